@@ -1,0 +1,82 @@
+"""A robot as data: its table, bodies, drives and shapes with exact numbers; robot files, the library, frames, poses."""
+
+from dhkit.description.assets import asset
+from dhkit.description.changes import with_base, with_parameters, with_payload, with_tool, with_uniform_links
+from dhkit.description.files import write_atomically
+from dhkit.description.frames import joint_array, link_transforms, world_to_frames, world_to_tool
+from dhkit.description.library import library_robot, robots
+from dhkit.description.locking import lock
+from dhkit.description.named import Named
+from dhkit.description.numbers import Array, Numbers
+from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
+from dhkit.description.robot import (
+    Base,
+    Body,
+    Box,
+    Capsule,
+    Convention,
+    Cylinder,
+    Description,
+    Drive,
+    Geometry,
+    Inertia,
+    Joint,
+    JointType,
+    Mesh,
+    Placement,
+    Shape,
+    Sphere,
+    Tool,
+    Units,
+)
+from dhkit.description.robot_file import from_toml, read_robot
+from dhkit.description.table import DHTable, from_dh
+from dhkit.description.toml_writer import to_toml, write_robot
+
+__all__ = [
+    "Array",
+    "Base",
+    "Body",
+    "Box",
+    "Capsule",
+    "Convention",
+    "Cylinder",
+    "DHTable",
+    "Description",
+    "Drive",
+    "Geometry",
+    "Inertia",
+    "Joint",
+    "JointType",
+    "Mesh",
+    "Named",
+    "Numbers",
+    "Placement",
+    "Shape",
+    "Sphere",
+    "Tool",
+    "Units",
+    "asset",
+    "check_pose",
+    "from_dh",
+    "from_toml",
+    "joint_array",
+    "library_robot",
+    "link_transforms",
+    "lock",
+    "pose",
+    "pose_parts",
+    "pose_quaternion",
+    "read_robot",
+    "robots",
+    "to_toml",
+    "with_base",
+    "with_parameters",
+    "with_payload",
+    "with_tool",
+    "with_uniform_links",
+    "world_to_frames",
+    "world_to_tool",
+    "write_atomically",
+    "write_robot",
+]

@@ -1,0 +1,180 @@
+"""New descriptions from old: another tool, base, payload, parameter values, uniform links."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.bodies import joined, moved_body, rod
+from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
+from dhkit.description.named import Named
+from dhkit.description.poses import check_pose, pose_parts
+from dhkit.description.robot import (
+    ORIGIN,
+    Base,
+    Body,
+    Convention,
+    Description,
+    Inertia,
+    Placement,
+    Tool,
+    Vector,
+)
+from dhkit.description.table import Quantity, quantity
+from dhkit.errors import DescriptionError
+from dhkit.expressions import Expression, exact, exact_angle
+
+__all__ = ["with_base", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
+
+
+def with_tool(description: Description, T: ArrayLike) -> Description:
+    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), in place of the one it has."""
+    return replace(description, tool=Tool(_placement(T, "tool"), description.tool.shapes))
+
+
+def with_base(description: Description, T: ArrayLike) -> Description:
+    """Return the arm with frame 0 at T in the world, shape (4, 4), in place of where it stood."""
+    base = description.base
+    return replace(description, base=Base(_placement(T, "base"), base.shapes, base.body))
+
+
+def with_parameters(description: Description, **values: Quantity) -> Description:
+    """Return the arm with other values of its parameters, SI and radians.
+
+    Raises
+    ------
+    DescriptionError
+        It has no such parameter, or the robot with this value is none.
+    """
+    known = description.parameters
+    for name in values:
+        if name not in known:
+            raise DescriptionError(f"{description.name} has no parameter {name!r}; it has {', '.join(known) or 'none'}")
+    new = {name: quantity(f"parameters.{name}", value, known) for name, value in values.items()}
+    return replace(description, parameters=Named(dict(known) | new))
+
+
+def with_payload(
+    description: Description,
+    mass: Quantity,
+    com: Sequence[Quantity] = (0, 0, 0),
+    inertia: ArrayLike | None = None,
+) -> Description:
+    """Return the arm with a rigid load joined to its last link.
+
+    Parameters
+    ----------
+    mass
+        kg; text may use the description's parameters.
+    com
+        Centre of mass in the tool's frame, m.
+    inertia
+        Tensor about the load's centre of mass in the tool's axes, shape (3, 3), kg m^2; a point mass if not given.
+
+    Raises
+    ------
+    DescriptionError
+        The last link has no body to join it to, or the load is no body.
+    """
+    last = description.joints[-1]
+    if last.body is None:
+        raise DescriptionError(
+            f"joint {description.n} ({last.name}) has no body to join a payload to; see with_uniform_links"
+        )
+    names = description.parameters
+    x, y, z = (quantity(f"payload: com[{i}]", entry, names) for i, entry in enumerate(com))
+    load = Body(quantity("payload: mass", mass, names), (x, y, z), _tensor(inertia))
+    T_last_tool = pose_of(description.tool.placement)
+    body = joined(last.body, moved_body(load, T_last_tool))
+    # What is joined is checked as a whole by the description; the load must be a body by itself.
+    replace(description, joints=(*description.joints[:-1], replace(last, body=load)))
+    return replace(description, joints=(*description.joints[:-1], replace(last, body=body)))
+
+
+def with_uniform_links(description: Description, masses: Sequence[Quantity] | None = None) -> Description:
+    """Return the arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
+
+    In the standard convention link i lies from frame i-1's origin to frame i's, in the modified one from frame i's to
+    frame i+1's; the last ends at the tool. A prismatic joint stands at zero.
+
+    Parameters
+    ----------
+    masses
+        One a link, kg; 1 kg each if not given.
+
+    Raises
+    ------
+    DescriptionError
+        Another number of masses, or ``m1`` ... is a parameter with a meaning of its own.
+    """
+    n = description.n
+    if masses is not None and len(masses) != n:
+        raise DescriptionError(f"{len(masses)} masses; expected {n}, one a link")
+    symbols = [f"m{i}" for i in range(1, n + 1)]
+    used = {name for joint in description.joints for name in _geometry_symbols(joint)}
+    if taken := used & set(symbols):
+        raise DescriptionError(f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass")
+    values = [exact(1)] * n if masses is None else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
+    ends = _link_ends(description)
+    joints = tuple(
+        replace(
+            joint,
+            body=rod(Expression.symbol(symbol), *end),
+            assumed=tuple(dict.fromkeys((*joint.assumed, "body"))),
+        )
+        for joint, symbol, end in zip(description.joints, symbols, ends, strict=True)
+    )
+    parameters = Named(dict(description.parameters) | dict(zip(symbols, values, strict=True)))
+    return replace(description, joints=joints, parameters=parameters)
+
+
+def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
+    """Return where each link's rod begins and ends, in its own frame."""
+    rows = [fixed_row(joint, description.convention) for joint in description.joints]
+    tool = _origin(pose_of(description.tool.placement))
+    if description.convention is Convention.MODIFIED:
+        return [(ORIGIN, _origin(row)) for row in rows[1:]] + [(ORIGIN, tool)]
+    ends = [(_origin(inverse(row)), ORIGIN) for row in rows]
+    return [*ends[:-1], (ends[-1][0], tool)]
+
+
+def _origin(T: ExactPose) -> Vector:
+    x, y, z = T[:3, 3]
+    return x, y, z
+
+
+def _geometry_symbols(joint: object) -> set[str]:
+    return {name for key in ("a", "alpha", "d", "theta") for name in getattr(joint, key).symbols}
+
+
+def _placement(T: ArrayLike, name: str) -> Placement:
+    matrix = np.asarray(T, dtype=float)
+    if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
+        raise ValueError(f"{name}: found shape {matrix.shape}; expected a finite (4, 4) pose")
+    xyz, (yaw, pitch, roll) = pose_parts(check_pose(matrix, name), order="ZYX")
+    x, y, z = (exact(float(entry)) for entry in xyz)
+    angles = (exact_angle(exact(_rounded(angle))) for angle in (roll, pitch, yaw))
+    r, p, w = angles
+    return Placement((x, y, z), (r, p, w))
+
+
+def _rounded(angle: float) -> float:
+    """Return an angle, with one within rounding of a multiple of 15 degrees put onto it."""
+    step = round(float(angle) * 12 / math.pi) * math.pi / 12
+    return step if math.isclose(angle, step, rel_tol=4e-16, abs_tol=4e-16) else float(angle)
+
+
+def _tensor(inertia: ArrayLike | None) -> Inertia:
+    if inertia is None:
+        return Inertia()
+    I = np.asarray(inertia, dtype=float)  # noqa: E741 - the field's letter
+    if I.shape != (3, 3) or not np.array_equal(I, I.T):
+        raise DescriptionError(f"payload: inertia has shape {I.shape}; expected a symmetric (3, 3) matrix")
+    if not np.all(np.isfinite(I)):
+        raise DescriptionError("payload: inertia is not finite")
+    entries = {"xx": I[0, 0], "yy": I[1, 1], "zz": I[2, 2], "xy": I[0, 1], "yz": I[1, 2], "xz": I[0, 2]}
+    return Inertia(**{key: exact(float(entry)) for key, entry in entries.items()})

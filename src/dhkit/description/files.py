@@ -1,0 +1,47 @@
+"""Reading at most so much, and writing all or nothing."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from dhkit.errors import DescriptionError
+
+__all__ = ["read_bounded", "write_atomically"]
+
+
+def read_bounded(path: Path, most: int) -> bytes:
+    """Return a regular file's bytes.
+
+    Raises
+    ------
+    DescriptionError
+        No such file, not a regular file, unreadable, or longer than ``most`` bytes.
+    """
+    try:
+        if not path.is_file():
+            raise DescriptionError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+    except (OSError, ValueError) as error:
+        raise DescriptionError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    if len(content) > most:
+        raise DescriptionError(f"{path}: more than {most / 1e6:g} MB; expected a robot file")
+    return content
+
+
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Write a file under a temporary name and rename it: it is there whole, or not at all."""
+    data = content.encode() if isinstance(content, str) else content
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

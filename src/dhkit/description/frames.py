@@ -1,0 +1,90 @@
+"""Frames of a description by a plain product of its table's matrices, for one state or a batch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Convention, Description
+
+__all__ = ["joint_array", "link_transforms", "world_to_frames", "world_to_tool"]
+
+
+def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
+    """Return an array of joint values, shape (..., n).
+
+    Raises
+    ------
+    ValueError
+        Another last axis than n.
+    TypeError
+        Not numbers.
+    """
+    try:
+        array = np.asarray(q, dtype=float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: found {type(q).__name__} of other things; expected numbers, shape (..., n)") from None
+    if array.ndim == 0 or array.shape[-1] != description.n:
+        raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
+    return array
+
+
+def link_transforms(description: Description, q: ArrayLike) -> Array:
+    """Return the table's matrices A_1 ... A_n.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1. NaN rows where q is NaN.
+    """
+    numbers = description.numbers
+    q = joint_array(description, q)
+    angle, offset = np.where(numbers.prismatic, 0.0, q), np.where(numbers.prismatic, q, 0.0)
+    cos_q, sin_q = np.cos(angle), np.sin(angle)
+    # The table's own angle enters by the sum's formula, so that an offset of 90 degrees is exact.
+    cos_theta = cos_q * numbers.cos_theta - sin_q * numbers.sin_theta
+    sin_theta = sin_q * numbers.cos_theta + cos_q * numbers.sin_theta
+    cos_alpha, sin_alpha, a, d = numbers.cos_alpha, numbers.sin_alpha, numbers.a, numbers.d + offset
+
+    A = np.zeros((*q.shape, 4, 4))
+    A[..., 3, 3] = 1.0
+    A[..., 0, 0] = cos_theta
+    A[..., 2, 2] = cos_alpha
+    if description.convention is Convention.STANDARD:
+        A[..., 0, 1], A[..., 0, 2], A[..., 0, 3] = -sin_theta * cos_alpha, sin_theta * sin_alpha, a * cos_theta
+        A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta, cos_theta * cos_alpha, -cos_theta * sin_alpha
+        A[..., 1, 3] = a * sin_theta
+        A[..., 2, 1], A[..., 2, 3] = sin_alpha, d
+    else:
+        A[..., 0, 1], A[..., 0, 3] = -sin_theta, a
+        A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta * cos_alpha, cos_theta * cos_alpha, -sin_alpha
+        A[..., 1, 3] = -sin_alpha * d
+        A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
+    return np.where(np.isnan(q).any(axis=-1)[..., None, None, None], np.nan, A)
+
+
+def world_to_frames(description: Description, q: ArrayLike) -> Array:
+    """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), for joint values of shape (..., n)."""
+    A = link_transforms(description, q)
+    frames = np.empty((*A.shape[:-3], description.n + 1, 4, 4))
+    frames[..., 0, :, :] = description.numbers.T_world_base
+    frames[..., 0, :, :] += 0.0 * A[..., 0, :, :]  # NaN where the state is
+    for i in range(description.n):
+        np.matmul(frames[..., i, :, :], A[..., i, :, :], out=frames[..., i + 1, :, :])
+    return frames
+
+
+def world_to_tool(description: Description, q: ArrayLike) -> Array:
+    """Return the tool's frame in the world, shape (..., 4, 4): base A_1 ... A_n tool."""
+    A = link_transforms(description, q)
+    T = np.broadcast_to(description.numbers.T_world_base, (*A.shape[:-3], 4, 4))
+    for i in range(description.n):
+        T = T @ A[..., i, :, :]
+    tool: Array = T @ description.numbers.T_last_tool
+    return tool

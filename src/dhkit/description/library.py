@@ -1,0 +1,44 @@
+"""The named robots that come with dhkit."""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib import resources
+
+from dhkit.description.assets import asset
+from dhkit.description.robot import Description
+from dhkit.description.robot_file import from_toml
+from dhkit.errors import DescriptionError
+
+__all__ = ["library_robot", "robots"]
+
+
+@cache
+def robots() -> tuple[str, ...]:
+    """Return the names of the library's robots, sorted.
+
+    Examples
+    --------
+    >>> "puma560" in robots()
+    True
+    """
+    files = (resources.files("dhkit.description") / "library").iterdir()
+    return tuple(sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml")))
+
+
+@cache
+def library_robot(name: str) -> Description:
+    """Return a robot of the library.
+
+    Raises
+    ------
+    DescriptionError
+        No robot of that name; names the nearest.
+    """
+    if name not in robots():
+        close = difflib.get_close_matches(name, robots(), n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(robots())}"
+        raise DescriptionError(f"no robot {name[:80]!r} in the library; {hint}")
+    text = (resources.files("dhkit.description") / "library" / f"{name}.toml").read_text("utf-8")
+    return from_toml(text, file=f"{name}.toml", mesh_folder=asset("meshes"))

@@ -1,0 +1,231 @@
+"""Joints frozen in place: a shorter arm with a table of its own, the same motion and the same masses.
+
+Between two moving joints the frozen row is a fixed transform Y. Written as
+
+    Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta)
+
+it is again a row: turns and shifts about a joint's own axis commute with the joint and go into its theta and d. This is
+the common normal of the two axes, found from Y's entries (Denavit & Hartenberg 1955).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dhkit.description.bodies import joined, moved_body
+from dhkit.description.exact_poses import (
+    ExactPose,
+    fixed_row,
+    identity,
+    inverse,
+    moved,
+    placement_of,
+    pose_of,
+    rotation_x,
+    rotation_z,
+    settled,
+    translation,
+)
+from dhkit.description.named import Named
+from dhkit.description.parameters import resolved
+from dhkit.description.robot import Base, Body, Convention, Description, Joint, Shape, Tool
+from dhkit.description.table import Quantity, quantity
+from dhkit.errors import DescriptionError
+from dhkit.expressions import PI, ZERO, Expression, arc_tangent, cos, exact_angle, sin, sqrt, substitute
+
+__all__ = ["lock"]
+
+PARALLEL = 1e-10
+"""Sine of the angle between two axes below which they count as parallel: a row of the table cannot say it better."""
+
+
+class _Chain(NamedTuple):
+    """What freezing a joint changes."""
+
+    base: Base
+    joints: tuple[Joint, ...]
+    tool: Tool
+
+
+class _Row(NamedTuple):
+    """Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta)."""
+
+    beta: Expression
+    epsilon: Expression
+    a: Expression
+    alpha: Expression
+    gamma: Expression
+    delta: Expression
+
+
+def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Description:
+    """Return the arm with some joints frozen, their links joined to the link before, or to the base.
+
+    Every remaining joint keeps its zero, limits and drive; configurations lose the frozen entries. The drives of
+    frozen joints go: their rotors stand still. A link without a body makes the joined link one without.
+
+    Parameters
+    ----------
+    joints
+        Where each is frozen, rad or m; by place from 0, or by name.
+
+    Raises
+    ------
+    DescriptionError
+        No such joint, one named twice, or none left to move.
+    """
+    held = _places(description, joints)
+    if len(held) == description.n:
+        raise DescriptionError(f"all {description.n} joints locked; expected one left to move")
+    chain = _Chain(description.base, description.joints, description.tool)
+    values = resolved(description.parameters)
+    for place in sorted(held, reverse=True):
+        chain = _without(chain, description.convention, place, held[place], values)
+    kept = [i for i in range(description.n) if i not in held]
+    configurations = Named({name: tuple(q[i] for i in kept) for name, q in description.configurations.items()})
+    return replace(description, configurations=configurations, **chain._asdict())
+
+
+def _places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
+    names = [joint.name for joint in description.joints]
+    places: dict[int, Expression] = {}
+    for key, value in joints.items():
+        if isinstance(key, str) and key in names:
+            place = names.index(key)
+        elif isinstance(key, (int, np.integer)) and not isinstance(key, bool) and 0 <= key < description.n:
+            place = int(key)
+        else:
+            raise DescriptionError(
+                f"lock: no joint {key!r}; expected 0 to {description.n - 1} or one of {', '.join(names)}"
+            )
+        if place in places:
+            raise DescriptionError(f"lock: joint {place} ({names[place]}) given twice")
+        q = quantity(f"lock: joint {place} ({names[place]})", value, description.parameters)
+        places[place] = exact_angle(q) if description.joints[place].is_revolute else q
+    return places
+
+
+def _without(
+    chain: _Chain, convention: Convention, place: int, q: Expression, values: Mapping[str, Expression]
+) -> _Chain:
+    """Freeze the joint at one place."""
+    row = fixed_row(chain.joints[place], convention, q)
+    if place == 0:
+        return _onto_base(chain, row)
+    if place == len(chain.joints) - 1:
+        return _onto_tool(chain, row)
+    return _between(chain, convention, place, row, values)
+
+
+def _onto_base(chain: _Chain, row: ExactPose) -> _Chain:
+    """Make frame 1 the new frame 0."""
+    base, first = chain.base, chain.joints[0]
+    back = inverse(row)
+    held = None if base.body is None else moved_body(base.body, back)
+    placement = placement_of(pose_of(base.placement) @ row)
+    body = joined(held, first.body) if held and first.body else held or first.body
+    return chain._replace(
+        base=Base(placement, _moved_shapes(base.shapes, back) + first.shapes, body), joints=chain.joints[1:]
+    )
+
+
+def _onto_tool(chain: _Chain, row: ExactPose) -> _Chain:
+    """Make the last link part of the one before, and its row part of the tool's placement."""
+    *others, before, last = chain.joints
+    placement = placement_of(row @ pose_of(chain.tool.placement))
+    return chain._replace(
+        joints=(*others, _carrying(before, last, identity(), row)), tool=Tool(placement, chain.tool.shapes)
+    )
+
+
+def _between(
+    chain: _Chain, convention: Convention, place: int, row: ExactPose, values: Mapping[str, Expression]
+) -> _Chain:
+    before, frozen, after = chain.joints[place - 1 : place + 2]
+    if convention is Convention.STANDARD:
+        own = translation(x=before.a) @ rotation_x(before.alpha)
+        new = _common_normal(own @ row, values)
+        along_x = translation(x=new.a) @ rotation_x(new.alpha)
+        to_new = inverse(rotation_z(new.beta) @ translation(z=new.epsilon) @ along_x) @ own
+        before, after = replace(before, a=new.a, alpha=new.alpha), after
+    else:
+        new = _common_normal(row @ translation(x=after.a) @ rotation_x(after.alpha), values)
+        to_new = inverse(rotation_z(new.beta) @ translation(z=new.epsilon))
+        after = replace(after, a=new.a, alpha=new.alpha)
+    before = _turned(_carrying(before, frozen, to_new, to_new @ row), new.beta, new.epsilon)
+    after = _turned(after, new.gamma, new.delta)
+    return chain._replace(joints=(*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]))
+
+
+def _carrying(before: Joint, frozen: Joint, T_new_before: ExactPose, T_new_frozen: ExactPose) -> Joint:
+    """Join the frozen link to the one before, both put into the new frame."""
+    body: Body | None = None
+    if before.body is not None and frozen.body is not None:
+        body = joined(moved_body(before.body, T_new_before), moved_body(frozen.body, T_new_frozen))
+    shapes = _moved_shapes(before.shapes, T_new_before) + _moved_shapes(frozen.shapes, T_new_frozen)
+    assumed = tuple(dict.fromkeys(before.assumed + frozen.assumed * ("body" in frozen.assumed)))
+    return replace(before, body=body, shapes=shapes, assumed=assumed)
+
+
+def _moved_shapes(shapes: tuple[Shape, ...], T: ExactPose) -> tuple[Shape, ...]:
+    return tuple(replace(shape, placement=moved(shape.placement, T)) for shape in shapes)
+
+
+def _turned(joint: Joint, angle: Expression, shift: Expression) -> Joint:
+    """Turn and shift a row about its own joint's axis."""
+    return replace(joint, theta=exact_angle(settled(joint.theta + angle, angle=True)), d=settled(joint.d + shift))
+
+
+def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
+    """Write a fixed transform as a row; see the module's docstring."""
+
+    def size(x: Expression) -> float:
+        return float(substitute(x, values))
+
+    if math.hypot(size(Y[0, 2]), size(Y[1, 2])) < PARALLEL:
+        row = _parallel(Y, opposite=size(Y[2, 2]) < 0)
+    else:
+        row = _skew(Y, size)
+    beta, epsilon, a, alpha, gamma, delta = row
+    return _Row(
+        settled(beta, angle=True),
+        settled(epsilon),
+        settled(a),
+        settled(alpha, angle=True),
+        settled(gamma, angle=True),
+        settled(delta),
+    )
+
+
+def _parallel(Y: ExactPose, opposite: bool) -> _Row:
+    """Axes that point along each other: the normal is taken through the first joint's frame."""
+    x, y, z = Y[:3, 3]
+    turn = arc_tangent(Y[1, 0], Y[0, 0])
+    if y.is_zero:
+        beta, a = ZERO, x
+    elif x.is_zero:
+        beta, a = PI / 2, y
+    else:
+        beta, a = arc_tangent(y, x), sqrt(x * x + y * y)
+    return _Row(beta, z, a, PI if opposite else ZERO, beta - turn if opposite else turn - beta, ZERO)
+
+
+def _skew(Y: ExactPose, size: Callable[[Expression], float]) -> _Row:
+    """Axes that do not: beta from the second axis' direction, the rest from where it passes."""
+    (x, y, z), (u, v, w) = Y[:3, 3], Y[:3, 2]
+    if u.is_zero:
+        beta, sine = ZERO, -v
+    elif v.is_zero:
+        beta, sine = PI / 2, u
+    else:
+        beta, sine = arc_tangent(u, -v), sqrt(u * u + v * v)
+    c, s = (cos(beta), sin(beta)) if u.is_zero or v.is_zero else (-v / sine, u / sine)
+    delta = (x * s - y * c) / sine
+    sign = -1 if size(sine) < 0 else 1
+    gamma = arc_tangent(Y[2, 0] * sign, Y[2, 1] * sign)
+    return _Row(beta, z - delta * w, x * c + y * s, arc_tangent(sine, w), gamma, delta)

@@ -1,0 +1,147 @@
+"""The float view of a description: what array code reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description.parameters import resolved
+from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from dhkit.description.robot import Body, Description, Joint, Placement, Vector
+
+__all__ = ["Array", "Numbers", "matrix"]
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Arrays of a robot's numbers, SI and radians, read-only; n joints.
+
+    Cosines and sines are rounded from the exact angles: those of 90 degrees are 0 and 1.
+    """
+
+    values: dict[str, float]
+    """The parameters' values."""
+    a: Array
+    """Shape (n,), m."""
+    d: Array
+    """Shape (n,), m."""
+    alpha: Array
+    """Shape (n,), rad."""
+    theta: Array
+    """Shape (n,), rad."""
+    cos_alpha: Array
+    sin_alpha: Array
+    cos_theta: Array
+    sin_theta: Array
+    prismatic: NDArray[np.bool_]
+    """Shape (n,)."""
+    lower: Array
+    """Shape (n,), rad or m; -inf where unlimited."""
+    upper: Array
+    velocity: Array
+    """Shape (n,), rad/s or m/s; inf where unlimited."""
+    effort: Array
+    """Shape (n,), N m or N; inf where unlimited."""
+    mass: Array
+    """Shape (n,), kg; NaN where a link has no body."""
+    com: Array
+    """Shape (n, 3), m, in DH frame i."""
+    inertia: Array
+    """Shape (n, 3, 3), kg m^2, about the centre of mass in the axes of DH frame i."""
+    armature: Array
+    """Shape (n,), gear^2 rotor inertia, kg m^2 or kg; 0 without a drive."""
+    viscous: Array
+    """Shape (n,), joint side, N m s/rad or N s/m."""
+    coulomb: Array
+    """Shape (n, 2), joint side, against positive and against negative motion, N m or N; the second is <= 0."""
+    gravity: Array
+    """Shape (3,), m/s^2, world."""
+    T_world_base: Array
+    """Shape (4, 4): frame 0 in the world."""
+    T_last_tool: Array
+    """Shape (4, 4): the tool in DH frame n."""
+    reach: float
+    """The sum of abs(a) + abs(d) + stroke, m."""
+
+    @classmethod
+    def of(cls, description: Description) -> Numbers:
+        """Round a description's exact numbers."""
+        values = resolved(description.parameters)
+        joints = description.joints
+        bodies = [joint.body for joint in joints]
+        drives = [joint.drive for joint in joints]
+
+        def known(expression: Expression) -> Expression:
+            return substitute(expression, values)
+
+        def array(column: Iterable[Expression | float]) -> Array:
+            return np.array([float(known(x)) if isinstance(x, Expression) else x for x in column], dtype=float)
+
+        def angles(column: Iterable[Expression]) -> list[Expression]:
+            return [exact_angle(known(x)) for x in column]
+
+        alpha, theta = angles(j.alpha for j in joints), angles(j.theta for j in joints)
+        lower = array(j.limits[0] if j.limits else -np.inf for j in joints)
+        upper = array(j.limits[1] if j.limits else np.inf for j in joints)
+        a, d = array(j.a for j in joints), array(j.d for j in joints)
+        gear = array(drive.gear if drive else 1.0 for drive in drives)
+        prismatic = np.array([not j.is_revolute for j in joints])
+        numbers = cls(
+            values={name: float(value) for name, value in values.items()},
+            a=a,
+            d=d,
+            alpha=array(alpha),
+            theta=array(theta),
+            cos_alpha=array(cos(x) for x in alpha),
+            sin_alpha=array(sin(x) for x in alpha),
+            cos_theta=array(cos(x) for x in theta),
+            sin_theta=array(sin(x) for x in theta),
+            prismatic=prismatic,
+            lower=lower,
+            upper=upper,
+            velocity=array(np.inf if j.velocity is None else j.velocity for j in joints),
+            effort=array(np.inf if j.effort is None else j.effort for j in joints),
+            mass=array(body.mass if body else np.nan for body in bodies),
+            com=np.array([array(body.com) if body else np.full(3, np.nan) for body in bodies]),
+            inertia=np.array([_tensor(body, array) for body in bodies]),
+            armature=array(drive.armature if drive else 0.0 for drive in drives),
+            viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
+            coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
+            gravity=array(description.gravity),
+            T_world_base=matrix(description.base.placement, values),
+            T_last_tool=matrix(description.tool.placement, values),
+            reach=float(np.sum(np.abs(a) + np.abs(d)) + _stroke(joints, lower, upper)),
+        )
+        for item in fields(numbers):
+            value = getattr(numbers, item.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        return numbers
+
+
+def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
+    """Return a placement's (4, 4) matrix; right angles have exact cosines."""
+    from dhkit.description.exact_poses import pose_of
+
+    return np.array(
+        [[float(substitute(entry, values)) for entry in row] for row in pose_of(placement, values)], dtype=float
+    )
+
+
+def _tensor(body: Body | None, array: Callable[[Vector], Array]) -> Array:
+    return np.full((3, 3), np.nan) if body is None else np.array([array(row) for row in body.inertia.rows])
+
+
+def _stroke(joints: Sequence[Joint], lower: Array, upper: Array) -> float:
+    """Return how far the prismatic joints with limits can move away from zero, m."""
+    strokes = [max(abs(lo), abs(up)) for j, lo, up in zip(joints, lower, upper, strict=True) if not j.is_revolute]
+    return float(sum(stroke for stroke in strokes if np.isfinite(stroke)))

@@ -1,0 +1,212 @@
+"""Poses as people state them, position with Euler angles or a quaternion, to and from homogeneous matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.numbers import Array
+
+__all__ = ["check_pose", "pose", "pose_parts", "pose_quaternion"]
+
+ORTHONORMAL = 1e-6
+"""Largest entry of R^T R - 1 that still counts as a rotation: six digits typed by hand."""
+AXES = {"X": 0, "Y": 1, "Z": 2}
+
+
+def pose(
+    xyz: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    euler: ArrayLike | None = None,
+    order: str = "XYZ",
+    degrees: bool = False,
+    quat: ArrayLike | None = None,
+) -> Array:
+    """Return the homogeneous matrix of a pose.
+
+    Parameters
+    ----------
+    xyz
+        Position, shape (..., 3), m.
+    euler
+        Three angles, shape (..., 3), in the order's sequence.
+    order
+        Three axes, neighbours different. Capitals turn about the moving axes, as in SciPy: ``"XYZ"`` is Rx Ry Rz;
+        small letters about the fixed ones: ``"xyz"`` is Rz Ry Rx, a URDF's rpy.
+    degrees
+        Whether angles are in degrees. Multiples of 90 degrees give exact zeros and ones.
+    quat
+        Quaternion (x, y, z, w) instead, shape (..., 4), of any length but zero.
+
+    Returns
+    -------
+    Array
+        Shape (..., 4, 4), batch axes broadcast.
+
+    Raises
+    ------
+    ValueError
+        Another shape or order, both euler and quat, or a quaternion of zero length.
+
+    Examples
+    --------
+    >>> pose((0.4, 0.1, 0.2), euler=(0, 90, 0), degrees=True)[:3, 2]
+    array([1., 0., 0.])
+    """
+    position = _array("xyz", xyz, 3)
+    if euler is not None and quat is not None:
+        raise ValueError("pose: both euler and quat given; expected one of them")
+    if quat is not None:
+        rotation = _from_quaternion(_array("quat", quat, 4))
+    else:
+        rotation = _from_euler(_array("euler", (0.0, 0.0, 0.0) if euler is None else euler, 3), order, degrees)
+    batch = np.broadcast_shapes(position.shape[:-1], rotation.shape[:-2])
+    T = np.zeros((*batch, 4, 4))
+    T[..., :3, :3] = rotation
+    T[..., :3, 3] = position
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tuple[Array, Array]:
+    """Return position and Euler angles of a pose.
+
+    Where the first and third axis coincide (gimbal lock) only their sum or difference is determined: the third angle
+    is then 0. Angles come from arc tangents alone, which keep full precision near it.
+
+    Parameters
+    ----------
+    T
+        Shape (..., 4, 4).
+    order, degrees
+        As for :func:`pose`.
+
+    Returns
+    -------
+    tuple[Array, Array]
+        Position, shape (..., 3), m, and angles, shape (..., 3), the middle one in [-90, 90] degrees or, for an order
+        that ends as it begins, in [0, 180].
+
+    Raises
+    ------
+    ValueError
+        Another shape or order, or a matrix that is no pose.
+
+    Examples
+    --------
+    >>> xyz, angles = pose_parts(pose((1, 2, 3), euler=(10, 20, 30), degrees=True), degrees=True)
+    >>> angles.round(9)
+    array([10., 20., 30.])
+    """
+    T = check_pose(T)
+    angles = _to_euler(T[..., :3, :3], order)
+    return T[..., :3, 3].copy(), np.degrees(angles) if degrees else angles
+
+
+def pose_quaternion(T: ArrayLike) -> Array:
+    """Return a pose's unit quaternion (x, y, z, w) with w >= 0, shape (..., 4)."""
+    from scipy.spatial.transform import Rotation
+
+    R = check_pose(T)[..., :3, :3]
+    quaternions = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(canonical=True)
+    return np.asarray(quaternions, dtype=float).reshape(*R.shape[:-2], 4)
+
+
+def check_pose(T: ArrayLike, name: str = "T") -> Array:
+    """Return T as an array of poses; NaN rows pass.
+
+    Raises
+    ------
+    ValueError
+        Not of shape (..., 4, 4), or some matrix is no rigid transform to 1e-6.
+    """
+    array = np.asarray(T, dtype=float)
+    if array.shape[-2:] != (4, 4):
+        raise ValueError(f"{name} has shape {array.shape}; expected (..., 4, 4)")
+    R = array[..., :3, :3]
+    defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+    bottom = np.abs(array[..., 3, :] - (0, 0, 0, 1)).max(axis=-1)
+    improper = np.linalg.det(R) < 0
+    if np.any((defect > ORTHONORMAL) | (bottom > ORTHONORMAL) | improper):
+        raise ValueError(f"{name} is no pose: its rotation must be orthonormal, its last row 0 0 0 1")
+    return array
+
+
+def _array(name: str, value: ArrayLike, size: int) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape[-1:] != (size,):
+        raise ValueError(f"{name} has shape {array.shape}; expected (..., {size})")
+    return array
+
+
+def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
+    """Return the axes' indices in the sequence of intrinsic turns, and whether the order was extrinsic."""
+    upper = order.upper()
+    intrinsic, extrinsic = order == upper, order == order.lower()
+    if len(order) != 3 or set(upper) - set("XYZ") or not (intrinsic or extrinsic) or upper[1] in (upper[0], upper[2]):
+        raise ValueError(f"order is {order!r}; expected three of XYZ (moving) or xyz (fixed), neighbours different")
+    first, second, third = (AXES[letter] for letter in (upper if intrinsic else upper[::-1]))
+    return (first, second, third), extrinsic
+
+
+def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
+    if not degrees:
+        return np.cos(angles), np.sin(angles)
+    # Reduce in degrees, where it is exact, so that 90 degrees have the cosine 0.
+    quarter = np.round(angles / 90.0)
+    rest = np.radians(angles - 90.0 * quarter)
+    c, s = np.cos(rest), np.sin(rest)
+    turn = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
+    cosine = np.select([turn == 0, turn == 1, turn == 2], [c, -s, -c], s)
+    sine = np.select([turn == 0, turn == 1, turn == 2], [s, c, -s], -c)
+    return cosine + 0.0, sine + 0.0
+
+
+def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
+    axes, extrinsic = _axes(order)
+    cosines, sines = _cos_sin(angles[..., ::-1] if extrinsic else angles, degrees)
+    rotation = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
+    for k, axis in enumerate(axes):
+        turn = np.zeros((*angles.shape[:-1], 3, 3))
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[..., axis, axis] = 1.0
+        turn[..., i, i] = turn[..., j, j] = cosines[..., k]
+        turn[..., i, j], turn[..., j, i] = -sines[..., k], sines[..., k]
+        rotation = rotation @ turn
+    return rotation
+
+
+def _to_euler(R: Array, order: str) -> Array:
+    """Return the angles of R = R_i(p) R_j(q) R_k(r) (Shoemake, Graphics Gems IV, 1994, with atan2 throughout)."""
+    (i, j, k), extrinsic = _axes(order)
+    o = 3 - i - j
+    parity = 1.0 if (j - i) % 3 == 1 else -1.0
+    proper = i == k
+    if proper:
+        level = np.hypot(R[..., j, i], R[..., o, i])
+        first, middle = np.arctan2(R[..., j, i], -parity * R[..., o, i]), np.arctan2(level, R[..., i, i])
+    else:
+        level = np.hypot(R[..., i, i], R[..., i, j])
+        first, middle = np.arctan2(-parity * R[..., j, k], R[..., k, k]), np.arctan2(parity * R[..., i, k], level)
+    locked = level == 0.0
+    first = np.where(locked, np.arctan2(parity * R[..., o, j], R[..., j, j]), first)
+    # With the first turn taken off, row j of what is left depends on the third alone, however near the lock is.
+    c, s = np.cos(first), np.sin(first)
+    row = c[..., None] * R[..., j, :] + parity * s[..., None] * R[..., o, :]
+    sine = -row[..., o] if proper else row[..., i]
+    third = np.where(locked, 0.0, np.arctan2(parity * sine, row[..., j]))
+    angles = np.stack([first, middle, third], axis=-1) + 0.0
+    return angles[..., ::-1] if extrinsic else angles
+
+
+def _from_quaternion(quaternion: Array) -> Array:
+    norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    if np.any(norm == 0.0):
+        raise ValueError("quat has zero length; expected (x, y, z, w) of a rotation")
+    x, y, z, w = np.moveaxis(quaternion / norm, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

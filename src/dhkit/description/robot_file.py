@@ -1,0 +1,232 @@
+"""Robot files: TOML text to a description and back, without loss."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dhkit.description.files import read_bounded
+from dhkit.description.named import Named
+from dhkit.description.robot import (
+    Base,
+    Body,
+    Box,
+    Capsule,
+    Convention,
+    Cylinder,
+    Description,
+    Drive,
+    Inertia,
+    Joint,
+    JointType,
+    Mesh,
+    Placement,
+    Shape,
+    Sphere,
+    Tool,
+    Units,
+    Vector,
+)
+from dhkit.errors import DescriptionError, ExpressionError
+from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
+
+if TYPE_CHECKING:
+    from dhkit.description.schema import BodyForm, DriveForm, Entry, JointForm, RobotForm, ShapeForm
+
+__all__ = ["from_toml", "read_robot"]
+
+MAX_BYTES = 1_000_000
+DOTTED_KEY = re.compile(r"[\w\-\"']+(?:[ \t]*\.[ \t]*[\w\-\"']+){9}")
+"""No key of ours is dotted so deep, and tomllib takes quadratic time over such keys."""
+ONE = exact(1)
+
+
+def read_robot(path: str | Path) -> Description:
+    """Read a robot file.
+
+    Raises
+    ------
+    DescriptionError
+        It cannot be read, or describes no robot: file, joint, key, what was found and expected.
+    """
+    path = Path(path)
+    content = read_bounded(path, MAX_BYTES)
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise DescriptionError(f"{path}: not UTF-8 text (byte {error.start + 1})") from None
+    return from_toml(text, file=str(path), mesh_folder=path.parent)
+
+
+def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None = None) -> Description:
+    """Read a robot file's text; ``file`` names it in messages, mesh paths are relative to ``mesh_folder``.
+
+    Raises
+    ------
+    DescriptionError
+        See :func:`read_robot`.
+    """
+    from dhkit.description.schema import validated
+
+    try:
+        if len(text) > MAX_BYTES:
+            raise DescriptionError(f"more than {MAX_BYTES / 1e6:g} MB; expected a robot file")
+        return _Reader(validated(_document(text)), mesh_folder).description()
+    except DescriptionError as error:
+        raise DescriptionError(f"{file}: {error}") from None
+
+
+def _document(text: str) -> dict[str, Any]:
+    if deep := DOTTED_KEY.search(text):
+        raise DescriptionError(f"the key {deep.group()[:40]}... is nested too deep")
+    try:
+        return tomllib.loads(text, parse_float=_decimal)
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
+    except RecursionError:
+        raise DescriptionError("nested too deep") from None
+    except ValueError as error:
+        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
+
+
+def _decimal(text: str) -> Decimal:
+    try:
+        return Decimal(text)
+    except InvalidOperation:
+        raise DescriptionError(f"{text[:40]} is beyond the range of a double") from None
+
+
+class _Reader:
+    """A validated form, turned into exact values in SI units."""
+
+    def __init__(self, form: RobotForm, mesh_folder: Path | None) -> None:
+        self.form = form
+        self.mesh_folder = mesh_folder
+        self.units = Units(form.units.length, form.units.angle)
+        self.names = frozenset(form.parameters)
+        self.budget = Budget()
+
+    def description(self) -> Description:
+        form = self.form
+        return Description(
+            name=form.name,
+            convention=Convention(form.convention),
+            parameters=Named({name: self.number(f"parameters.{name}", x) for name, x in form.parameters.items()}),
+            joints=tuple(self.joint(i, joint) for i, joint in enumerate(form.joint, start=1)),
+            gravity=self.vector("gravity", form.gravity),
+            base=Base(
+                self.placement("base", form.base.xyz, form.base.rpy),
+                self.shapes("base", form.base.shape),
+                self.body("base", form.base.body),
+            ),
+            tool=Tool(self.placement("tool", form.tool.xyz, form.tool.rpy), self.shapes("tool", form.tool.shape)),
+            configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
+            source=form.source,
+            notes=form.notes,
+            units=self.units,
+            mesh_folder=self.mesh_folder,
+        )
+
+    def number(self, where: str, entry: Entry, unit: Expression = ONE) -> Expression:
+        """Read an entry: a bare number in this unit, or text in SI."""
+        try:
+            if isinstance(entry, str):
+                return parse(entry, self.names, self.budget)
+            return exact(entry) * unit
+        except ExpressionError as error:
+            raise DescriptionError(f"{where}: {error}") from None
+
+    def length(self, where: str, entry: Entry) -> Expression:
+        return self.number(where, entry, self.units.metres)
+
+    def angle(self, where: str, entry: Entry) -> Expression:
+        value = self.number(where, entry, self.units.radians)
+        snapped = exact_angle(value)
+        return snapped.as_written(value.written) if value.written is not None else snapped
+
+    def vector(self, where: str, entries: Sequence[Entry], unit: Expression = ONE) -> Vector:
+        x, y, z = (self.number(f"{where}[{i}]", entry, unit) for i, entry in enumerate(entries))
+        return x, y, z
+
+    def placement(self, where: str, xyz: Sequence[Entry], rpy: Sequence[Entry]) -> Placement:
+        roll, pitch, yaw = (self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(rpy))
+        return Placement(self.vector(f"{where}: xyz", xyz, self.units.metres), (roll, pitch, yaw))
+
+    def motion(self, where: str, type: JointType, entry: Entry) -> Expression:
+        """Read a value of the joint variable, or its rate."""
+        return self.angle(where, entry) if type is JointType.REVOLUTE else self.length(where, entry)
+
+    def joint(self, number: int, form: JointForm) -> Joint:
+        where = f"joint {number}" + (f" ({form.name[:40]})" if form.name else "")
+        kind = JointType(form.type)
+        limits = None
+        if form.limits is not None:
+            lower, upper = (self.motion(f"{where}: limits[{i}]", kind, x) for i, x in enumerate(form.limits))
+            limits = (lower, upper)
+        return Joint(
+            type=kind,
+            a=self.length(f"{where}: a", form.a),
+            alpha=self.angle(f"{where}: alpha", form.alpha),
+            d=self.length(f"{where}: d", form.d),
+            theta=self.angle(f"{where}: theta", form.theta),
+            name=form.name,
+            limits=limits,
+            velocity=None if form.velocity is None else self.motion(f"{where}: velocity", kind, form.velocity),
+            effort=None if form.effort is None else self.number(f"{where}: effort", form.effort),
+            body=self.body(where, form.body),
+            drive=self.drive(where, form.drive),
+            shapes=self.shapes(where, form.shape),
+            assumed=tuple(form.assumed),
+        )
+
+    def body(self, where: str, form: BodyForm | None) -> Body | None:
+        if form is None:
+            return None
+        tensor = {
+            key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key))
+            for key in ("xx", "yy", "zz", "xy", "yz", "xz")
+        }
+        return Body(
+            self.number(f"{where}: body.mass", form.mass),
+            self.vector(f"{where}: body.com", form.com, self.units.metres),
+            Inertia(**tensor),
+            form.unphysical,
+        )
+
+    def drive(self, where: str, form: DriveForm | None) -> Drive | None:
+        if form is None:
+            return None
+        coulomb = [self.number(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)]
+        return Drive(
+            *(self.number(f"{where}: drive.{key}", getattr(form, key)) for key in ("gear", "rotor_inertia", "viscous")),
+            coulomb=(coulomb[0], coulomb[1] if len(coulomb) == 2 else -coulomb[0]),
+        )
+
+    def shapes(self, where: str, forms: Iterable[ShapeForm]) -> tuple[Shape, ...]:
+        return tuple(self.shape(f"{where}: shape", form) for form in forms)
+
+    def shape(self, where: str, form: ShapeForm) -> Shape:
+        placement = self.placement(where, form.xyz, form.rpy)
+        if form.mesh is not None:
+            return Shape(Mesh(form.mesh, self.number(f"{where}.scale", form.scale)), placement, form.color)
+        if form.box is not None:
+            return Shape(Box(self.vector(f"{where}.box", form.box, self.units.metres)), placement, form.color)
+        if form.sphere is not None:
+            return Shape(Sphere(self.length(f"{where}.sphere.radius", form.sphere.radius)), placement, form.color)
+        kind, round_form = (Cylinder, form.cylinder) if form.cylinder is not None else (Capsule, form.capsule)
+        assert round_form is not None  # the form holds exactly one of the five
+        radius = self.length(f"{where}.radius", round_form.radius)
+        return Shape(kind(radius, self.length(f"{where}.length", round_form.length)), placement, form.color)
+
+    def configuration(self, name: str, q: Sequence[Entry]) -> tuple[Expression, ...]:
+        where = f"configurations.{name[:80]}"
+        if len(q) != len(self.form.joint):
+            raise DescriptionError(f"{where}: {len(q)} numbers; expected {len(self.form.joint)}, one a joint")
+        return tuple(
+            self.motion(f"{where}[{i}]", JointType(joint.type), entry)
+            for i, (joint, entry) in enumerate(zip(self.form.joint, q, strict=True))
+        )

@@ -1,0 +1,302 @@
+"""The robot file's form, format 1: one definition that validates files and prints as JSON Schema."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from dhkit.errors import DescriptionError
+
+__all__ = ["BodyForm", "JointForm", "RobotForm", "ShapeForm", "robot_schema", "validated"]
+
+Entry: TypeAlias = int | Decimal | str
+"""A number as the file has it: bare, or text in quotes."""
+
+
+def _entry(value: object) -> Entry:
+    if isinstance(value, bool) or not isinstance(value, (int, Decimal, float, str)):
+        raise PydanticCustomError("number", "expected a number, or an expression in quotes")
+    return Decimal(repr(value)) if isinstance(value, float) else value
+
+
+def _one_or_several(value: object) -> object:
+    return [value] if isinstance(value, dict) else value
+
+
+def _keyed_inertia(value: object) -> object:
+    """Turn a 3x3 list into keys; refuse a list of six, which every tool orders in its own way."""
+    if not isinstance(value, list):
+        return value
+    if len(value) == 3 and all(isinstance(row, list) and len(row) == 3 for row in value):
+        rows = [[_entry(entry) for entry in row] for row in value]
+        for i, j in ((0, 1), (1, 2), (0, 2)):
+            if rows[i][j] != rows[j][i]:
+                raise PydanticCustomError("inertia", f"expected a symmetric matrix; {rows[i][j]} is not {rows[j][i]}")
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = rows
+        return {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+    raise PydanticCustomError(
+        "inertia", "expected keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently"
+    )
+
+
+def _one_or_two(value: object) -> object:
+    return value if isinstance(value, list) else [value]
+
+
+Number = Annotated[
+    Entry,
+    PlainValidator(_entry),
+    WithJsonSchema({"type": ["number", "string"], "description": "a number in the file's units, or text in SI"}),
+]
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Text = Annotated[str, Field(max_length=20_000)]
+
+
+class Form(BaseModel):
+    """A table of the file: known keys only, no conversion of types."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class UnitsForm(Form):
+    """Units of bare a, d, alpha, theta, com, xyz, rpy, limits, velocity, configurations and shapes."""
+
+    length: Literal["m", "mm", "cm", "in"] = "m"
+    angle: Literal["rad", "deg"] = "rad"
+
+
+class InertiaForm(Form):
+    """Inertia about the centre of mass, kg m^2, axes of the link's DH frame; products with the tensor's sign."""
+
+    xx: Number = 0
+    yy: Number = 0
+    zz: Number = 0
+    xy: Number = 0
+    yz: Number = 0
+    xz: Number = 0
+
+
+class BodyForm(Form):
+    """Mass, kg, centre of mass and inertia of a link in its own DH frame."""
+
+    mass: Number
+    com: Triple = Field(default=[0, 0, 0])
+    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia)] = InertiaForm()
+    unphysical: bool = False
+
+
+class DriveForm(Form):
+    """Motor and gear, motor side: rotor inertia kg m^2, viscous N m s/rad, Coulomb N m."""
+
+    gear: Number = 1
+    rotor_inertia: Number = 0
+    viscous: Number = 0
+    coulomb: Annotated[
+        list[Number],
+        BeforeValidator(_one_or_two),
+        Field(min_length=1, max_length=2),
+        WithJsonSchema(
+            {
+                "anyOf": [
+                    {"type": ["number", "string"]},
+                    {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2},
+                ]
+            }
+        ),
+    ] = [0]
+
+
+class RoundForm(Form):
+    """A cylinder or capsule along z."""
+
+    radius: Number
+    length: Number
+
+
+class BallForm(Form):
+    """A sphere."""
+
+    radius: Number
+
+
+class ShapeForm(Form):
+    """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame."""
+
+    mesh: Text | None = None
+    scale: Number = 1
+    box: Triple | None = None
+    cylinder: RoundForm | None = None
+    capsule: RoundForm | None = None
+    sphere: BallForm | None = None
+    xyz: Triple = Field(default=[0, 0, 0])
+    rpy: Triple = Field(default=[0, 0, 0])
+    color: Text | None = None
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> ShapeForm:
+        kinds = ("mesh", "box", "cylinder", "capsule", "sphere")
+        given = [kind for kind in kinds if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise PydanticCustomError(
+                "shape", f"expected exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
+            )
+        return self
+
+
+Shapes = Annotated[
+    list[ShapeForm],
+    BeforeValidator(_one_or_several),
+    Field(max_length=50, default=[]),
+]
+
+
+class JointForm(Form):
+    """A row of the DH table, and the link that its joint moves."""
+
+    name: Text = ""
+    type: Literal["revolute", "prismatic"]
+    a: Number
+    alpha: Number
+    d: Number
+    theta: Number
+    limits: Pair | None = None
+    velocity: Number | None = None
+    effort: Number | None = None
+    body: BodyForm | None = None
+    drive: DriveForm | None = None
+    shape: Shapes
+    assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
+        Field(default=[], max_length=10)
+    )
+
+
+class BaseForm(Form):
+    """Frame 0 in the world, and link 0."""
+
+    xyz: Triple = Field(default=[0, 0, 0])
+    rpy: Triple = Field(default=[0, 0, 0])
+    shape: Shapes
+    body: BodyForm | None = None
+
+
+class ToolForm(Form):
+    """The tool's frame in DH frame n."""
+
+    xyz: Triple = Field(default=[0, 0, 0])
+    rpy: Triple = Field(default=[0, 0, 0])
+    shape: Shapes
+
+
+class RobotForm(Form):
+    """A robot file."""
+
+    format: Literal[1]
+    name: Text
+    convention: Literal["standard", "modified"]
+    units: UnitsForm = UnitsForm()
+    gravity: Triple = Field(default=[0, 0, Decimal("-9.81")])
+    source: Text = ""
+    notes: Text = ""
+    parameters: dict[str, Number] = Field(default={}, max_length=200)
+    joint: list[JointForm] = Field(min_length=1, max_length=32)
+    base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))
+    tool: ToolForm = Field(default_factory=lambda: ToolForm.model_validate({}))
+    configurations: dict[str, list[Number]] = Field(default={}, max_length=100)
+
+
+def robot_schema() -> dict[str, Any]:
+    """Return the JSON Schema of robot files, made from the definition that validates them."""
+    schema = RobotForm.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dhkit robot file, format 1"} | {
+        key: value for key, value in schema.items() if key != "title"
+    }
+
+
+def validated(document: Mapping[str, Any]) -> RobotForm:
+    """Check a parsed robot file's keys and types.
+
+    Raises
+    ------
+    DescriptionError
+        The first thing wrong: where, what was found, what was expected.
+    """
+    try:
+        return RobotForm.model_validate(document)
+    except ValidationError as error:
+        raise DescriptionError(_one_line(error.errors()[0], document)) from None
+
+
+def _one_line(error: ErrorDetails, document: Mapping[str, Any]) -> str:
+    path = tuple(part for part in error["loc"])
+    key, found = path[-1] if path else "", error["input"]
+    match error["type"]:
+        case "missing":
+            return f"{_place(path[:-1], document)}key {key!r} is missing"
+        case "extra_forbidden":
+            return f"{_place(path[:-1], document)}unknown key {str(key)[:80]!r}{_hint(path)}"
+        case "model_type" | "dict_type":
+            expected = "a table"
+        case "too_long" | "too_short":
+            count = error["ctx"]
+            bound = f"at most {count['max_length']}" if "max_length" in count else f"at least {count['min_length']}"
+            return f"{_place(path, document)}found {count['actual_length']} entries; expected {bound}"
+        case "literal_error":
+            expected = str(error["ctx"]["expected"])
+        case "number" | "inertia" | "shape":
+            expected = error["msg"].removeprefix("expected ")
+        case _:
+            expected = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    return f"{_place(path, document)}found {_shown(found)}; expected {expected}"
+
+
+def _shown(found: object) -> str:
+    text = str(found) if isinstance(found, Decimal) else repr(found)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _place(path: tuple[int | str, ...], document: Mapping[str, Any]) -> str:
+    """Say where in words: ``joint 2 (elbow): body.mass: ``."""
+    place = ""
+    if path[:1] == ("joint",) and len(path) > 1 and isinstance(path[1], int):
+        row = document["joint"][path[1]]
+        name = row.get("name") if isinstance(row, dict) else None
+        place = f"joint {path[1] + 1}{f' ({name[:40]})' if isinstance(name, str) else ''}: "
+        path = path[2:]
+    keys = "".join(f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path).removeprefix(".")
+    return place + (f"{keys}: " if keys else "")
+
+
+def _hint(path: tuple[int | str, ...]) -> str:
+    """Name the known key that an unknown one is nearest to."""
+    forms: dict[str, type[Form]] = {
+        "joint": JointForm,
+        "units": UnitsForm,
+        "body": BodyForm,
+        "inertia": InertiaForm,
+        "drive": DriveForm,
+        "shape": ShapeForm,
+        "base": BaseForm,
+        "tool": ToolForm,
+        "cylinder": RoundForm,
+        "capsule": RoundForm,
+        "sphere": BallForm,
+    }
+    within = [forms[part] for part in path[:-1] if isinstance(part, str) and part in forms]
+    known = list((within[-1] if within else RobotForm).model_fields)
+    close = difflib.get_close_matches(str(path[-1])[:80], known, n=1)
+    return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"

@@ -1,0 +1,222 @@
+"""The Denavit-Hartenberg table: rows in, a description out; and the table as a person reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import TypeAlias
+
+from dhkit.description.named import Named
+from dhkit.description.robot import Convention, Description, Joint, JointType, Units
+from dhkit.errors import DescriptionError, ExpressionError
+from dhkit.expressions import Expression, exact, exact_angle, parse
+
+__all__ = ["DHTable", "Quantity", "from_dh", "length", "quantity"]
+
+Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
+"""A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
+
+COLUMNS = ("theta", "d", "a", "alpha")
+
+
+def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
+    """Return an argument's exact value; bare numbers are in ``unit``, text is in SI.
+
+    Raises
+    ------
+    DescriptionError
+        Not a finite number or expression; begins with ``where``.
+    """
+    try:
+        if isinstance(value, str):
+            return parse(value, tuple(names))
+        number = exact(value)
+        return number if unit is None or isinstance(value, Expression) else number * unit
+    except ExpressionError as error:
+        raise DescriptionError(f"{where}: {error}") from None
+
+
+def from_dh(
+    rows: Sequence[Sequence[Quantity]],
+    *,
+    order: Sequence[str] = COLUMNS,
+    kinds: str | None = None,
+    convention: str = "standard",
+    angle: str = "rad",
+    length: str = "m",
+    name: str = "arm",
+    parameters: Mapping[str, Quantity] | None = None,
+) -> Description:
+    """Return the description of a Denavit-Hartenberg table.
+
+    Parameters
+    ----------
+    rows
+        One row a joint: four numbers, in the units given, or text in metres and radians.
+    order
+        What the columns are.
+    kinds
+        One letter a joint: R or P; all revolute if not given.
+    convention
+        ``"standard"`` or ``"modified"`` (row i then holds alpha_(i-1) and a_(i-1)).
+    angle, length
+        Units of bare numbers: rad or deg; m, mm, cm or in.
+    name
+        The robot's name.
+    parameters
+        Values of the names that occur in text.
+
+    Raises
+    ------
+    DescriptionError
+        Another number of columns, an unknown kind, unit or convention, or a value that is no finite number.
+
+    Examples
+    --------
+    >>> arm = from_dh([(0, 0.3, 0, "pi/2"), (0, 0, "l", 0)], kinds="RR", parameters={"l": 0.5})
+    >>> arm.n, float(arm.numbers.a[1])
+    (2, 0.5)
+    """
+    if sorted(order) != sorted(COLUMNS):
+        raise DescriptionError(f"order is {tuple(order)}; expected {', '.join(COLUMNS)} in some order")
+    for what, found, known in (
+        ("convention", convention, [c.value for c in Convention]),
+        ("angle", angle, list(Units.ANGLES)),
+        ("length", length, list(Units.LENGTHS)),
+    ):
+        if found not in known:
+            raise DescriptionError(f"{what} is {found!r}; expected one of {', '.join(known)}")
+    types = (kinds or "R" * len(rows)).upper()
+    if len(types) != len(rows) or set(types) - {"R", "P"}:
+        raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
+    units = Units(length, angle)
+    named = dict(parameters or {})
+    return Description(
+        name=name,
+        convention=Convention(convention),
+        joints=tuple(
+            _joint(i, row, order, type, units, named) for i, (row, type) in enumerate(zip(rows, types, strict=True), 1)
+        ),
+        parameters=Named({key: quantity(f"parameters.{key}", value, named) for key, value in named.items()}),
+        units=units,
+    )
+
+
+def _joint(
+    number: int,
+    row: Sequence[Quantity],
+    order: Sequence[str],
+    type: str,
+    units: Units,
+    names: Mapping[str, object],
+) -> Joint:
+    if isinstance(row, str) or len(row) != len(COLUMNS):
+        raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
+    entries = {
+        key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
+        for key, value in zip(order, row, strict=True)
+    }
+    for key in ("theta", "alpha"):
+        snapped, written = exact_angle(entries[key]), entries[key].written
+        entries[key] = snapped if written is None else snapped.as_written(written)
+    return Joint(type=JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, **entries)
+
+
+def length(value: Expression, units: Units) -> str:
+    """Return a length as text in these units: a number, or the expression that it is."""
+    bare = (value / units.metres).rational
+    return value.text if bare is None else _short(bare)
+
+
+def angle(value: Expression) -> str:
+    """Return an angle as text: degrees where it is a number, else the expression that it is."""
+    if value.half_turns is not None:
+        return f"{_short(value.half_turns * 180)}°"
+    number = value.rational
+    return value.text if number is None else f"{_short(number)} rad"
+
+
+def _short(number: Fraction) -> str:
+    exactly = Expression.number(number).text
+    return exactly if len(exactly) <= 12 and "/" not in exactly else f"{float(number):.6g}"
+
+
+@dataclass(frozen=True)
+class DHTable:
+    """A description's Denavit-Hartenberg table; prints as one, in a terminal and in a notebook.
+
+    Attributes
+    ----------
+    convention
+        Which table: in the modified one the columns a and alpha are those of the link before.
+    headings
+        Column titles, with units.
+    rows
+        The entries as text, one row a joint.
+    """
+
+    convention: Convention
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    latex_rows: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, description: Description) -> DHTable:
+        """Read a description's table, in the units of its file."""
+        units = description.units
+        shift = "₋₁" if description.convention is Convention.MODIFIED else ""
+        headings = ("joint", "θ", f"d [{units.length}]", f"a{shift} [{units.length}]", f"α{shift}")
+        rows, latex_rows = [], []
+        for i, joint in enumerate(description.joints, start=1):
+            entries = {
+                "theta": angle(joint.theta),
+                "d": length(joint.d, units),
+                "a": length(joint.a, units),
+                "alpha": angle(joint.alpha),
+            }
+            rows.append((f"{i} {joint.name}", *(_with_variable(key, entries[key], joint, f"q{i}") for key in COLUMNS)))
+            latex_rows.append(
+                (str(i), *(_latex(_with_variable(key, entries[key], joint, f"q_{{{i}}}")) for key in COLUMNS))
+            )
+        return cls(description.convention, headings, tuple(rows), tuple(latex_rows))
+
+    def __str__(self) -> str:
+        table = (self.headings, *self.rows)
+        widths = [max(len(row[k]) for row in table) for k in range(len(self.headings))]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table
+        ]
+        return "\n".join([f"{self.convention.value} DH", lines[0], "  ".join("-" * w for w in widths), *lines[1:]])
+
+    def _repr_html_(self) -> str:
+        def cells(row: tuple[str, ...], tag: str) -> str:
+            escaped = (cell.replace("&", "&amp;").replace("<", "&lt;") for cell in row)
+            return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in escaped) + "</tr>"
+
+        body = "".join(cells(row, "td") for row in self.rows)
+        caption = f"<caption>{self.convention.value} DH</caption>"
+        return f"<table>{caption}<thead>{cells(self.headings, 'th')}</thead><tbody>{body}</tbody></table>"
+
+    def latex(self) -> str:
+        """Return the table as a LaTeX ``tabular``."""
+        shift = "_{i-1}" if self.convention is Convention.MODIFIED else "_i"
+        unit = self.headings[2].partition(" ")[2]
+        titles = ["$i$", r"$\theta_i$", f"$d_i$ {unit}", f"$a{shift}$ {unit}", rf"$\alpha{shift}$"]
+        lines = [" & ".join(titles) + r" \\ \hline", *(" & ".join(row) + r" \\" for row in self.latex_rows)]
+        return "\n".join([r"\begin{tabular}{ccccc}", *lines, r"\end{tabular}"])
+
+
+def _with_variable(column: str, entry: str, joint: Joint, variable: str) -> str:
+    """Add the joint variable to the entry that it belongs to."""
+    if column != ("theta" if joint.is_revolute else "d"):
+        return entry
+    if entry in ("0°", "0"):
+        return variable
+    return f"{variable} - {entry[1:]}" if entry.startswith("-") else f"{variable} + {entry}"
+
+
+def _latex(entry: str) -> str:
+    text = entry.replace("°", r"^\circ").replace("*", " ").replace(" rad", r"\,\mathrm{rad}")
+    return f"${text}$"

@@ -1,0 +1,206 @@
+"""Whether the values of a description make a robot: errors that stop, warnings that are kept."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dhkit.description.parameters import check_parameter_name, resolved
+from dhkit.errors import DescriptionError, ExpressionError
+from dhkit.expressions import Expression, substitute
+
+if TYPE_CHECKING:
+    from dhkit.description.robot import Body, Description, Drive, Geometry, Joint, Shape
+
+__all__ = ["MAX_JOINTS", "check"]
+
+MAX_JOINTS = 32
+MAX_PARAMETERS = 200
+MAX_CONFIGURATIONS = 100
+MAX_SHAPES = 50
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
+RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
+"""Names of the URDF's links and fixed joints: a joint of the same name would confuse Pinocchio."""
+COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+ABSOLUTE_SLACK = 1e-12
+"""kg m^2: the smallest eigenvalue of a published inertia may be this far below zero."""
+RELATIVE_SLACK = 1e-9
+"""Share of the largest eigenvalue, for tensors given to ten digits."""
+
+Value = Callable[[str, Expression], float]
+
+
+def check(description: Description) -> tuple[str, ...]:
+    """Check a description; return its warnings.
+
+    Raises
+    ------
+    DescriptionError
+        The first thing found that makes it no robot: joint, key, found, expected.
+    """
+    _check_counts(description)
+    for name in description.parameters:
+        check_parameter_name(name)
+    values = resolved(description.parameters)
+    for name, parameter in values.items():
+        _finite(f"parameters.{name}", parameter, {})
+
+    def value(where: str, expression: Expression) -> float:
+        return _finite(where, expression, values)
+
+    for i, component in enumerate(description.gravity):
+        value(f"gravity[{i}]", component)
+    warnings: list[str] = []
+    for joint in description.joints:
+        warnings += _check_joint(joint, f"joint {description.joints.index(joint) + 1} ({joint.name})", value)
+    _check_names(description)
+    for part, placement, shapes in (
+        ("base", description.base.placement, description.base.shapes),
+        ("tool", description.tool.placement, description.tool.shapes),
+    ):
+        for key, entries in (("xyz", placement.xyz), ("rpy", placement.rpy)):
+            for i, entry in enumerate(entries):
+                value(f"{part}: {key}[{i}]", entry)
+        warnings += _check_shapes(shapes, part, value, description)
+    for joint in description.joints:
+        warnings += _check_shapes(joint.shapes, f"link of {joint.name}", value, description)
+    if description.base.body is not None:
+        warnings += _check_body(description.base.body, "base", value)
+    _check_configurations(description, value)
+    return tuple(warnings)
+
+
+def _finite(where: str, expression: Expression, values: Mapping[str, Expression]) -> float:
+    try:
+        return float(substitute(expression, values))
+    except ExpressionError as error:
+        raise DescriptionError(f"{where}: {error}") from None
+
+
+def _check_counts(description: Description) -> None:
+    for what, count, least, most in (
+        ("joints", description.n, 1, MAX_JOINTS),
+        ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
+        ("configurations", len(description.configurations), 0, MAX_CONFIGURATIONS),
+    ):
+        if not least <= count <= most:
+            raise DescriptionError(f"{count} {what}; expected {least} to {most}")
+
+
+def _check_names(description: Description) -> None:
+    if not NAME.fullmatch(description.name):
+        raise DescriptionError(
+            f"name: found {description.name[:80]!r}; expected letters, digits, '_', '.', '-', beginning with a letter"
+        )
+    seen: set[str] = set()
+    for i, joint in enumerate(description.joints, start=1):
+        if not NAME.fullmatch(joint.name):
+            raise DescriptionError(
+                f"joint {i}: name {joint.name[:80]!r}; expected letters, digits, '_', '.', '-', beginning with a letter"
+            )
+        if RESERVED.fullmatch(joint.name):
+            raise DescriptionError(f"joint {i}: name {joint.name!r} is taken by a frame of the URDF; choose another")
+        if joint.name in seen:
+            raise DescriptionError(f"joint {i}: name {joint.name!r} is another joint's already")
+        seen.add(joint.name)
+
+
+def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
+    for key in ("a", "alpha", "d", "theta"):
+        value(f"{where}: {key}", getattr(joint, key))
+    if joint.limits is not None:
+        lower, upper = (value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits))
+        if lower > upper:
+            raise DescriptionError(f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round")
+    for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
+        limit = getattr(joint, key)
+        if limit is not None and not value(f"{where}: {key}", limit) > 0:
+            raise DescriptionError(f"{where}: {key} is {limit}; expected a positive number of {unit}")
+    if joint.drive is not None:
+        _check_drive(joint.drive, where, value)
+    if joint.body is not None:
+        yield from _check_body(joint.body, where, value)
+
+
+def _check_drive(drive: Drive, where: str, value: Value) -> None:
+    if value(f"{where}: drive.gear", drive.gear) == 0:
+        raise DescriptionError(f"{where}: drive.gear is 0; expected the ratio of motor to joint speed")
+    for key, unit in (("rotor_inertia", "kg m^2"), ("viscous", "N m s/rad")):
+        found = value(f"{where}: drive.{key}", getattr(drive, key))
+        if found < 0:
+            raise DescriptionError(f"{where}: drive.{key} is {found:g} {unit}; expected none below 0")
+    positive, negative = (value(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(drive.coulomb))
+    if positive < 0 or negative > 0:
+        raise DescriptionError(
+            f"{where}: drive.coulomb is [{positive:g}, {negative:g}] N m; expected [not negative, not positive]"
+        )
+
+
+def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
+    mass = value(f"{where}: body.mass", body.mass)
+    if mass < 0:
+        raise DescriptionError(f"{where}: body.mass is {mass:g} kg; expected none below 0")
+    for i, entry in enumerate(body.com):
+        value(f"{where}: body.com[{i}]", entry)
+    rows = [[value(f"{where}: body.inertia", entry) for entry in row] for row in body.inertia.rows]
+    lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(np.array(rows)))
+    slack = ABSOLUTE_SLACK + RELATIVE_SLACK * abs(largest)
+    if lowest < -slack:
+        message = f"{where}: body.inertia has the eigenvalue {lowest:.6g} kg m^2; expected none below 0"
+        if not body.unphysical:
+            raise DescriptionError(message)
+        yield message
+    elif largest > lowest + middle + slack:
+        yield (
+            f"{where}: no body has principal moments {lowest:.4g}, {middle:.4g}, {largest:.4g} kg m^2 "
+            "(triangle inequality)"
+        )
+    if mass == 0 and largest > slack:
+        yield f"{where}: a body without mass has inertia"
+    if mass > 0 and math.isclose(max(abs(lowest), abs(largest)), 0.0, abs_tol=ABSOLUTE_SLACK):
+        yield f"{where}: a body of {mass:g} kg has no inertia"
+
+
+def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: Description) -> Iterator[str]:
+    if len(shapes) > MAX_SHAPES:
+        raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
+    for shape in shapes:
+        for key, entries in (("xyz", shape.placement.xyz), ("rpy", shape.placement.rpy)):
+            for i, entry in enumerate(entries):
+                value(f"{where}: shape.{key}[{i}]", entry)
+        if shape.color is not None and not COLOR.fullmatch(shape.color):
+            raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
+        yield from _check_geometry(shape.geometry, f"{where}: shape", value, description)
+
+
+def _check_geometry(geometry: Geometry, where: str, value: Value, description: Description) -> Iterator[str]:
+    from dhkit.description.assets import inside
+    from dhkit.description.robot import Box, Mesh
+
+    if isinstance(geometry, Mesh):
+        sizes = {"scale": geometry.scale}
+        file = inside(description.mesh_folder, geometry.path, where)
+        if file is not None and not file.is_file():
+            yield f"{where}.mesh: no file {geometry.path!r}; the link is drawn from the table"
+    elif isinstance(geometry, Box):
+        sizes = {f"box[{i}]": edge for i, edge in enumerate(geometry.size)}
+    else:
+        sizes = dict(vars(geometry))
+    for key, size in sizes.items():
+        found = value(f"{where}.{key}", size)
+        if not found > 0:
+            raise DescriptionError(f"{where}.{key} is {found:g}; expected a positive number")
+
+
+def _check_configurations(description: Description, value: Value) -> None:
+    for name, q in description.configurations.items():
+        if not NAME.fullmatch(name):
+            raise DescriptionError(f"configurations: {name[:80]!r} is no name")
+        if len(q) != description.n:
+            raise DescriptionError(f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint")
+        for i, entry in enumerate(q):
+            value(f"configurations.{name}[{i}]", entry)

@@ -1,0 +1,41 @@
+"""What dhkit raises: one base, a few kinds, each with one line that says what and where."""
+
+from __future__ import annotations
+
+__all__ = [
+    "AnswerError",
+    "DescriptionError",
+    "DhkitError",
+    "ExpressionError",
+    "ModelError",
+    "PlanningError",
+    "UnreachableError",
+]
+
+
+class DhkitError(Exception):
+    """Base of every error that dhkit raises about its input."""
+
+
+class ExpressionError(DhkitError):
+    """Text that is no expression, or an expression that has no finite value."""
+
+
+class DescriptionError(DhkitError):
+    """A robot file or a table that describes no robot: names file, joint and key, what was found and expected."""
+
+
+class ModelError(DhkitError):
+    """A URDF, a mesh or a Pinocchio model that cannot be read or built."""
+
+
+class UnreachableError(DhkitError):
+    """A pose that the arm cannot reach, where one was required."""
+
+
+class PlanningError(DhkitError):
+    """A trajectory that is infeasible or did not converge: names the constraint."""
+
+
+class AnswerError(DhkitError):
+    """An answer sheet that cannot be read."""

@@ -1,0 +1,386 @@
+"""Exact numbers and the expressions over them: sums of products, with rational coefficients, in a normal form.
+
+An :class:`Expression` is a Laurent polynomial with rational coefficients in its *atoms*: pi, parameters, and functions
+such as ``sin(q1)`` or ``sqrt(2)``. Two texts that mean the same sum of products are equal values, so 17 inches equal
+0.4318 m and ``m1*l1^2/12`` equals ``l1^2*m1/12``, whatever was typed. The float is rounded once, at the end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from decimal import Context, Decimal
+from fractions import Fraction
+from numbers import Integral, Rational, Real
+from typing import TypeAlias
+
+from dhkit.errors import ExpressionError
+from dhkit.expressions.syntax import decimal_fraction
+
+__all__ = ["PI", "ZERO", "Atom", "Expression", "Monomial", "Scalar", "exact", "exact_angle"]
+
+MAX_TERMS = 2_000
+"""Terms of a sum: a robot file's longest entry has a few dozen."""
+MAX_EXPONENT = 64
+"""Largest whole exponent, which keeps a power's expansion and its digits bounded."""
+MAX_BITS = 8_192
+"""Bits of a coefficient: beyond the range of a double by far, and still fast."""
+PI_DIGITS = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
+STEPS_IN_PI = 12
+"""Twists and offsets that are multiples of 15 degrees have exact cosines."""
+SHORT = 16
+"""Fractions of numbers up to this are printed as such (l1/12), others as decimals where they end (0.4318*l1)."""
+
+Scalar: TypeAlias = "Expression | int | Fraction"
+
+
+@dataclass(frozen=True)
+class Atom:
+    """A factor that is taken whole: pi, a parameter, or a function of expressions.
+
+    Two names are of our own: ``sqrt``, whose even powers are resolved, and ``group``, a sum that stands below a
+    fraction bar.
+    """
+
+    name: str
+    arguments: tuple[Expression, ...] = ()
+
+    @property
+    def is_symbol(self) -> bool:
+        """Whether this is a name with a value of its own, and not pi or a function."""
+        return not self.arguments and self.name != "pi"
+
+    def value(self) -> Fraction:
+        """Return the number that this stands for, as near as a double (pi: 60 digits).
+
+        Raises
+        ------
+        ExpressionError
+            A name without value, or a function outside its domain.
+        """
+        if self.name == "pi":
+            return PI_DIGITS
+        if self.is_symbol:
+            raise ExpressionError(f"{self.name} has no value")
+        arguments = [float(argument) for argument in self.arguments]
+        if self.name == "group":
+            return Fraction(arguments[0])
+        try:
+            return Fraction(abs(*arguments) if self.name == "abs" else getattr(math, self.name)(*arguments))
+        except (ValueError, OverflowError):
+            raise ExpressionError(f"{self} is not a finite number") from None
+
+    def __str__(self) -> str:
+        if not self.arguments:
+            return self.name
+        inner = ", ".join(argument.text for argument in self.arguments)
+        return f"({inner})" if self.name == "group" else f"{self.name}({inner})"
+
+
+Monomial: TypeAlias = tuple[tuple[Atom, int], ...]
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An exact value: a sum of products of atoms, in normal form.
+
+    Attributes
+    ----------
+    terms
+        Pairs of a monomial (atoms with their exponents) and its rational coefficient, sorted, none zero.
+    written
+        The text that it was read from; not compared.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import parse
+    >>> parse("17*inch") == exact(0.4318)
+    True
+    >>> str(parse("m*l^2/12") * 2)
+    'l^2*m/6'
+    """
+
+    terms: tuple[tuple[Monomial, Fraction], ...] = ()
+    written: str | None = field(default=None, compare=False)
+
+    @classmethod
+    def number(cls, value: int | Fraction) -> Expression:
+        """Return a rational number."""
+        return _collected({(): Fraction(value)})
+
+    @classmethod
+    def symbol(cls, name: str) -> Expression:
+        """Return a name that stands for itself."""
+        return cls.of_atom(Atom(name))
+
+    @classmethod
+    def of_atom(cls, atom: Atom) -> Expression:
+        """Return the expression that is one atom."""
+        return cls(((((atom, 1),), Fraction(1)),))
+
+    # Reading
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether this is zero identically."""
+        return not self.terms
+
+    @property
+    def rational(self) -> Fraction | None:
+        """The rational number that this is, or None."""
+        if not self.terms:
+            return Fraction(0)
+        monomial, coefficient = self.terms[0]
+        return coefficient if len(self.terms) == 1 and not monomial else None
+
+    @property
+    def half_turns(self) -> Fraction | None:
+        """The rational r for which this is r pi, or None."""
+        if not self.terms:
+            return Fraction(0)
+        monomial, coefficient = self.terms[0]
+        return coefficient if len(self.terms) == 1 and monomial == ((Atom("pi"), 1),) else None
+
+    @property
+    def symbols(self) -> frozenset[str]:
+        """The names that this depends on."""
+        return frozenset(_symbols(self))
+
+    def __float__(self) -> float:
+        total = Fraction(0)
+        for monomial, coefficient in self.terms:
+            value = coefficient
+            for atom, exponent in monomial:
+                base = atom.value()
+                if exponent < 0 and base == 0:
+                    raise ExpressionError(f"{self.text} divides by zero")
+                value *= base**exponent
+            total += value
+        try:
+            return float(total)
+        except OverflowError:
+            raise ExpressionError(f"{self.text} is no finite double") from None
+
+    @property
+    def text(self) -> str:
+        """The normal form as text that :func:`parse` reads back to an equal value."""
+        if not self.terms:
+            return "0"
+        first, *rest = (_term_text(monomial, coefficient) for monomial, coefficient in self.terms)
+        return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest)
+
+    def __str__(self) -> str:
+        return self.written if self.written is not None else self.text
+
+    def __repr__(self) -> str:
+        return f"Expression({str(self)!r})"
+
+    def as_written(self, text: str) -> Expression:
+        """Return the same value, to be shown as this text."""
+        return replace(self, written=text)
+
+    # Arithmetic
+
+    def __add__(self, other: Scalar) -> Expression:
+        total = dict(self.terms)
+        for monomial, coefficient in _expression(other).terms:
+            total[monomial] = total.get(monomial, Fraction(0)) + coefficient
+        return _collected(total)
+
+    def __neg__(self) -> Expression:
+        return Expression(tuple((monomial, -coefficient) for monomial, coefficient in self.terms))
+
+    def __sub__(self, other: Scalar) -> Expression:
+        return self + -_expression(other)
+
+    def __rsub__(self, other: Scalar) -> Expression:
+        return -self + other
+
+    def __mul__(self, other: Scalar) -> Expression:
+        total: dict[Monomial, Fraction] = {}
+        unresolved = ZERO
+        right = _expression(other).terms
+        for left_monomial, left in self.terms:
+            for right_monomial, coefficient in right:
+                monomial, factor = _merged(left_monomial, right_monomial)
+                if factor is None:
+                    total[monomial] = total.get(monomial, Fraction(0)) + left * coefficient
+                else:
+                    unresolved = unresolved + Expression(((monomial, left * coefficient),)) * factor
+        product = _collected(total)
+        return product if unresolved.is_zero else product + unresolved
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Scalar) -> Expression:
+        divisor = _expression(other)
+        ratio = _ratio(self, divisor)
+        return self * _reciprocal(divisor) if ratio is None else Expression.number(ratio)
+
+    def __rtruediv__(self, other: Scalar) -> Expression:
+        return _expression(other) / self
+
+    def __pow__(self, exponent: int) -> Expression:
+        if abs(exponent) > MAX_EXPONENT:
+            raise ExpressionError(f"an exponent beyond {MAX_EXPONENT}")
+        if exponent < 0:
+            return 1 / self**-exponent
+        result = Expression.number(1)
+        for bit in f"{exponent:b}":
+            result = result * result * (self if bit == "1" else 1)
+        return result
+
+
+ZERO = Expression()
+PI = Expression.of_atom(Atom("pi"))
+
+
+def exact(value: object) -> Expression:
+    """Return a number as the exact value that it was written for: 0.1 is 1/10, not the double nearest to it.
+
+    Raises
+    ------
+    ExpressionError
+        Not a number, or not finite.
+    """
+    if isinstance(value, Expression):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (Real, Decimal)):
+        raise ExpressionError(f"{value!r} is no number")
+    if isinstance(value, Integral):
+        return Expression.number(decimal_fraction(str(int(value))) if abs(value) >= 10**300 else int(value))
+    if isinstance(value, Rational):
+        return Expression.number(Fraction(value.numerator, value.denominator))
+    number = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
+    if not number.is_finite():
+        raise ExpressionError(f"{value} is not finite")
+    sign, digits = ("-", str(number)[1:]) if number.is_signed() else ("", str(number))
+    magnitude = decimal_fraction(digits)
+    return Expression.number(-magnitude if sign else magnitude)
+
+
+def exact_angle(value: Expression) -> Expression:
+    """Return an angle in radians, with a decimal that is the nearest double to k pi/12 taken as k pi/12.
+
+    Nobody writes 1.5707963267948966 and means another number than pi/2; of any other decimal nothing is guessed.
+    """
+    number = value.rational
+    if not number:
+        return value
+    step = round(number * STEPS_IN_PI / PI_DIGITS)
+    candidate = PI * Fraction(step, STEPS_IN_PI)
+    return candidate if step and float(candidate) == float(number) else value
+
+
+def _expression(value: Scalar) -> Expression:
+    return value if isinstance(value, Expression) else Expression.number(value)
+
+
+def _symbols(expression: Expression) -> Iterator[str]:
+    for monomial, _ in expression.terms:
+        for atom, _ in monomial:
+            if atom.is_symbol:
+                yield atom.name
+            for argument in atom.arguments:
+                yield from _symbols(argument)
+
+
+def _order(term: tuple[Monomial, Fraction]) -> tuple[int, str]:
+    """Sort terms by falling degree, then by name."""
+    monomial, _ = term
+    return -sum(abs(exponent) for _, exponent in monomial), " ".join(
+        f"{atom}^{exponent}" for atom, exponent in monomial
+    )
+
+
+def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
+    terms = [term for term in total.items() if term[1]]
+    if len(terms) > MAX_TERMS:
+        raise ExpressionError(f"an expression of more than {MAX_TERMS} terms")
+    if any(c.numerator.bit_length() + c.denominator.bit_length() > MAX_BITS for _, c in terms):
+        raise ExpressionError("a number too long to be kept exactly")
+    return Expression(tuple(sorted(terms, key=_order) if len(terms) > 1 else terms))
+
+
+def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | None]:
+    """Multiply two monomials; what a square root's or a group's power resolves to is a factor of its own."""
+    if not left or not right:
+        return left or right, None
+    powers = dict(left)
+    for atom, exponent in right:
+        powers[atom] = powers.get(atom, 0) + exponent
+    if any(abs(exponent) > MAX_EXPONENT**2 for exponent in powers.values()):
+        raise ExpressionError(f"an exponent of more than {MAX_EXPONENT**2}")
+    factor: Expression | None = None
+    for atom, exponent in list(powers.items()):
+        resolved, left_over = 0, exponent
+        if atom.name == "sqrt" and atom.arguments:
+            resolved, left_over = divmod(exponent, 2)
+        elif atom.name == "group" and exponent > 0:
+            resolved, left_over = exponent, 0
+        if resolved:
+            factor = (factor or Expression.number(1)) * atom.arguments[0] ** resolved
+        powers[atom] = left_over
+    return tuple(sorted(((a, e) for a, e in powers.items() if e), key=lambda power: str(power[0]))), factor
+
+
+def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
+    """Return the rational r with dividend = r divisor, which a group below the bar would not show; None otherwise."""
+    if not dividend.terms or not divisor.terms:
+        return None
+    ratio = dividend.terms[0][1] / divisor.terms[0][1]
+    return ratio if dividend.terms == tuple((m, c * ratio) for m, c in divisor.terms) else None
+
+
+def _reciprocal(divisor: Expression) -> Expression:
+    """Return 1/divisor; a sum is divided by its leading coefficient and kept whole as a group."""
+    if divisor.is_zero:
+        raise ExpressionError("division by zero")
+    monomial, leading = divisor.terms[0]
+    if len(divisor.terms) > 1:
+        group = Atom("group", (divisor * (1 / leading),))
+        return Expression(((((group, -1),), 1 / leading),))
+    inverse = Expression.number(1 / leading)
+    for atom, exponent in monomial:
+        inverse = inverse * _atom_power(atom, -exponent)
+    return inverse
+
+
+def _atom_power(atom: Atom, exponent: int) -> Expression:
+    monomial, factor = _merged(((atom, exponent),), ((atom, 0),))
+    power = Expression(((monomial, Fraction(1)),))
+    return power if factor is None else power * factor
+
+
+def _term_text(monomial: Monomial, coefficient: Fraction) -> str:
+    above = [_power_text(atom, exponent) for atom, exponent in monomial if exponent > 0]
+    below = [_power_text(atom, -exponent) for atom, exponent in monomial if exponent < 0]
+    magnitude = abs(coefficient)
+    has_pi = any(atom.name == "pi" for atom, _ in monomial)
+    small = max(magnitude.numerator, magnitude.denominator) <= SHORT
+    decimal = None if monomial and (has_pi or small) else _decimal_text(magnitude)
+    if decimal is not None:
+        above[:0] = [decimal] if not monomial or magnitude != 1 else []
+    else:
+        above[:0] = [str(magnitude.numerator)] if magnitude.numerator != 1 or not above else []
+        below[:0] = [str(magnitude.denominator)] if magnitude.denominator != 1 else []
+    text = "*".join(above or ["1"]) + "".join(f"/{factor}" for factor in below)
+    return f"-{text}" if coefficient < 0 else text
+
+
+def _power_text(atom: Atom, exponent: int) -> str:
+    return str(atom) if exponent == 1 else f"{atom}^{exponent}"
+
+
+def _decimal_text(value: Fraction) -> str | None:
+    """Return a rational's decimal, exactly, or None where it does not end."""
+    denominator = value.denominator
+    for prime in (2, 5):
+        while denominator % prime == 0:
+            denominator //= prime
+    if denominator != 1:
+        return None
+    digits = Context(prec=max(50, MAX_BITS // 2))
+    return str(digits.divide(Decimal(value.numerator), Decimal(value.denominator))).lower()

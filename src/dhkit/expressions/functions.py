@@ -1,0 +1,224 @@
+"""Elementary functions of exact values: exact at multiples of 15 degrees and at perfect squares, named otherwise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+
+from dhkit.errors import ExpressionError
+from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression
+
+__all__ = ["FUNCTIONS", "arc_tangent", "call", "cos", "sin", "sqrt", "substitute"]
+
+LARGEST_FACTORED = 10**6
+"""Square roots of numbers below this are split into those of primes, so that sqrt(6) is sqrt(2)*sqrt(3)."""
+
+
+def sqrt(x: Expression) -> Expression:
+    """Return the square root; perfect squares come out as rationals."""
+    number = x.rational
+    if number is None:
+        return Expression.of_atom(Atom("sqrt", (x,)))
+    if number < 0:
+        raise ExpressionError(f"sqrt({x.text}) is not real")
+    inside = number.numerator * number.denominator
+    root = math.isqrt(inside)
+    if root * root == inside:
+        return Expression.number(Fraction(root, number.denominator))
+    if inside > LARGEST_FACTORED:
+        return Expression.of_atom(Atom("sqrt", (x,)))
+    result = Expression.number(Fraction(1, number.denominator))
+    for prime, power in _prime_factors(inside):
+        atom = Expression.of_atom(Atom("sqrt", (Expression.number(prime),)))
+        result = result * prime ** (power // 2) * (atom if power % 2 else 1)
+    return result
+
+
+def sin(x: Expression) -> Expression:
+    """Return the sine of an angle in radians."""
+    steps = _steps(x)
+    if steps is not None:
+        return _sine_of_steps(steps)
+    if (direction := _direction(x)) is not None:
+        return direction[1]
+    return -sin(-x) if _leads_negative(x) else Expression.of_atom(Atom("sin", (x,)))
+
+
+def cos(x: Expression) -> Expression:
+    """Return the cosine of an angle in radians."""
+    steps = _steps(x)
+    if steps is not None:
+        return _sine_of_steps(steps + STEPS_IN_PI // 2)
+    if (direction := _direction(x)) is not None:
+        return direction[0]
+    return cos(-x) if _leads_negative(x) else Expression.of_atom(Atom("cos", (x,)))
+
+
+def tan(x: Expression) -> Expression:
+    """Return the tangent of an angle in radians."""
+    steps = _steps(x)
+    if steps is None:
+        return Expression.of_atom(Atom("tan", (x,)))
+    if steps % STEPS_IN_PI == 0:
+        return ZERO
+    # Half angle: the sine below the bar is one term, so that tan(15 deg) comes out as 2 - sqrt(3).
+    if steps % (STEPS_IN_PI // 2) == 0:
+        raise ExpressionError(f"tan({x.text}) is not finite")
+    return (1 - cos(x * 2)) / sin(x * 2)
+
+
+def arc_tangent(y: Expression, x: Expression) -> Expression:
+    """Return atan2(y, x), exactly where both are numbers at a multiple of 15 degrees."""
+    if y.symbols or x.symbols:
+        return Expression.of_atom(Atom("atan2", (y, x)))
+    angle = math.atan2(float(y), float(x))
+    steps = round(angle * STEPS_IN_PI / math.pi)
+    # At that angle y cos = x sin holds exactly, and the point lies on its side of the origin.
+    if (y * _sine_of_steps(steps + STEPS_IN_PI // 2) - x * _sine_of_steps(steps)).is_zero:
+        return PI * Fraction(steps, STEPS_IN_PI)
+    return Expression.of_atom(Atom("atan2", (y, x)))
+
+
+def absolute(x: Expression) -> Expression:
+    """Return the absolute value, resolved where x is a number."""
+    if x.symbols:
+        return Expression.of_atom(Atom("abs", (x,)))
+    return -x if float(x) < 0 else x
+
+
+def _arc_sine(x: Expression) -> Expression:
+    return _inverse("asin", x, math.asin, _sine_of_steps)
+
+
+def _arc_cosine(x: Expression) -> Expression:
+    return _inverse("acos", x, math.acos, lambda steps: _sine_of_steps(steps + STEPS_IN_PI // 2))
+
+
+def _arc_tangent_of_one(x: Expression) -> Expression:
+    angle = arc_tangent(x, Expression.number(1))
+    return angle if angle.half_turns is not None else Expression.of_atom(Atom("atan", (x,)))
+
+
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., Expression]]] = {
+    "sin": (1, sin),
+    "cos": (1, cos),
+    "tan": (1, tan),
+    "asin": (1, _arc_sine),
+    "acos": (1, _arc_cosine),
+    "atan": (1, _arc_tangent_of_one),
+    "atan2": (2, arc_tangent),
+    "sqrt": (1, sqrt),
+    "abs": (1, absolute),
+}
+"""The functions that text may use: name -> number of arguments and meaning. Nothing else is ever called."""
+
+
+def call(function: str, *arguments: Expression) -> Expression:
+    """Apply a function of :data:`FUNCTIONS`.
+
+    Raises
+    ------
+    ExpressionError
+        No such function, another number of arguments, or a value outside its domain.
+    """
+    if function not in FUNCTIONS:
+        raise ExpressionError(f"unknown function {function!r}; expected one of {', '.join(FUNCTIONS)}")
+    count, meaning = FUNCTIONS[function]
+    if len(arguments) != count:
+        raise ExpressionError(f"{function} takes {count} argument{'s' * (count > 1)}, found {len(arguments)}")
+    return meaning(*arguments)
+
+
+def substitute(expression: Expression, values: Mapping[str, Expression]) -> Expression:
+    """Return the expression with names replaced by values; names without one stay."""
+    if values.keys().isdisjoint(expression.symbols):
+        return expression
+    total = ZERO
+    for monomial, coefficient in expression.terms:
+        product = Expression.number(coefficient)
+        for atom, exponent in monomial:
+            product = product * _replaced(atom, values) ** exponent
+        total = total + product
+    return total
+
+
+def _replaced(atom: Atom, values: Mapping[str, Expression]) -> Expression:
+    if atom.is_symbol:
+        return values.get(atom.name, Expression.of_atom(atom))
+    arguments = [substitute(argument, values) for argument in atom.arguments]
+    if atom.name == "group":
+        return arguments[0]
+    return call(atom.name, *arguments) if arguments else Expression.of_atom(atom)
+
+
+def _steps(angle: Expression) -> int | None:
+    """Return how many 15 degree steps an angle is, or None."""
+    half_turns = angle.half_turns
+    if half_turns is None or (half_turns * STEPS_IN_PI).denominator != 1:
+        return None
+    return int(half_turns * STEPS_IN_PI)
+
+
+def _sine_of_steps(steps: int) -> Expression:
+    """Return sin(steps 15 degrees), in Q(sqrt 2, sqrt 3)."""
+    half_circle, step = divmod(steps, STEPS_IN_PI)
+    sign = -1 if half_circle % 2 else 1
+    return _first_quadrant(min(step, STEPS_IN_PI - step)) * sign
+
+
+def _first_quadrant(step: int) -> Expression:
+    two, three, six = (sqrt(Expression.number(n)) for n in (2, 3, 6))
+    return (
+        ZERO,
+        (six - two) / 4,
+        Expression.number(Fraction(1, 2)),
+        two / 2,
+        three / 2,
+        (six + two) / 4,
+        Expression.number(1),
+    )[step]
+
+
+def _inverse(
+    name: str, x: Expression, approximate: Callable[[float], float], exactly: Callable[[int], Expression]
+) -> Expression:
+    """Invert a function at the multiples of 15 degrees, and name its inverse elsewhere."""
+    if not x.symbols:
+        try:
+            angle = approximate(float(x))
+        except ValueError:
+            raise ExpressionError(f"{name}({x.text}) is not real") from None
+        steps = round(angle * STEPS_IN_PI / math.pi)
+        if exactly(steps) == x:
+            return PI * Fraction(steps, STEPS_IN_PI)
+    return Expression.of_atom(Atom(name, (x,)))
+
+
+def _direction(angle: Expression) -> tuple[Expression, Expression] | None:
+    """Return cosine and sine of an angle that is +-atan2(y, x): x/r and +-y/r; None for other angles."""
+    if len(angle.terms) != 1:
+        return None
+    monomial, sign = angle.terms[0]
+    if len(monomial) != 1 or monomial[0][1] != 1 or abs(sign) != 1 or monomial[0][0].name != "atan2":
+        return None
+    y, x = monomial[0][0].arguments
+    r = sqrt(x * x + y * y)
+    return x / r, y * sign / r
+
+
+def _leads_negative(x: Expression) -> bool:
+    return bool(x.terms) and x.terms[0][1] < 0
+
+
+def _prime_factors(number: int) -> list[tuple[int, int]]:
+    """Factor by trial division; numbers are small here."""
+    factors, prime = [], 2
+    while prime * prime <= number:
+        power = 0
+        while number % prime == 0:
+            number, power = number // prime, power + 1
+        if power:
+            factors.append((prime, power))
+        prime += 1
+    return [*factors, (number, 1)] if number > 1 else factors

@@ -1,0 +1,123 @@
+"""From text to an exact value: the syntax tree worked out over names that the caller allows."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection
+from fractions import Fraction
+from math import comb
+
+from dhkit.errors import ExpressionError
+from dhkit.expressions.exact import MAX_EXPONENT, PI, ZERO, Expression
+from dhkit.expressions.functions import call, sqrt
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree, read
+
+__all__ = ["CONSTANTS", "Budget", "parse", "value_of"]
+
+CONSTANTS = {
+    "pi": PI,
+    "deg": PI / 180,
+    "mm": Expression.number(Fraction(1, 1000)),
+    "cm": Expression.number(Fraction(1, 100)),
+    "inch": Expression.number(Fraction(254, 10_000)),
+}
+"""What a name means everywhere: lengths in metres, angles in radians."""
+
+DEFAULT_WORK = 50_000
+"""Term products that one text, or one file, may cost: a tenth of a second."""
+
+
+class Budget:
+    """Work that is still allowed; share one over a whole file to bound its time."""
+
+    def __init__(self, work: int = DEFAULT_WORK) -> None:
+        self.left = work
+
+    def spend(self, work: int) -> None:
+        """Take from what is left.
+
+        Raises
+        ------
+        ExpressionError
+            Nothing is left.
+        """
+        self.left -= work
+        if self.left < 0:
+            raise ExpressionError("multiplies out to too many terms")
+
+
+def parse(text: str, names: Collection[str] = (), budget: Budget | None = None) -> Expression:
+    """Read an expression: decimals, the given names, :data:`CONSTANTS`, the known functions and ``+ - * / ** ^``.
+
+    Nothing is evaluated as code. Decimals are rationals, so that ``0.1 + 0.2`` is 0.3.
+
+    Parameters
+    ----------
+    text
+        What a person typed.
+    names
+        The parameters or variables that may occur.
+    budget
+        Work allowed, shared between texts; a fresh one if not given.
+
+    Raises
+    ------
+    ExpressionError
+        Not an expression, an unknown name or function, no finite value, or more than the limits allow.
+
+    Examples
+    --------
+    >>> float(parse("2*(17 + 3/10)*inch"))
+    0.87884
+    >>> parse("l1 + 3*mm", names=["l1"]).symbols
+    frozenset({'l1'})
+    """
+    return value_of(read(text), names, budget or Budget()).as_written(text.strip())
+
+
+def value_of(tree: Tree, names: Collection[str], budget: Budget) -> Expression:
+    """Work out a syntax tree."""
+    match tree:
+        case Number(value):
+            return Expression.number(value)
+        case Name(text):
+            return _named(text, names)
+        case Call(function, arguments):
+            return call(function, *(value_of(argument, names, budget) for argument in arguments))
+        case Power(base, exponent):
+            return _power(value_of(base, names, budget), value_of(exponent, names, budget), budget)
+        case Sum(terms):
+            total = ZERO
+            for added, term in terms:
+                value = value_of(term, names, budget)
+                budget.spend(len(total.terms))
+                total = total + value if added else total - value
+            return total
+        case Product(factors):
+            product = Expression.number(1)
+            for multiplied, factor in factors:
+                value = value_of(factor, names, budget)
+                budget.spend(len(product.terms) * len(value.terms))
+                product = product * value if multiplied else product / value
+            return product
+
+
+def _named(text: str, names: Collection[str]) -> Expression:
+    if text in names:
+        return Expression.symbol(text)
+    if text in CONSTANTS:
+        return CONSTANTS[text]
+    close = difflib.get_close_matches(text, [*names, *CONSTANTS], n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join([*names, *CONSTANTS][:12])}"
+    raise ExpressionError(f"unknown name {text!r}; {hint}")
+
+
+def _power(base: Expression, exponent: Expression, budget: Budget) -> Expression:
+    """Raise to a whole or half-whole power."""
+    number = exponent.rational
+    if number is None or number.denominator > 2:
+        raise ExpressionError(f"an exponent of {exponent.text}; expected a whole number or half of one")
+    size, terms = abs(number.numerator), len(base.terms)
+    expanded = comb(min(size, MAX_EXPONENT) + terms - 1, terms - 1) if terms > 1 else 1
+    budget.spend(4 * expanded * terms)
+    return (base if number.denominator == 1 else sqrt(base)) ** number.numerator

@@ -1,0 +1,225 @@
+"""From text to a syntax tree: a recursive-descent parser with a whitelist, bounded in length, depth and numbers.
+
+The grammar is that of school algebra, with ``^`` and ``**`` for powers (right-associative, binding tighter than a
+sign on their left: ``-2^2`` is -4)::
+
+    sum     = product (("+" | "-") product)*
+    product = signed (("*" | "/") signed)*
+    signed  = ("+" | "-")* power
+    power   = atom (("^" | "**") signed)?
+    atom    = number | name | name "(" sum ("," sum)* ")" | "(" sum ")"
+
+Sums and products are kept flat, so that a tree is no deeper than the brackets of its text.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NoReturn, TypeAlias
+
+from dhkit.errors import ExpressionError
+
+__all__ = ["Call", "Name", "Number", "Power", "Product", "Sum", "Tree", "decimal_fraction", "read"]
+
+MAX_LENGTH = 10_000
+"""Characters of one expression: longer than any derivation that a person types."""
+MAX_DEPTH = 50
+"""Nested brackets, signs and powers."""
+MAX_DIGITS = 400
+"""Digits of one number, and the size of its decimal exponent: beyond it no double is finite."""
+
+TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A decimal, as the rational that it is."""
+
+    value: Fraction
+
+
+@dataclass(frozen=True)
+class Name:
+    """A constant, parameter or variable."""
+
+    text: str
+    at: int
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of its arguments; which functions there are is not the grammar's business."""
+
+    function: str
+    arguments: tuple[Tree, ...]
+    at: int
+
+
+@dataclass(frozen=True)
+class Power:
+    """``base ^ exponent``."""
+
+    base: Tree
+    exponent: Tree
+    at: int
+
+
+@dataclass(frozen=True)
+class Product:
+    """Factors, each multiplied (True) or divided by (False)."""
+
+    factors: tuple[tuple[bool, Tree], ...]
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Terms, each added (True) or subtracted (False)."""
+
+    terms: tuple[tuple[bool, Tree], ...]
+
+
+Tree: TypeAlias = Number | Name | Call | Power | Product | Sum
+
+
+def read(text: str) -> Tree:
+    """Read an expression's syntax tree.
+
+    Raises
+    ------
+    ExpressionError
+        The text is no expression, or is longer or deeper than the limits of this module.
+    """
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"an expression of {len(text)} characters; expected at most {MAX_LENGTH}")
+    return _Reader(text).whole()
+
+
+def decimal_fraction(text: str) -> Fraction:
+    """Return the rational that a decimal number's text stands for.
+
+    Raises
+    ------
+    ExpressionError
+        It has more digits, or a larger exponent, than any finite double.
+    """
+    mantissa, _, exponent = text.lower().partition("e")
+    shown = text if len(text) <= 20 else f"{text[:17]}..."
+    if len(mantissa) > MAX_DIGITS or len(exponent) > 6 or abs(int(exponent or 0)) > MAX_DIGITS:
+        raise ExpressionError(f"{shown} is beyond the range of a double")
+    value = Fraction(text)
+    try:
+        float(value)
+    except OverflowError:
+        raise ExpressionError(f"{shown} is beyond the range of a double") from None
+    return value
+
+
+class _Reader:
+    """One pass over the tokens of a text."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.depth = 0
+        self.tokens = self._split()
+        self.index = 0
+
+    def _split(self) -> list[tuple[str, str, int]]:
+        tokens, at = [], 0
+        end = len(self.text.rstrip())
+        while at < end:
+            match = TOKEN.match(self.text, at)
+            if match is None:
+                at += len(self.text[at:]) - len(self.text[at:].lstrip())
+                raise ExpressionError(f"{self._shown()}: unexpected character {self.text[at]!r} at position {at + 1}")
+            kind = ("number", "name", "sign")[(match.lastindex or 1) - 1]
+            tokens.append((kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1)))
+            at = match.end()
+        return tokens
+
+    def _shown(self) -> str:
+        return repr(self.text if len(self.text) <= 60 else self.text[:57] + "...")
+
+    def _fail(self, expected: str) -> NoReturn:
+        if self.index < len(self.tokens):
+            _, found, at = self.tokens[self.index]
+            raise ExpressionError(f"{self._shown()}: found {found!r} at position {at + 1}, expected {expected}")
+        raise ExpressionError(f"{self._shown()}: ends where {expected} was expected")
+
+    def _peek(self) -> str:
+        return self.tokens[self.index][1] if self.index < len(self.tokens) else ""
+
+    def _take(self, *signs: str) -> str:
+        """Consume the next token if it is one of these; '' otherwise."""
+        found = self._peek()
+        if found not in signs:
+            return ""
+        self.index += 1
+        return found
+
+    def _deeper(self) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise ExpressionError(f"{self._shown()}: nested more than {MAX_DEPTH} deep")
+
+    def whole(self) -> Tree:
+        tree = self.sum()
+        if self.index < len(self.tokens):
+            self._fail("an operator or the end")
+        return tree
+
+    def sum(self) -> Tree:
+        terms = [(True, self.product())]
+        while sign := self._take("+", "-"):
+            terms.append((sign == "+", self.product()))
+        return terms[0][1] if len(terms) == 1 else Sum(tuple(terms))
+
+    def product(self) -> Tree:
+        factors = [(True, self.signed())]
+        while sign := self._take("*", "/"):
+            factors.append((sign == "*", self.signed()))
+        return factors[0][1] if len(factors) == 1 else Product(tuple(factors))
+
+    def signed(self) -> Tree:
+        positive = True
+        while sign := self._take("+", "-"):
+            positive ^= sign == "-"
+        power = self.power()
+        return power if positive else Sum(((False, power),))
+
+    def power(self) -> Tree:
+        base = self.atom()
+        at = self.tokens[self.index][2] if self.index < len(self.tokens) else 0
+        if not self._take("^", "**"):
+            return base
+        self._deeper()
+        exponent = self.signed()
+        self.depth -= 1
+        return Power(base, exponent, at)
+
+    def atom(self) -> Tree:
+        if self.index == len(self.tokens):
+            self._fail("a number, a name or a bracket")
+        kind, text, at = self.tokens[self.index]
+        if kind == "number":
+            self.index += 1
+            return Number(decimal_fraction(text))
+        if kind == "name":
+            self.index += 1
+            return Call(text, self._arguments(), at) if self._peek() == "(" else Name(text, at)
+        if text == "(":
+            return self._arguments(most=1)[0]
+        self._fail("a number, a name or a bracket")
+
+    def _arguments(self, most: int = 2) -> tuple[Tree, ...]:
+        """Read ``( sum, ... )``."""
+        self.index += 1
+        self._deeper()
+        arguments = [self.sum()]
+        while len(arguments) < most and self._take(","):
+            arguments.append(self.sum())
+        if not self._take(")"):
+            self._fail("')'")
+        self.depth -= 1
+        return tuple(arguments)
