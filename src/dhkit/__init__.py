@@ -1,0 +1,62 @@
+"""Robot arms from their Denavit-Hartenberg table: URDF, Pinocchio model, kinematics, and a view in the browser."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from dhkit.errors import (
+    AnswerError,
+    DescriptionError,
+    DhkitError,
+    ExpressionError,
+    ModelError,
+    PlanningError,
+    UnreachableError,
+)
+
+if TYPE_CHECKING:
+    from dhkit.arm import Arm
+    from dhkit.description import Description, pose, pose_parts, robots
+    from dhkit.viewer import plot
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AnswerError",
+    "Arm",
+    "Description",
+    "DescriptionError",
+    "DhkitError",
+    "ExpressionError",
+    "ModelError",
+    "PlanningError",
+    "UnreachableError",
+    "__version__",
+    "plot",
+    "pose",
+    "pose_parts",
+    "robots",
+]
+
+_HOMES = {
+    "Arm": "dhkit.arm",
+    "Description": "dhkit.description",
+    "plot": "dhkit.viewer",
+    "pose": "dhkit.description",
+    "pose_parts": "dhkit.description",
+    "robots": "dhkit.description",
+}
+"""Where the public names live: imported when first used, so that ``import dhkit`` takes no time."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'dhkit' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -69,6 +69,8 @@ class Numbers:
     """Shape (4, 4): frame 0 in the world."""
     T_last_tool: Array
     """Shape (4, 4): the tool in DH frame n."""
+    configurations: dict[str, Array]
+    """Joint vectors by name, shape (n,), rad and m."""
     reach: float
     """The sum of abs(a) + abs(d) + stroke, m."""
 
@@ -119,10 +121,11 @@ class Numbers:
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
             T_last_tool=matrix(description.tool.placement, values),
+            configurations={name: array(q) for name, q in description.configurations.items()},
             reach=float(np.sum(np.abs(a) + np.abs(d)) + _stroke(joints, lower, upper)),
         )
-        for item in fields(numbers):
-            value = getattr(numbers, item.name)
+        own = [getattr(numbers, item.name) for item in fields(numbers)]
+        for value in [*own, *numbers.configurations.values()]:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
         return numbers

@@ -208,9 +208,9 @@ class _Reader:
         if kind == "name":
             self.index += 1
             return Call(text, self._arguments(), at) if self._peek() == "(" else Name(text, at)
-        if text == "(":
-            return self._arguments(most=1)[0]
-        self._fail("a number, a name or a bracket")
+        if text != "(":
+            self._fail("a number, a name or a bracket")
+        return self._arguments(most=1)[0]
 
     def _arguments(self, most: int = 2) -> tuple[Tree, ...]:
         """Read ``( sum, ... )``."""

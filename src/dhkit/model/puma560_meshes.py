@@ -11,7 +11,6 @@ vertices and faces are sorted, so that every run gives the same bytes.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -94,7 +93,7 @@ def write_puma560_meshes(folder: Path) -> list[Path]:
         path = folder / f"{name}.stl"
         unfinished = path.with_suffix(".stl.part")
         unfinished.write_bytes(_binary_stl(name, mesh))
-        os.replace(unfinished, path)
+        unfinished.replace(path)
         paths.append(path)
     return paths
 
@@ -222,7 +221,7 @@ def _slab(discs: Sequence[Disc], low: float, high: float, chamfer: float, axis: 
 
 
 def _ring_of(solid: Manifold, radius: float, count: int) -> Manifold:
-    """Copies of a solid around z at a radius, m, the first half a step from x."""
+    """Return copies of a solid around z at a radius, m, the first half a step from x."""
     angle = (np.arange(count) + 0.5) * (2 * np.pi / count)
     centres = np.round(radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=-1), DECIMALS)
     return Manifold.compose([solid.translate(tuple(centre)) for centre in centres])
@@ -242,7 +241,7 @@ def _canonical(solid: Manifold) -> trimesh.Trimesh:
 
 
 def _binary_stl(name: str, mesh: trimesh.Trimesh) -> bytes:
-    """A mesh as binary STL: an 80-byte header, the number of facets, 50 bytes per facet."""
+    """Write a mesh as binary STL: an 80-byte header, the number of facets, 50 bytes per facet."""
     corners = np.asarray(mesh.vertices)[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facets = np.zeros(len(corners), dtype=STL_FACET)

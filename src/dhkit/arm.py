@@ -1,0 +1,238 @@
+"""The front door: one robot, with everything that dhkit does for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from dhkit import description as describe
+from dhkit.description import Array, Description, DHTable, Named
+from dhkit.errors import DescriptionError
+
+if TYPE_CHECKING:
+    from dhkit.description.table import Quantity
+    from dhkit.kinematics import ReferenceAxes
+    from dhkit.model import PinocchioModel
+    from dhkit.verification import VerificationReport
+    from dhkit.viewer import View
+
+__all__ = ["Arm"]
+
+
+class Arm:
+    """A serial robot arm; immutable, equal to its copies, picklable, safe to share between threads.
+
+    Angles are in radians, lengths in metres; arrays are float64 with leading batch axes: q (..., n).
+
+    Examples
+    --------
+    >>> arm = Arm.load("puma560")
+    >>> arm.n, arm.name
+    (6, 'puma560')
+    >>> arm.fk(arm.configurations["ready"])[:3, 3].round(4)
+    array([-0.0203, -0.15  ,  1.5354])
+    """
+
+    __slots__ = ("__dict__", "_description")
+
+    def __init__(self, description: Description) -> None:
+        self._description = description
+
+    # Where arms come from
+
+    @classmethod
+    def load(cls, name: str | Path) -> Arm:
+        """Return a robot of the library by name, or read a robot file by path (anything that ends in ``.toml``).
+
+        Raises
+        ------
+        DescriptionError
+            No such robot, or a file that describes none.
+        """
+        if isinstance(name, str) and not name.endswith((".toml", ".urdf")) and "/" not in name:
+            return cls(describe.library_robot(name))
+        if Path(name).suffix == ".urdf":
+            raise DescriptionError(f"{name}: reading URDFs is not built yet; expected a .toml robot file")
+        return cls(describe.read_robot(name))
+
+    @classmethod
+    def from_dh(
+        cls,
+        rows: Sequence[Sequence[Quantity]],
+        *,
+        order: Sequence[str] = ("theta", "d", "a", "alpha"),
+        kinds: str | None = None,
+        convention: str = "standard",
+        angle: str = "rad",
+        length: str = "m",
+        name: str = "arm",
+        parameters: Mapping[str, Quantity] | None = None,
+    ) -> Arm:
+        """Return the arm of a Denavit-Hartenberg table; see :func:`dhkit.description.from_dh`."""
+        return cls(
+            describe.from_dh(
+                rows,
+                order=order,
+                kinds=kinds,
+                convention=convention,
+                angle=angle,
+                length=length,
+                name=name,
+                parameters=parameters,
+            )
+        )
+
+    def with_tool(self, T: ArrayLike) -> Arm:
+        """Return this arm with its tool at T in DH frame n, shape (4, 4)."""
+        return Arm(describe.with_tool(self._description, T))
+
+    def with_base(self, T: ArrayLike) -> Arm:
+        """Return this arm with frame 0 at T in the world, shape (4, 4)."""
+        return Arm(describe.with_base(self._description, T))
+
+    def with_payload(
+        self, mass: Quantity, com: Sequence[Quantity] = (0, 0, 0), inertia: ArrayLike | None = None
+    ) -> Arm:
+        """Return this arm with a load, kg, its com in the tool's frame; see :func:`dhkit.description.with_payload`."""
+        return Arm(describe.with_payload(self._description, mass, com, inertia))
+
+    def with_parameters(self, **values: Quantity) -> Arm:
+        """Return this arm with other values of its parameters, SI and radians."""
+        return Arm(describe.with_parameters(self._description, **values))
+
+    def with_uniform_links(self, masses: Sequence[Quantity] | None = None) -> Arm:
+        """Return this arm with thin uniform rods for links; see :func:`dhkit.description.with_uniform_links`."""
+        return Arm(describe.with_uniform_links(self._description, masses))
+
+    def lock(self, joints: Mapping[int | str, Quantity]) -> Arm:
+        """Return this arm with joints frozen, by place from 0 or by name; see :func:`dhkit.description.lock`."""
+        return Arm(describe.lock(self._description, joints))
+
+    # What it is
+
+    @property
+    def description(self) -> Description:
+        """The robot as data."""
+        return self._description
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._description.name
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self._description.n
+
+    @cached_property
+    def dh(self) -> DHTable:
+        """The Denavit-Hartenberg table; prints as one."""
+        return DHTable.of(self._description)
+
+    @cached_property
+    def configurations(self) -> Mapping[str, Array]:
+        """Named joint vectors, shape (n,), rad and m, read-only."""
+        return Named(self._description.numbers.configurations)
+
+    # Kinematics
+
+    def fk(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the tool's pose in the world, shape (..., 4, 4), for q (..., n)."""
+        from dhkit.kinematics import forward_kinematics
+
+        return forward_kinematics(self._description, q, out, threads)
+
+    def frames(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), for q (..., n)."""
+        from dhkit.kinematics import frames
+
+        return frames(self._description, q, out, threads)
+
+    def jacobian(
+        self, q: ArrayLike, frame: ReferenceAxes = "world", out: Array | None = None, threads: int = 1
+    ) -> Array:
+        """Return the tool's Jacobian, shape (..., 6, n): linear, then angular velocity, in ``frame``'s axes."""
+        from dhkit.kinematics import jacobian
+
+        return jacobian(self._description, q, frame, out, threads)
+
+    def jacobian_dot(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        frame: ReferenceAxes = "world",
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
+        """Return the Jacobian's time derivative along a motion, shape (..., 6, n)."""
+        from dhkit.kinematics import jacobian_dot
+
+        return jacobian_dot(self._description, q, qd, frame, out, threads)
+
+    # The reference path
+
+    def urdf(self) -> str:
+        """Return the arm as URDF text; meshes are named as ``meshes/...`` beside it."""
+        from dhkit.model import urdf_text
+
+        return urdf_text(self._description)
+
+    def write_urdf(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the URDF and, beside it, the meshes that it names; return the files."""
+        from dhkit.model import write_urdf
+
+        return write_urdf(self._description, path)
+
+    @property
+    def model(self) -> PinocchioModel:
+        """A Pinocchio model with gravity, armature, friction and limits set; made once, a copy each time.
+
+        Raises
+        ------
+        ModelError
+            Pinocchio is not installed.
+        """
+        return self._model.copy()
+
+    @cached_property
+    def _model(self) -> PinocchioModel:
+        from dhkit.model import pinocchio_model
+
+        return pinocchio_model(self._description)
+
+    def verify(self, samples: int = 1000, seed: int = 0) -> VerificationReport:
+        """Hold our kinematics against Pinocchio's over random states; ``.ok`` says whether they agree."""
+        from dhkit.verification import verify
+
+        return verify(self._description, samples, seed)
+
+    # Showing
+
+    def view(self, **options: Any) -> View:
+        """Return a view of the arm for a browser; see :class:`dhkit.viewer.View`."""
+        from dhkit.viewer import View
+
+        return View(self._description, **options)
+
+    # Value semantics
+
+    def __eq__(self, other: object) -> bool:
+        return self._description == other._description if isinstance(other, Arm) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._description)
+
+    def __reduce__(self) -> tuple[type[Arm], tuple[Description]]:
+        return Arm, (self._description,)
+
+    def __repr__(self) -> str:
+        kinds = "".join("R" if joint.is_revolute else "P" for joint in self._description.joints)
+        return f"<Arm {self.name}: {kinds}, {self._description.convention.value} DH>"
+
+    def _repr_html_(self) -> str:
+        return f"<b>{self.name}</b>{self.dh._repr_html_()}"

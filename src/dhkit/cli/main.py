@@ -1,0 +1,134 @@
+"""The commands and their arguments; every bad input ends in one line on stderr and status 2."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import click
+import typer
+
+from dhkit.arm import Arm
+from dhkit.cli import demo as demo_command
+from dhkit.cli import info as info_command
+from dhkit.cli.output import print_json, say
+from dhkit.errors import DescriptionError, DhkitError
+
+__all__ = ["main"]
+
+app = typer.Typer(
+    name="dhkit",
+    help="Robot arms from their Denavit-Hartenberg table.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+Robot = Annotated[str, typer.Argument(help="A library name (see `dhkit robots`) or a robot file (.toml).")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command and exit with its status."""
+    logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
+    try:
+        status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+    except (DhkitError, ValueError) as error:
+        _fail(str(error))
+    except click.ClickException as error:
+        _fail(error.format_message())
+    except OSError as error:
+        _fail(f"{error.filename or 'output'}: {error.strerror or error}")
+    except (click.Abort, KeyboardInterrupt):
+        _fail("interrupted", status=130)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str, status: int = 2) -> NoReturn:
+    sys.stderr.write(f"dhkit: {' '.join(message.split())}\n")
+    sys.exit(status)
+
+
+@app.command()
+def robots(json: Json = False) -> None:
+    """List the robots of the library."""
+    info_command.list_robots(json)
+
+
+@app.command()
+def info(robot: Robot, json: Json = False) -> None:
+    """Show a robot: its DH table, limits, masses, configurations and what is odd about it."""
+    info_command.show(Arm.load(robot), json)
+
+
+@app.command()
+def build(
+    robot: Robot,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The URDF to write; ./NAME.urdf.")] = None,
+    json: Json = False,
+) -> None:
+    """Write a robot's URDF, with its meshes beside it."""
+    arm = Arm.load(robot)
+    path = output or Path(f"{arm.name}.urdf")
+    if not path.parent.is_dir():
+        raise DescriptionError(f"{path.parent}: no such folder")
+    files = arm.write_urdf(path)
+    if json:
+        print_json({"files": [str(file) for file in files]})
+    else:
+        say("\n".join(f"wrote {file}" for file in files))
+
+
+@app.command(context_settings={"ignore_unknown_options": True})
+def fk(
+    robot: Robot,
+    q: Annotated[list[str], typer.Argument(help="Joint values, or the name of a configuration such as ready.")],
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    frames: Annotated[bool, typer.Option("--frames", help="All DH frames too.")] = False,
+    json: Json = False,
+) -> None:
+    """Print where the tool is for given joint values (rad and m)."""
+    info_command.forward(Arm.load(robot), q, degrees=degrees, with_frames=frames, json=json)
+
+
+@app.command()
+def verify(
+    robot: Robot,
+    samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    json: Json = False,
+) -> int:
+    """Hold our kinematics against Pinocchio's; exit status 1 where they disagree."""
+    report = Arm.load(robot).verify(samples, seed)
+    if json:
+        agreements = [vars(agreement) | {"ok": agreement.ok} for agreement in report.agreements]
+        print_json(vars(report) | {"agreements": agreements, "ok": report.ok})
+    else:
+        say(str(report))
+    return 0 if report.ok else 1
+
+
+@app.command()
+def schema(what: Annotated[str, typer.Argument(help="Which file: robot.")] = "robot") -> None:
+    """Print the JSON Schema of a file format."""
+    from dhkit.description.schema import robot_schema
+
+    if what != "robot":
+        raise DescriptionError(f"no schema {what!r}; expected robot")
+    print_json(robot_schema())
+
+
+@app.command()
+def demo(
+    robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
+    output: Annotated[Path | None, typer.Option(help="Folder to write; out/NAME.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer samples.")] = False,
+    json: Json = False,
+) -> int:
+    """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""
+    return demo_command.run(Arm.load(robot), output, quick=quick, json=json)
+

@@ -1,0 +1,57 @@
+"""What the command prints: rich tables for people, JSON for machines."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+__all__ = ["print_json", "print_table", "say"]
+
+PIPE_WIDTH = 200
+"""Columns where the output is no terminal: tables then do not break."""
+
+
+def console() -> Console:
+    """Return a console on today's stdout, as wide as the terminal."""
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
+    return Console(width=width, highlight=False, soft_wrap=True)
+
+
+def say(text: str, style: str = "") -> None:
+    """Print a line of plain text: brackets in it are no markup."""
+    console().print(Text(text, style=style))
+
+
+def print_json(value: Any) -> None:
+    """Print a value as one JSON document; NaN and infinities are null."""
+    sys.stdout.write(json.dumps(_finite(value), ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
+    """Print a table, numbers to the right."""
+    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    listed = [list(row) for row in rows]
+    for k, heading in enumerate(headings):
+        numeric = all(row[k][:1] in "+-0123456789" for row in listed if row[k])
+        table.add_column(heading, justify="right" if numeric and listed else "left", overflow="fold")
+    for row in listed:
+        table.add_row(*(Text(cell) for cell in row))
+    out = Console(width=console().width, highlight=False)
+    out.print(table)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if value == value and abs(value) != float("inf") else None
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    return value

@@ -1,0 +1,54 @@
+"""Descriptions as Pinocchio models: the reference path, by way of the URDF."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.errors import ModelError
+from dhkit.model.urdf import urdf_text
+
+if TYPE_CHECKING:
+    import pinocchio
+
+    PinocchioModel: TypeAlias = pinocchio.Model
+else:
+    PinocchioModel: TypeAlias = Any
+
+__all__ = ["PinocchioModel", "pinocchio_model"]
+
+
+def pinocchio_model(description: Description) -> PinocchioModel:
+    """Return a Pinocchio model of a description, made from its URDF.
+
+    What a URDF cannot say is set on it: gravity, ``armature`` (gear^2 rotor inertia, which rnea, crba and aba use;
+    setting rotorInertia and rotorGearRatio alone would change nothing), dry friction by direction, unlimited effort
+    and velocity as inf. Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
+
+    Raises
+    ------
+    ModelError
+        Pinocchio is not installed (there is no wheel of it for Windows), or refuses the model.
+    """
+    try:
+        import pinocchio as pin
+    except ImportError:
+        raise ModelError(
+            "Pinocchio is not installed: pip install pin (Linux, macOS) or conda install pinocchio; "
+            "everything that needs no reference model works without it"
+        ) from None
+    try:
+        model = pin.buildModelFromXML(urdf_text(description))
+    except ValueError as error:
+        raise ModelError(f"{description.name}: Pinocchio refuses the URDF: {error}") from None
+    numbers = description.numbers
+    model.gravity.linear = np.array(numbers.gravity)
+    model.armature = np.array(numbers.armature)
+    model.damping = np.array(numbers.viscous)
+    model.upperDryFrictionLimit = np.array(numbers.coulomb[:, 0])
+    model.lowerDryFrictionLimit = np.array(numbers.coulomb[:, 1])
+    model.effortLimit = np.array(numbers.effort)
+    model.velocityLimit = np.array(numbers.velocity)
+    return model

@@ -1,0 +1,212 @@
+"""Parts of an arm, triads and the floor's grid as meshcat objects, lowered to plain data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Box, Capsule, Cylinder, Mesh, Sphere
+from dhkit.errors import ModelError
+
+if TYPE_CHECKING:
+    from dhkit.model.shapes import Part
+
+__all__ = ["Lowered", "grid_object", "grid_step", "part_object", "part_transform", "triad_object"]
+
+Lowered: TypeAlias = dict[str, Any]
+"""A meshcat object or command as dictionaries, lists, numbers and bytes."""
+
+Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
+"""meshcat's cylinders stand along y, dhkit's along z: a quarter turn about x."""
+
+AXIS_COLORS = np.array([[0.898, 0.282, 0.302], [0.188, 0.643, 0.424], [0.231, 0.510, 0.965]])
+"""Red, green and blue for x, y and z: readable on white and on black."""
+
+ROUND_SIDES = 48
+"""Sides of what is round; a multiple of 4, so that the silhouette has the true radius."""
+
+ARROW_SIDES = 8
+GRID_FADE = 6
+"""Pieces of a half grid line, each with its own opacity."""
+
+
+def part_object(part: Part, name: str) -> Lowered:
+    """Return a part's meshcat object, in meshcat's axes for its geometry.
+
+    Parameters
+    ----------
+    part
+        A drawn part of a link.
+    name
+        What its pieces are called in place of random identifiers, so that equal scenes are equal bytes.
+
+    Raises
+    ------
+    ModelError
+        A mesh without a readable STL, OBJ or DAE file.
+    """
+    from meshcat.geometry import MeshPhongMaterial  # type: ignore[import-untyped]
+
+    material = MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222)
+    return _lowered("Mesh", _geometry(part), material, name)
+
+
+def part_transform(part: Part) -> Array:
+    """Return what maps the coordinates of a part's meshcat object to its link's DH frame, shape (4, 4).
+
+    That is the part's own pose with the mesh's scale or, for cylinders and capsules, the turn from y to z.
+    """
+    if isinstance(part.geometry, Mesh):
+        scale = float(part.geometry.scale)
+        return part.T_link_part @ np.diag([scale, scale, scale, 1.0])
+    if isinstance(part.geometry, Cylinder | Capsule):
+        return part.T_link_part @ Y_TO_Z
+    return part.T_link_part
+
+
+def triad_object(length: float, name: str) -> Lowered:
+    """Return three arrows along x, y and z, red, green and blue, drawn over everything that hides them.
+
+    Parameters
+    ----------
+    length
+        From the origin to the arrows' tips, m.
+    name
+        As for :func:`part_object`.
+    """
+    from meshcat.geometry import MeshBasicMaterial, TriangularMeshGeometry
+
+    vertices, faces = _arrow()
+    along = [np.roll(vertices, axis, axis=1) for axis in range(3)]  # cyclic: x, y and z keep the triangles' sense
+    geometry = TriangularMeshGeometry(
+        length * np.concatenate(along),
+        np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
+        np.repeat(AXIS_COLORS, len(vertices), axis=0),
+    )
+    material = MeshBasicMaterial(vertexColors=True, depthTest=False, transparent=True)
+    return _lowered("Mesh", geometry, material, name)
+
+
+def grid_step(size: float) -> float:
+    """Return a round distance between grid lines, about a sixth of a size: 1, 2 or 5 times a power of ten, m.
+
+    Examples
+    --------
+    >>> grid_step(1.5), grid_step(0.2)
+    (0.2, 0.02)
+    """
+    power = 10.0 ** np.floor(np.log10(size / 6))
+    steps = [round(float(power * digit), 12) for digit in (1, 2, 5, 10)]
+    return min(steps, key=lambda step: abs(np.log(step * 6 / size)))
+
+
+def grid_object(size: float, name: str) -> Lowered:
+    """Return a square grid in the plane z = 0 that fades out towards its edge; the page gives it its color.
+
+    Parameters
+    ----------
+    size
+        The arm's size, m: the grid reaches a little beyond it on every side.
+    name
+        As for :func:`part_object`.
+    """
+    from meshcat.geometry import LineBasicMaterial, PointsGeometry
+
+    step = grid_step(size)
+    lines = int(np.ceil(1.3 * size / step))
+    half = lines * step
+    across = step * np.arange(-lines, lines + 1)
+    along = np.linspace(-half, half, 2 * GRID_FADE + 1)
+    x, y = np.meshgrid(along, across)
+    line = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 3)
+    points = np.concatenate([segments, segments[:, [1, 0, 2]]])
+    opacity = np.clip(1 - np.hypot(points[:, 0], points[:, 1]) / half, 0, 1)
+    colors = np.concatenate([np.ones((3, len(points))), opacity[None]])
+    geometry = PointsGeometry(points.T.astype(np.float32), colors.astype(np.float32))
+    return _lowered("LineSegments", geometry, LineBasicMaterial(vertexColors=True, transparent=True), name)
+
+
+def _lowered(kind: str, geometry: Any, material: Any, name: str) -> Lowered:
+    import meshcat.geometry
+
+    drawn = getattr(meshcat.geometry, kind)(geometry, material)
+    geometry.uuid, material.uuid, drawn.uuid = f"{name}/geometry", f"{name}/material", name
+    lowered: Lowered = drawn.lower()
+    return lowered
+
+
+def _geometry(part: Part) -> Any:
+    from meshcat import geometry as meshcat
+
+    shape = part.geometry
+    match shape:
+        case Mesh():
+            return _mesh(part)
+        case Box():
+            return meshcat.Box([float(edge) for edge in shape.size])
+        case Sphere():
+            return _lathe(_arc(float(shape.radius), 0.0, -90, 90))
+        case Cylinder():
+            cylinder = meshcat.Cylinder(float(shape.length), float(shape.radius))
+            cylinder.radialSegments = ROUND_SIDES
+            return cylinder
+        case Capsule():
+            radius, half = float(shape.radius), float(shape.length) / 2
+            return _lathe(np.concatenate([_arc(radius, -half, -90, 0), _arc(radius, half, 0, 90)]))
+
+
+def _mesh(part: Part) -> Any:
+    from meshcat import geometry as meshcat
+
+    readers = {
+        ".stl": meshcat.StlMeshGeometry,
+        ".obj": meshcat.ObjMeshGeometry,
+        ".dae": meshcat.DaeMeshGeometry,
+    }
+    assert isinstance(part.geometry, Mesh)
+    if part.file is None:
+        raise ModelError(f"link {part.link}: mesh {part.geometry.path!r} has no folder; expected a robot read from a file")
+    reader = readers.get(part.file.suffix.lower())
+    if reader is None:
+        raise ModelError(f"link {part.link}: mesh {part.file} ends in {part.file.suffix!r}; expected .stl, .obj or .dae")
+    try:
+        return reader.from_file(part.file)
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ModelError(f"link {part.link}: mesh {part.file}: {reason}") from None
+
+
+def _lathe(outline: Array) -> Any:
+    """Return three.js's surface of revolution about y of an outline, shape (k, 2): distance from y, height."""
+    from meshcat.geometry import Geometry
+
+    class Lathe(Geometry):  # type: ignore[misc]  # meshcat-python has none
+        def lower(self, object_data: Lowered) -> Lowered:
+            points = [{"x": float(x), "y": float(y)} for x, y in outline]
+            return {"uuid": self.uuid, "type": "LatheGeometry", "points": points, "segments": ROUND_SIDES}
+
+    return Lathe()
+
+
+def _arc(radius: float, height: float, start: float, stop: float) -> Array:
+    """Return a circle's points between two latitudes in degrees, shape (k, 2), at least 0 from the axis."""
+    steps = round(abs(stop - start) / 360 * ROUND_SIDES)
+    latitude = np.radians(np.linspace(start, stop, steps + 1))
+    return np.stack([radius * np.maximum(np.cos(latitude), 0), height + radius * np.sin(latitude)], axis=1)
+
+
+def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
+    """Return an arrow of length 1 along x: a rod with a cone, vertices (k, 3) and triangles (m, 3)."""
+    turn = 2 * np.pi * np.arange(ARROW_SIDES) / ARROW_SIDES
+    rings = [(0.0, 0.02), (0.8, 0.02), (0.8, 0.055), (1.0, 0.0)]
+    vertices = np.concatenate(
+        [np.stack([np.full(ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1) for x, r in rings]
+    )
+    i = np.arange(ARROW_SIDES)
+    j = (i + 1) % ARROW_SIDES
+    bands = [k * ARROW_SIDES + np.array([[i, j, j + ARROW_SIDES], [i, j + ARROW_SIDES, i + ARROW_SIDES]]) for k in range(3)]
+    faces = np.concatenate([band.transpose(0, 2, 1).reshape(-1, 3) for band in bands])
+    return vertices, faces.astype(np.uint32)

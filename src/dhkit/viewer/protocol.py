@@ -1,0 +1,266 @@
+"""What Python and a page say to each other, as bytes; nothing here does input or output.
+
+Python to page: binary, little-endian. Every message begins with a header of 16 bytes: type (u8), flags (u8), number
+of joints n (u16), sequence (u32), time (f64, s). What follows depends on the type:
+
+- scene: length (u32) and JSON about the arm; then, to the end, length (u32) and a meshcat command in msgpack;
+- pose: q (f32, n), transforms (f32, (n + 2) x 12);
+- animation: count N (u32), zero (u32), times (f64, N), q (f32, N x n), transforms (f32, N x (n + 2) x 12);
+- trace: points in the world (f32, N x 3);
+- frames: nothing; flag 1 shows them.
+
+A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Page to
+Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dhkit.description.numbers import Array
+
+if TYPE_CHECKING:
+    from dhkit.viewer.drawables import Lowered
+    from dhkit.viewer.scene import Scene
+
+__all__ = [
+    "Animation",
+    "Header",
+    "MessageType",
+    "Pose",
+    "ProtocolError",
+    "decode_animation",
+    "decode_header",
+    "decode_pose",
+    "decode_scene",
+    "decode_shown",
+    "decode_trace",
+    "encode_animation",
+    "encode_frames",
+    "encode_pose",
+    "encode_scene",
+    "encode_trace",
+    "stamped",
+]
+
+HEADER = struct.Struct("<BBHId")
+LENGTH = struct.Struct("<I")
+MAX_SEQUENCE = 2**32
+FLAG = 1
+
+
+class ProtocolError(ValueError):
+    """Bytes or text that are no message."""
+
+
+class MessageType(IntEnum):
+    """What a message to a page is about."""
+
+    SCENE = 1
+    POSE = 2
+    ANIMATION = 3
+    TRACE = 4
+    FRAMES = 5
+
+
+@dataclass(frozen=True)
+class Header:
+    """The first 16 bytes of a message."""
+
+    type: MessageType
+    flags: int
+    joints: int
+    sequence: int
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """One state of the arm."""
+
+    q: Array
+    """Shape (n,), rad and m."""
+    transforms: Array
+    """Shape (n + 2, 3, 4): links and tool in the world."""
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """States of the arm over time."""
+
+    times: Array
+    """Shape (N,), s."""
+    q: Array
+    """Shape (N, n), rad and m."""
+    transforms: Array
+    """Shape (N, n + 2, 3, 4)."""
+    trace: bool
+    """Whether the tool's path is drawn as it plays."""
+
+
+def encode_scene(scene: Scene) -> bytes:
+    """Return a scene message."""
+    import umsgpack  # type: ignore[import-untyped]
+
+    about = json.dumps(scene.about, separators=(",", ":"), allow_nan=False).encode()
+    blocks = [about, *(umsgpack.packb(command) for command in scene.commands)]
+    body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
+    return _header(MessageType.SCENE, joints=len(scene.about["joints"])) + body
+
+
+def decode_scene(message: bytes) -> tuple[Lowered, list[Lowered]]:
+    """Return what a scene message says about the arm, and its commands."""
+    import umsgpack
+
+    _expect(message, MessageType.SCENE)
+    about, *commands = _blocks(message[HEADER.size :])
+    return json.loads(about), [umsgpack.unpackb(command) for command in commands]
+
+
+def encode_pose(q: Array, transforms: Array, time: float = 0.0) -> bytes:
+    """Return a pose message.
+
+    Parameters
+    ----------
+    q
+        Shape (n,), rad and m.
+    transforms
+        Shape (n + 2, 4, 4): links and tool in the world.
+    time
+        When, s.
+    """
+    return _header(MessageType.POSE, joints=len(q), time=time) + _floats(q) + _floats(transforms[:, :3, :])
+
+
+def decode_pose(message: bytes) -> Pose:
+    """Return the state in a pose message."""
+    n = _expect(message, MessageType.POSE).joints
+    numbers = _array(message[HEADER.size :], "<f4")
+    return Pose(numbers[:n], numbers[n:].reshape(n + 2, 3, 4))
+
+
+def encode_animation(times: Array, q: Array, transforms: Array, *, trace: bool) -> bytes:
+    """Return an animation message.
+
+    Parameters
+    ----------
+    times
+        Shape (N,), s, increasing.
+    q
+        Shape (N, n), rad and m.
+    transforms
+        Shape (N, n + 2, 4, 4).
+    trace
+        Whether the tool's path is drawn as it plays.
+    """
+    header = _header(MessageType.ANIMATION, flags=FLAG * trace, joints=q.shape[1])
+    count = LENGTH.pack(len(times)) + LENGTH.pack(0)  # the zero keeps the times on a multiple of 8
+    return header + count + times.astype("<f8").tobytes() + _floats(q) + _floats(transforms[:, :, :3, :])
+
+
+def decode_animation(message: bytes) -> Animation:
+    """Return the states in an animation message."""
+    header = _expect(message, MessageType.ANIMATION)
+    (count,) = LENGTH.unpack_from(message, HEADER.size)
+    start = HEADER.size + 2 * LENGTH.size
+    times = _array(message[start : start + 8 * count], "<f8")
+    numbers = _array(message[start + 8 * count :], "<f4")
+    q, transforms = np.split(numbers, [count * header.joints])
+    return Animation(
+        times,
+        q.reshape(count, header.joints),
+        transforms.reshape(count, header.joints + 2, 3, 4),
+        bool(header.flags & FLAG),
+    )
+
+
+def encode_trace(points: Array) -> bytes:
+    """Return a trace message: a polyline in the world, shape (N, 3), m; no points take it away."""
+    return _header(MessageType.TRACE) + _floats(points)
+
+
+def decode_trace(message: bytes) -> Array:
+    """Return the points of a trace message, shape (N, 3), m."""
+    _expect(message, MessageType.TRACE)
+    return _array(message[HEADER.size :], "<f4").reshape(-1, 3)
+
+
+def encode_frames(visible: bool) -> bytes:
+    """Return a message that shows or hides the triads with their labels."""
+    return _header(MessageType.FRAMES, flags=FLAG * visible)
+
+
+def stamped(message: bytes, sequence: int) -> bytes:
+    """Return a message with its sequence number, modulo 2^32."""
+    return message[:4] + LENGTH.pack(sequence % MAX_SEQUENCE) + message[8:]
+
+
+def decode_header(message: bytes) -> Header:
+    """Return a message's header.
+
+    Raises
+    ------
+    ProtocolError
+        Too short, or of an unknown type.
+    """
+    try:
+        kind, flags, joints, sequence, time = HEADER.unpack_from(message)
+        return Header(MessageType(kind), flags, joints, sequence, time)
+    except (struct.error, ValueError) as error:
+        raise ProtocolError(f"no message: {error}") from None
+
+
+def decode_shown(text: str | bytes) -> int:
+    """Return the sequence number of a page's acknowledgement.
+
+    Raises
+    ------
+    ProtocolError
+        Not JSON, not an object, of another type, or without a whole number from 0 to 2^32 - 1.
+    """
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        raise ProtocolError("message is no JSON") from None
+    if not isinstance(message, dict) or message.get("type") != "shown":
+        kind = message.get("type") if isinstance(message, dict) else type(message).__name__
+        raise ProtocolError(f"message type is {str(kind)[:40]!r}; expected 'shown'")
+    sequence = message.get("sequence")
+    if type(sequence) is not int or not 0 <= sequence < MAX_SEQUENCE:
+        raise ProtocolError(f"sequence is {str(sequence)[:40]}; expected a whole number from 0 to 2^32 - 1")
+    return sequence
+
+
+def _header(kind: MessageType, flags: int = 0, joints: int = 0, time: float = 0.0) -> bytes:
+    return HEADER.pack(kind, flags, joints, 0, time)
+
+
+def _expect(message: bytes, kind: MessageType) -> Header:
+    header = decode_header(message)
+    if header.type is not kind:
+        raise ProtocolError(f"message type is {header.type.name}; expected {kind.name}")
+    return header
+
+
+def _floats(array: Array) -> bytes:
+    return array.astype("<f4").tobytes()
+
+
+def _array(content: bytes, kind: str) -> Array:
+    return np.frombuffer(content, dtype=kind).astype(float)
+
+
+def _blocks(body: bytes) -> Iterable[bytes]:
+    at = 0
+    while at < len(body):
+        (length,) = LENGTH.unpack_from(body, at)
+        at += LENGTH.size
+        yield body[at : at + length]
+        at += length

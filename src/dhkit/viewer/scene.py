@@ -1,0 +1,195 @@
+"""An arm as a meshcat scene: what is drawn, under which paths, and where its nodes stand for a joint vector.
+
+Links are nodes ``/dhkit/link0`` ... ``/dhkit/linkn`` that stand at their DH frames in the world; their parts and
+triads are children that never move. ``/dhkit/tool`` stands at the tool's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.frames import world_to_frames
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Description
+from dhkit.viewer.drawables import Lowered, grid_object, part_object, part_transform, triad_object
+
+if TYPE_CHECKING:
+    from dhkit.model.shapes import Part
+
+__all__ = ["Label", "Scene", "build_scene", "first_configuration", "frame_labels", "node_transforms", "scene_size"]
+
+ROOT = "/dhkit"
+COINCIDE = 1e-9
+"""Frames nearer than this times the arm's size coincide: far above the rounding of a chain, far below what is seen."""
+TRIAD = 0.13
+"""Length of a triad as a share of the arm's size."""
+NESTED = 0.72
+"""How much shorter the next triad at the same origin is, so that both are seen."""
+LEAST_SIZE = 0.1
+"""What an arm without lengths is drawn as, m."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What is written at the origin of a frame."""
+
+    frame: int
+    """0 ... n, or n + 1 for the tool."""
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene that a page builds once, and then only moves."""
+
+    about: Lowered
+    """What the page says of the arm: name, joints, labels, size (m) and which way is up (world)."""
+    commands: tuple[Lowered, ...]
+    """meshcat's commands, in order."""
+
+
+def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
+    """Return the scene of an arm in its first configuration; triads are there, and hidden.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    parts
+        What its links look like, as ``dhkit.model.shapes.link_parts`` gives it.
+
+    Raises
+    ------
+    ModelError
+        A mesh that cannot be read.
+    """
+    size = scene_size(description)
+    commands = [_set_object(f"{ROOT}/grid", grid_object(size, "grid"))]
+    commands += _part_commands(parts)
+    commands += _triad_commands(description, size)
+    nodes = [f"{ROOT}/link{i}" for i in range(description.n + 1)] + [f"{ROOT}/tool"]
+    transforms = node_transforms(description, first_configuration(description))
+    commands += [_set_transform(path, T) for path, T in zip(nodes, transforms, strict=True)]
+    about = {
+        "name": description.name,
+        "joints": [{"name": j.name, "unit": "deg" if j.is_revolute else "m"} for j in description.joints],
+        "labels": [{"frame": label.frame, "text": label.text} for label in frame_labels(description)],
+        "size": size,
+        "up": _up(description),
+    }
+    return Scene(about, tuple(commands))
+
+
+def node_transforms(description: Description, q: ArrayLike) -> Array:
+    """Return where the nodes stand in the world: links 0 ... n and the tool.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (..., n + 2, 4, 4).
+    """
+    frames = world_to_frames(description, q)
+    tool = frames[..., -1:, :, :] @ description.numbers.T_last_tool
+    return np.concatenate([frames, tool], axis=-3)
+
+
+def first_configuration(description: Description) -> Array:
+    """Return the joint vector an arm is first shown in: ``ready`` where the robot file has one, else zero; (n,)."""
+    ready = description.configurations.get("ready")
+    return np.zeros(description.n) if ready is None else np.array([float(value) for value in ready])
+
+
+def scene_size(description: Description) -> float:
+    """Return a length that bounds how far the tool gets from the world's origin, m."""
+    numbers = description.numbers
+    offsets = np.linalg.norm([numbers.T_world_base[:3, 3], numbers.T_last_tool[:3, 3]], axis=1)
+    return max(float(numbers.reach + offsets.sum()), LEAST_SIZE)
+
+
+def frame_labels(description: Description) -> tuple[Label, ...]:
+    """Return one label per place that frames share in every configuration.
+
+    Frames that are the same one are joined by ``=``, those that share only their origin by a comma:
+    ``4, 5, 6 = tool`` at a wrist's centre.
+    """
+    labels = []
+    for group in _shared_origins(description):
+        text = ", ".join(" = ".join(_name(description, i) for i in same) for same in group)
+        labels.append(Label(group[0][0], text))
+    return tuple(labels)
+
+
+def _shared_origins(description: Description) -> list[list[list[int]]]:
+    """Return frames 0 ... n + 1 by common origin and, within it, by common axes.
+
+    What holds in two random configurations holds in all: a coincidence by chance has probability 0.
+    """
+    q = np.random.default_rng(0).uniform(0.3, 1.2, (2, description.n))
+    T = node_transforms(description, q)
+    near = COINCIDE * scene_size(description)
+    places: list[list[list[int]]] = []
+    for i in range(description.n + 2):
+        place = next((p for p in places if np.abs(T[:, p[0][0], :3, 3] - T[:, i, :3, 3]).max() < near), None)
+        if place is None:
+            places.append([[i]])
+            continue
+        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < COINCIDE), None)
+        if same is None:
+            place.append([i])
+        else:
+            same.append(i)
+    return places
+
+
+def _name(description: Description, frame: int) -> str:
+    return "tool" if frame == description.n + 1 else str(frame)
+
+
+def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
+    commands: list[Lowered] = []
+    count: dict[int, int] = {}
+    for part in parts:
+        k = count[part.link] = count.get(part.link, -1) + 1
+        path = f"{ROOT}/link{part.link}/part{k}"
+        commands.append(_set_object(path, part_object(part, f"link{part.link}/part{k}")))
+        commands.append(_set_transform(path, part_transform(part)))
+    return commands
+
+
+def _triad_commands(description: Description, size: float) -> list[Lowered]:
+    commands: list[Lowered] = []
+    for place in _shared_origins(description):
+        for k, same in enumerate(place):
+            name = _name(description, same[0])
+            node = "tool" if name == "tool" else f"link{name}"
+            triad = triad_object(TRIAD * size * NESTED**k, f"{node}/frame")
+            commands.append(_set_object(f"{ROOT}/{node}/frame", triad))
+            commands.append(
+                {"type": "set_property", "path": f"{ROOT}/{node}/frame", "property": "visible", "value": False}
+            )
+    return commands
+
+
+def _up(description: Description) -> list[float]:
+    """Return the direction against gravity; z where there is none."""
+    gravity = description.numbers.gravity
+    strength = float(np.linalg.norm(gravity))
+    return [0.0, 0.0, 1.0] if strength == 0 else [float(0.0 - g) / strength for g in gravity]
+
+
+def _set_object(path: str, drawn: Lowered) -> Lowered:
+    return {"type": "set_object", "path": path, "object": drawn}
+
+
+def _set_transform(path: str, T: Array) -> Lowered:
+    return {"type": "set_transform", "path": path, "matrix": [float(entry) for entry in T.T.flat]}
