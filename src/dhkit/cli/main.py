@@ -6,9 +6,8 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, NoReturn, cast
 
-import click
 import typer
 
 from dhkit.arm import Arm
@@ -18,6 +17,9 @@ from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError, DhkitError
 
 __all__ = ["main"]
+
+UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
+"""Click's base of usage errors: newer typers carry a click of their own, which ``import click`` is not."""
 
 app = typer.Typer(
     name="dhkit",
@@ -39,11 +41,15 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
     except (DhkitError, ValueError) as error:
         _fail(str(error))
-    except click.ClickException as error:
-        _fail(error.format_message())
+    except UsageError as error:
+        message: str = error.format_message()  # type: ignore[attr-defined]
+        if type(error).__name__ == "NoArgsIsHelpError":
+            sys.stderr.write(f"{message}\n")
+            sys.exit(2)
+        _fail(message)
     except OSError as error:
         _fail(f"{error.filename or 'output'}: {error.strerror or error}")
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         _fail("interrupted", status=130)
     sys.exit(status if isinstance(status, int) else 0)
 
@@ -113,13 +119,13 @@ def verify(
 
 
 @app.command()
-def schema(what: Annotated[str, typer.Argument(help="Which file: robot.")] = "robot") -> None:
+def schema(what: Annotated[str, typer.Argument(help="Which file: robot.")]) -> None:
     """Print the JSON Schema of a file format."""
     from dhkit.description.schema import robot_schema
 
     if what != "robot":
         raise DescriptionError(f"no schema {what!r}; expected robot")
-    print_json(robot_schema())
+    print_json(robot_schema(), indent=2)
 
 
 @app.command()
@@ -131,4 +137,3 @@ def demo(
 ) -> int:
     """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""
     return demo_command.run(Arm.load(robot), output, quick=quick, json=json)
-

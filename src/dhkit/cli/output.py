@@ -29,22 +29,29 @@ def say(text: str, style: str = "") -> None:
     console().print(Text(text, style=style))
 
 
-def print_json(value: Any) -> None:
+def print_json(value: Any, indent: int | None = None) -> None:
     """Print a value as one JSON document; NaN and infinities are null."""
-    sys.stdout.write(json.dumps(_finite(value), ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.write(json.dumps(_finite(value), ensure_ascii=False, allow_nan=False, indent=indent) + "\n")
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
     """Print a table, numbers to the right."""
-    table = Table(title=title, title_justify="left", header_style="bold", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
     listed = [list(row) for row in rows]
     for k, heading in enumerate(headings):
-        numeric = all(row[k][:1] in "+-0123456789" for row in listed if row[k])
-        table.add_column(heading, justify="right" if numeric and listed else "left", overflow="fold")
+        numeric = bool(listed) and all(_is_number(row[k]) for row in listed)
+        table.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold")
     for row in listed:
         table.add_row(*(Text(cell) for cell in row))
-    out = Console(width=console().width, highlight=False)
-    out.print(table)
+    console().print(table)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _finite(value: Any) -> Any:

@@ -66,7 +66,8 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
         A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta * cos_alpha, cos_theta * cos_alpha, -sin_alpha
         A[..., 1, 3] = -sin_alpha * d
         A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
-    return np.where(np.isnan(q).any(axis=-1)[..., None, None, None], np.nan, A)
+    A[np.isnan(q).any(axis=-1)] = np.nan
+    return A
 
 
 def world_to_frames(description: Description, q: ArrayLike) -> Array:

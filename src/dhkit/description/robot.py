@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -40,6 +40,7 @@ Vector: TypeAlias = tuple[Expression, Expression, Expression]
 """Three coordinates."""
 
 ORIGIN: Vector = (ZERO, ZERO, ZERO)
+ONE = exact(1)
 STANDARD_GRAVITY: Vector = (ZERO, ZERO, exact(-9.81))
 
 
@@ -114,7 +115,7 @@ class Body:
 class Drive:
     """Motor and gear of a joint, motor side: the joint sees gear^2 J, gear^2 B and abs(gear) Tc."""
 
-    gear: Expression = exact(1)
+    gear: Expression = ONE
     """Motor turns per joint turn (rad/m for a prismatic joint); its sign is the motor's sense."""
     rotor_inertia: Expression = ZERO
     """kg m^2."""
@@ -142,7 +143,7 @@ class Mesh:
     """A mesh file, its path relative to the robot file's folder, times ``scale`` to be in metres."""
 
     path: str
-    scale: Expression = exact(1)
+    scale: Expression = ONE
 
 
 @dataclass(frozen=True)
@@ -275,7 +276,7 @@ class Description:
         from dhkit.description.validation import check
 
         joints = tuple(
-            joint if joint.name else _named(joint, f"joint{i}") for i, joint in enumerate(self.joints, start=1)
+            joint if joint.name else replace(joint, name=f"joint{i}") for i, joint in enumerate(self.joints, start=1)
         )
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "warnings", check(self))
@@ -296,9 +297,3 @@ class Description:
     def reach(self) -> float:
         """An upper bound of the distance from frame 0 to frame n: the sum of abs(a) + abs(d) + stroke, m."""
         return self.numbers.reach
-
-
-def _named(joint: Joint, name: str) -> Joint:
-    from dataclasses import replace
-
-    return replace(joint, name=name)

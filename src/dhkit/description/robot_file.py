@@ -202,7 +202,9 @@ class _Reader:
             return None
         coulomb = [self.number(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)]
         return Drive(
-            *(self.number(f"{where}: drive.{key}", getattr(form, key)) for key in ("gear", "rotor_inertia", "viscous")),
+            gear=self.number(f"{where}: drive.gear", form.gear),
+            rotor_inertia=self.number(f"{where}: drive.rotor_inertia", form.rotor_inertia),
+            viscous=self.number(f"{where}: drive.viscous", form.viscous),
             coulomb=(coulomb[0], coulomb[1] if len(coulomb) == 2 else -coulomb[0]),
         )
 
@@ -217,10 +219,11 @@ class _Reader:
             return Shape(Box(self.vector(f"{where}.box", form.box, self.units.metres)), placement, form.color)
         if form.sphere is not None:
             return Shape(Sphere(self.length(f"{where}.sphere.radius", form.sphere.radius)), placement, form.color)
-        kind, round_form = (Cylinder, form.cylinder) if form.cylinder is not None else (Capsule, form.capsule)
-        assert round_form is not None  # the form holds exactly one of the five
-        radius = self.length(f"{where}.radius", round_form.radius)
-        return Shape(kind(radius, self.length(f"{where}.length", round_form.length)), placement, form.color)
+        for kind, ends in ((Cylinder, form.cylinder), (Capsule, form.capsule)):
+            if ends is not None:
+                radius = self.length(f"{where}.radius", ends.radius)
+                return Shape(kind(radius, self.length(f"{where}.length", ends.length)), placement, form.color)
+        raise DescriptionError(f"{where}: no geometry")
 
     def configuration(self, name: str, q: Sequence[Entry]) -> tuple[Expression, ...]:
         where = f"configurations.{name[:80]}"

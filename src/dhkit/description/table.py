@@ -114,14 +114,15 @@ def _joint(
 ) -> Joint:
     if isinstance(row, str) or len(row) != len(COLUMNS):
         raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
-    entries = {
+    entries: dict[str, Expression] = {
         key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
         for key, value in zip(order, row, strict=True)
     }
     for key in ("theta", "alpha"):
         snapped, written = exact_angle(entries[key]), entries[key].written
         entries[key] = snapped if written is None else snapped.as_written(written)
-    return Joint(type=JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, **entries)
+    a, alpha, d, theta = (entries[key] for key in ("a", "alpha", "d", "theta"))
+    return Joint(JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, a, alpha, d, theta)
 
 
 def length(value: Expression, units: Units) -> str:

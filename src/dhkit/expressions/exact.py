@@ -250,9 +250,10 @@ def exact(value: object) -> Expression:
     if isinstance(value, bool) or not isinstance(value, (Real, Decimal)):
         raise ExpressionError(f"{value!r} is no number")
     if isinstance(value, Integral):
-        return Expression.number(decimal_fraction(str(int(value))) if abs(value) >= 10**300 else int(value))
+        whole = int(value)
+        return Expression.number(decimal_fraction(str(whole)) if abs(whole) >= 10**300 else whole)
     if isinstance(value, Rational):
-        return Expression.number(Fraction(value.numerator, value.denominator))
+        return Expression.number(Fraction(int(value.numerator), int(value.denominator)))
     number = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
     if not number.is_finite():
         raise ExpressionError(f"{value} is not finite")

@@ -78,8 +78,8 @@ def parse(text: str, names: Collection[str] = (), budget: Budget | None = None) 
 def value_of(tree: Tree, names: Collection[str], budget: Budget) -> Expression:
     """Work out a syntax tree."""
     match tree:
-        case Number(value):
-            return Expression.number(value)
+        case Number(decimal):
+            return Expression.number(decimal)
         case Name(text):
             return _named(text, names)
         case Call(function, arguments):

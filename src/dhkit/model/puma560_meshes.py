@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-from manifold3d import Manifold, Mesh64  # type: ignore[import-not-found]  # its stub is not in a package
+from manifold3d import Manifold, Mesh64  # its stub is not in a package
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -20,7 +20,6 @@ from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
 from dhkit.description.robot import (
     Box,
-    Capsule,
     Convention,
     Cylinder,
     Description,
@@ -267,7 +266,8 @@ class _Drawing:
             return
         T_slider = link.T_corner @ _about_z(-joint.theta)
         if joint.rod:
-            low, high = _span(-joint.stroke[1], -joint.stroke[0], joint.half)
+            near = float(np.clip(0.0, *joint.stroke))
+            low, high = _span(near - joint.stroke[1], near - joint.stroke[0], joint.half)
             yield _box(T_slider, BAR * joint.radius, BAR * joint.radius, low, high)
         else:
             yield _box(T_slider, joint.radius, joint.radius, -joint.half, joint.half)
@@ -318,7 +318,8 @@ def _housing(link: _Link, joint: _Joint) -> Iterator[Solid]:
     if not joint.prismatic:
         yield _cylinder(link.T_end, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
     elif joint.rod:
-        yield _box(link.T_end, joint.radius, joint.radius, -joint.half, joint.half)
+        near = float(np.clip(0.0, *joint.stroke))
+        yield _box(link.T_end, joint.radius, joint.radius, min(-joint.half, near), max(joint.half, near))
     else:
         thick, wide = THIN * joint.radius, STOP * joint.radius
         low, high = _span(*joint.stroke, joint.half + thick)

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
-from xml.etree import ElementTree as XML
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -40,12 +40,15 @@ MESHES = "meshes"
 UNLIMITED = 1e6
 """Effort and velocity of a joint that the description leaves unlimited; a URDF must give numbers."""
 
+DRAWN = 12
+"""Decimals of where a part is drawn, m and rad: what is below is rounding."""
+
 
 class Origin(NamedTuple):
     """A URDF origin: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
     xyz: Array
-    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 def urdf_text(description: Description, mesh_path: Callable[[str], str] | None = None) -> str:
@@ -59,29 +62,29 @@ def urdf_text(description: Description, mesh_path: Callable[[str], str] | None =
         From a mesh's path in the robot file to its path in the URDF; ``meshes/...`` if not given.
     """
     name_mesh = mesh_path or (lambda path: f"{MESHES}/{path}")
-    robot = XML.Element("robot", name=description.name)
-    robot.append(XML.Comment(_what_a_urdf_cannot_say(description)))
+    robot = ElementTree.Element("robot", name=description.name)
+    robot.append(ElementTree.Comment(_what_a_urdf_cannot_say(description)))
     parts: dict[int, list[Part]] = {}
     for part in link_parts(description):
         parts.setdefault(part.link, []).append(part)
 
-    XML.SubElement(robot, "link", name="world")
+    ElementTree.SubElement(robot, "link", name="world")
     _fixed(robot, "world", "dh0", _origin_of(description.numbers.T_world_base))
-    base = XML.SubElement(robot, "link", name="dh0")
+    base = ElementTree.SubElement(robot, "link", name="dh0")
     for part in parts.get(0, []):
         _add_part(base, part, np.eye(4), name_mesh)
     for i in range(1, description.n + 1):
         _add_joint(robot, description, i)
-        link = XML.SubElement(robot, "link", name=f"link{i}")
+        link = ElementTree.SubElement(robot, "link", name=f"link{i}")
         _add_inertial(link, description, i)
         for part in parts.get(i, []):
-            _add_part(link, part, _matrix(_behind(description, i)), name_mesh)
+            _add_part(link, part, _behind_matrix(description, i), name_mesh)
         _fixed(robot, f"link{i}", f"dh{i}", _behind(description, i))
-        XML.SubElement(robot, "link", name=f"dh{i}")
+        ElementTree.SubElement(robot, "link", name=f"dh{i}")
     _fixed(robot, f"dh{description.n}", "tool", _origin_of(description.numbers.T_last_tool))
-    XML.SubElement(robot, "link", name="tool")
-    XML.indent(robot)
-    return '<?xml version="1.0"?>\n' + XML.tostring(robot, encoding="unicode") + "\n"
+    ElementTree.SubElement(robot, "link", name="tool")
+    ElementTree.indent(robot)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding="unicode") + "\n"
 
 
 def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
@@ -131,6 +134,18 @@ def _behind(description: Description, i: int) -> Origin:
     return Origin(along_x, (n.alpha[k], 0.0, n.theta[k]))
 
 
+def _behind_matrix(description: Description, i: int) -> Array:
+    """Return :func:`_behind` as a (4, 4) matrix, from the exact cosines."""
+    k, n = i - 1, description.numbers
+    ct, st, ca, sa = n.cos_theta[k], n.sin_theta[k], n.cos_alpha[k], n.sin_alpha[k]
+    if description.convention is Convention.MODIFIED:
+        ca, sa = 1.0, 0.0
+    T = np.eye(4)
+    T[:3, :3] = [[ct, -st * ca, st * sa], [st, ct * ca, -ct * sa], [0.0, sa, ca]]
+    T[:3, 3] = _behind(description, i).xyz
+    return T
+
+
 def _joint_origin(description: Description, i: int) -> Origin:
     """Return where joint i lies in the link before it (dh0 for the first)."""
     k, n = i - 1, description.numbers
@@ -142,16 +157,16 @@ def _joint_origin(description: Description, i: int) -> Origin:
     return Origin(turned, (n.alpha[k], 0.0, theta_before))
 
 
-def _add_joint(robot: XML.Element, description: Description, i: int) -> None:
+def _add_joint(robot: ElementTree.Element, description: Description, i: int) -> None:
     k, numbers, joint = i - 1, description.numbers, description.joints[i - 1]
-    element = XML.SubElement(robot, "joint", name=joint.name, type=joint.type.value)
+    element = ElementTree.SubElement(robot, "joint", name=joint.name, type=joint.type.value)
     _add_origin(element, _joint_origin(description, i))
-    XML.SubElement(element, "parent", link=f"link{i - 1}" if k else "dh0")
-    XML.SubElement(element, "child", link=f"link{i}")
-    XML.SubElement(element, "axis", xyz="0 0 1")
+    ElementTree.SubElement(element, "parent", link=f"link{i - 1}" if k else "dh0")
+    ElementTree.SubElement(element, "child", link=f"link{i}")
+    ElementTree.SubElement(element, "axis", xyz="0 0 1")
     free = 2 * math.pi if joint.is_revolute else max(1.0, description.reach)
     lower, upper = numbers.lower[k], numbers.upper[k]
-    XML.SubElement(
+    ElementTree.SubElement(
         element,
         "limit",
         lower=_text(lower if np.isfinite(lower) else -free),
@@ -161,41 +176,43 @@ def _add_joint(robot: XML.Element, description: Description, i: int) -> None:
     )
     if numbers.viscous[k] or numbers.coulomb[k].any():
         friction = float(np.abs(numbers.coulomb[k]).mean())
-        XML.SubElement(element, "dynamics", damping=_text(numbers.viscous[k]), friction=_text(friction))
+        ElementTree.SubElement(element, "dynamics", damping=_text(numbers.viscous[k]), friction=_text(friction))
 
 
-def _fixed(robot: XML.Element, parent: str, child: str, origin: Origin) -> None:
-    joint = XML.SubElement(robot, "joint", name=f"{child}_fixed", type="fixed")
+def _fixed(robot: ElementTree.Element, parent: str, child: str, origin: Origin) -> None:
+    joint = ElementTree.SubElement(robot, "joint", name=f"{child}_fixed", type="fixed")
     _add_origin(joint, origin)
-    XML.SubElement(joint, "parent", link=parent)
-    XML.SubElement(joint, "child", link=child)
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
 
 
-def _add_inertial(link: XML.Element, description: Description, i: int) -> None:
+def _add_inertial(link: ElementTree.Element, description: Description, i: int) -> None:
     k, numbers = i - 1, description.numbers
     if np.isnan(numbers.mass[k]):
         return
     behind = _behind(description, i)
-    element = XML.SubElement(link, "inertial")
-    com = _rotation(behind) @ numbers.com[k] + behind.xyz
+    element = ElementTree.SubElement(link, "inertial")
+    T_link_frame = _behind_matrix(description, i)
+    com = T_link_frame[:3, :3] @ numbers.com[k] + behind.xyz
     _add_origin(element, Origin(com, behind.rpy))
-    XML.SubElement(element, "mass", value=_text(numbers.mass[k]))
+    ElementTree.SubElement(element, "mass", value=_text(numbers.mass[k]))
     tensor = numbers.inertia[k]
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    XML.SubElement(element, "inertia", {name: _text(tensor[place]) for name, place in names.items()})
+    ElementTree.SubElement(element, "inertia", {name: _text(tensor[place]) for name, place in names.items()})
 
 
-def _add_part(link: XML.Element, part: Part, T_link_frame: Array, name_mesh: Callable[[str], str]) -> None:
+def _add_part(link: ElementTree.Element, part: Part, T_link_frame: Array, name_mesh: Callable[[str], str]) -> None:
     """Add a drawn part as visual and as collision."""
     rgb = [int(part.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     for T, tag, attributes in _solids(part, name_mesh):
         for purpose in ("visual", "collision"):
-            element = XML.SubElement(link, purpose)
-            _add_origin(element, _origin_of(T_link_frame @ part.T_link_part @ T))
-            XML.SubElement(XML.SubElement(element, "geometry"), tag, attributes)
+            element = ElementTree.SubElement(link, purpose)
+            origin = _origin_of(T_link_frame @ part.T_link_part @ T)
+            _add_origin(element, Origin(np.round(origin.xyz, DRAWN), tuple(np.round(origin.rpy, DRAWN))))
+            ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), tag, attributes)
             if purpose == "visual":
-                material = XML.SubElement(element, "material", name=f"color_{part.color[1:].lower()}")
-                XML.SubElement(material, "color", rgba=" ".join(f"{c:.4g}" for c in (*rgb, 1.0)))
+                material = ElementTree.SubElement(element, "material", name=f"color_{part.color[1:].lower()}")
+                ElementTree.SubElement(material, "color", rgba=" ".join(f"{c:.4g}" for c in (*rgb, 1.0)))
 
 
 def _solids(part: Part, name_mesh: Callable[[str], str]) -> list[tuple[Array, str, dict[str, str]]]:
@@ -224,22 +241,8 @@ def _origin_of(T: Array) -> Origin:
     return Origin(xyz, (float(roll), float(pitch), float(yaw)))
 
 
-def _rotation(origin: Origin) -> Array:
-    """Return Rz(yaw) Rx(roll) of an origin without pitch."""
-    return _matrix(origin)[:3, :3]
-
-
-def _matrix(origin: Origin) -> Array:
-    roll, _, yaw = origin.rpy
-    (cr, sr), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in (roll, yaw))
-    T = np.eye(4)
-    T[:3, :3] = [[cy, -sy * cr, sy * sr], [sy, cy * cr, -cy * sr], [0.0, sr, cr]]
-    T[:3, 3] = origin.xyz
-    return T
-
-
-def _add_origin(element: XML.Element, origin: Origin) -> None:
-    XML.SubElement(
+def _add_origin(element: ElementTree.Element, origin: Origin) -> None:
+    ElementTree.SubElement(
         element, "origin", xyz=" ".join(map(_text, origin.xyz)), rpy=" ".join(_text(angle) for angle in origin.rpy)
     )
 

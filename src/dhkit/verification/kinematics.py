@@ -65,14 +65,15 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     names = [*(f"dh{i}" for i in range(description.n + 1)), "tool"]
     scale = max(1.0, description.reach)
 
-    worst = {key: (0.0, 0) for key in ("frame positions", "frame rotations", "Jacobian (world)", "Jacobian (tool)")}
+    quantities = ("frame positions", "frame rotations", "Jacobian (world)", "Jacobian (tool)")
+    worst = dict.fromkeys(quantities, (0.0, 0))
     for k, (reference, references_J) in enumerate(_references(model, q, names)):
         ours = np.concatenate([T_world_frames[k], T_world_tool[k : k + 1]])
         errors = {
             "frame positions": np.abs(ours - reference)[:, :3, 3].max() / scale,
             "frame rotations": np.abs(ours - reference)[:, :3, :3].max(),
         }
-        for key, J, reference_J in zip(list(worst)[2:], (J_world[k], J_tool[k]), references_J, strict=True):
+        for key, J, reference_J in zip(quantities[2:], (J_world[k], J_tool[k]), references_J, strict=True):
             difference = np.abs(J - reference_J)
             errors[key] = max(difference[:3].max() / scale, difference[3:].max())
         for key, error in errors.items():

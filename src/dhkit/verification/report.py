@@ -69,7 +69,6 @@ class VerificationReport:
         lines = [f"{self.robot} against {self.reference}, {self.samples} states, seed {self.seed}"]
         for agreement in self.agreements:
             verdict = "agrees" if agreement.ok else f"DISAGREES at q = {[float(f'{x:.6g}') for x in agreement.q]}"
-            lines.append(
-                f"  {agreement.quantity:{width}}  {agreement.error:8.1e}  of at most {agreement.tolerance:.0e}  {verdict}"
-            )
+            figures = f"{agreement.error:8.1e}  of at most {agreement.tolerance:.0e}"
+            lines.append(f"  {agreement.quantity:{width}}  {figures}  {verdict}")
         return "\n".join(lines)

@@ -168,10 +168,14 @@ def _mesh(part: Part) -> Any:
     }
     assert isinstance(part.geometry, Mesh)
     if part.file is None:
-        raise ModelError(f"link {part.link}: mesh {part.geometry.path!r} has no folder; expected a robot read from a file")
+        raise ModelError(
+            f"link {part.link}: mesh {part.geometry.path!r} has no folder; expected a robot read from a file"
+        )
     reader = readers.get(part.file.suffix.lower())
     if reader is None:
-        raise ModelError(f"link {part.link}: mesh {part.file} ends in {part.file.suffix!r}; expected .stl, .obj or .dae")
+        raise ModelError(
+            f"link {part.link}: mesh {part.file} ends in {part.file.suffix!r}; expected .stl, .obj or .dae"
+        )
     try:
         return reader.from_file(part.file)
     except (OSError, UnicodeDecodeError) as error:
@@ -207,6 +211,8 @@ def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
     )
     i = np.arange(ARROW_SIDES)
     j = (i + 1) % ARROW_SIDES
-    bands = [k * ARROW_SIDES + np.array([[i, j, j + ARROW_SIDES], [i, j + ARROW_SIDES, i + ARROW_SIDES]]) for k in range(3)]
+    bands = [
+        k * ARROW_SIDES + np.array([[i, j, j + ARROW_SIDES], [i, j + ARROW_SIDES, i + ARROW_SIDES]]) for k in range(3)
+    ]
     faces = np.concatenate([band.transpose(0, 2, 1).reshape(-1, 3) for band in bands])
     return vertices, faces.astype(np.uint32)

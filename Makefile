@@ -1,0 +1,47 @@
+# Everything works on a machine with Python 3.11 or later, git and make: the targets create .venv themselves.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+export PIP_DISABLE_PIP_VERSION_CHECK = 1
+
+.PHONY: help demo test check accept assets lowest format clean
+
+help:  ## show this list
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[test,check]'
+	@touch $@
+
+demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560/
+	$(BIN)/dhkit demo
+
+test: $(READY)  ## the tests, laws at a small sample size
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -q
+
+check: $(READY)  ## ruff, mypy --strict, import order
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+accept: $(READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
+	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
+
+assets: $(READY)  ## generate urdf/ and meshes/ anew
+	$(BIN)/python -m dhkit.model.assets
+
+lowest:  ## the tests with the oldest versions that pyproject.toml allows
+	$(PYTHON) -m venv $(VENV)-lowest
+	$(VENV)-lowest/bin/python -m pip install --quiet uv
+	VIRTUAL_ENV=$(VENV)-lowest $(VENV)-lowest/bin/uv pip install --quiet --resolution lowest-direct --editable '.[test]'
+	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadgroup -q tests
+
+format: $(READY)  ## let ruff format the sources
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean:  ## remove what was built
+	rm -rf $(VENV) $(VENV)-lowest out dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,36 @@
+"""`make assets`: the library's URDFs in urdf/ and the PUMA's meshes in meshes/, generated and checked in."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from dhkit.description import library_robot, robots, write_atomically
+from dhkit.model.puma560_meshes import write_puma560_meshes
+from dhkit.model.urdf import urdf_text
+
+__all__ = ["library_urdf", "write_assets"]
+
+log = logging.getLogger(__name__)
+
+
+def library_urdf(name: str) -> str:
+    """Return the text of urdf/NAME.urdf; its meshes are in meshes/ beside urdf/."""
+    return urdf_text(library_robot(name), mesh_path=lambda path: f"../meshes/{path}")
+
+
+def write_assets(root: Path) -> None:
+    """Write urdf/ and meshes/ below a folder."""
+    (root / "urdf").mkdir(exist_ok=True)
+    (root / "meshes" / "puma560").mkdir(parents=True, exist_ok=True)
+    written = list(write_puma560_meshes(root / "meshes" / "puma560"))
+    for name in robots():
+        path = root / "urdf" / f"{name}.urdf"
+        write_atomically(path, library_urdf(name))
+        written.append(path)
+    log.info("wrote %d files below %s", len(written), root)
+
+
+if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    write_assets(Path.cwd())

@@ -1,0 +1,61 @@
+"""A motion as a page plays it: joint vectors over time, sampled densely enough that the eye sees no steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.frames import joint_array
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Description
+
+__all__ = ["check_motion", "sampled"]
+
+RATE = 60.0
+"""Frames a second: what a screen shows."""
+MIN_FRAMES, MAX_FRAMES = 121, 6001
+"""At least so many, for slow motion; at most so many, 2.5 MB for a 6-axis arm."""
+
+
+def check_motion(description: Description, times: ArrayLike, q: ArrayLike) -> tuple[Array, Array]:
+    """Return a motion as arrays, times (N,), s, and joint values (N, n), rad and m.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
+    TypeError
+        Not numbers.
+    """
+    t, q = np.asarray(times, dtype=float), joint_array(description, q)
+    if t.ndim != 1 or len(t) < 2:
+        raise ValueError(f"times has shape {t.shape}; expected (N,) with N >= 2")
+    if q.shape != (len(t), description.n):
+        raise ValueError(f"q has shape {q.shape}; expected ({len(t)}, {description.n}) for {len(t)} times")
+    for name, array in (("times", t), ("q", q)):
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} has values that are not finite, the first in row {_first(~np.isfinite(array))}")
+    if (np.diff(t) <= 0).any():
+        k = _first(np.diff(t) <= 0)
+        raise ValueError(f"times do not increase: times[{k}] is {t[k]:g} s, times[{k + 1}] is {t[k + 1]:g} s")
+    return t, q
+
+
+def sampled(times: Array, q: Array) -> tuple[Array, Array]:
+    """Return a motion at equal time steps from 0, joint values linear between the given ones.
+
+    Joints are interpolated here and not poses in the page, so that an arm given by few samples keeps its lengths.
+
+    Parameters
+    ----------
+    times, q
+        Shapes (N,), s, increasing, and (N, n), rad and m.
+    """
+    duration = times[-1] - times[0]
+    count = int(np.clip(np.ceil(RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES))
+    grid = np.linspace(times[0], times[-1], count)
+    return grid - times[0], np.stack([np.interp(grid, times, column) for column in q.T], axis=1)
+
+
+def _first(wrong: np.ndarray) -> int:  # type: ignore[type-arg]
+    return int(np.argwhere(wrong)[0, 0])

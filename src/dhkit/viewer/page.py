@@ -1,0 +1,116 @@
+"""The viewer's page: its files as the server hands them out, and the same page as one offline file."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+
+from dhkit.errors import ModelError
+
+__all__ = ["SECURITY_POLICY", "meshcat_bundle", "offline_page", "page_files"]
+
+MODULES = ("main.js", "stage.js", "player.js", "trace.js", "labels.js", "readout.js", "messages.js", "connection.js")
+"""The page's ES modules; ``main.js`` imports the others."""
+
+CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+
+SECURITY_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
+)
+"""For the live page: nothing from any other host. meshcat's bundle writes style elements."""
+
+OFFLINE_POLICY = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
+
+
+def meshcat_bundle() -> bytes:
+    """Return the viewer's JavaScript from the installed meshcat wheel.
+
+    Raises
+    ------
+    ModelError
+        meshcat is not installed, or its viewer is not the one we know.
+    """
+    spec = find_spec("meshcat")
+    if spec is None or spec.origin is None:
+        raise ModelError("the viewer needs the package meshcat, which is not installed: pip install meshcat")
+    path = Path(spec.origin).parent / "viewer" / "dist" / "main.min.js"
+    try:
+        bundle = path.read_bytes()
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror}; expected meshcat's viewer: pip install --force-reinstall meshcat")
+    if b"MeshCat" not in bundle or b"handle_command_bytearray" not in bundle:
+        raise ModelError(
+            f"{path} is not the viewer of meshcat 0.3: pip install --force-reinstall 'meshcat>=0.3.2,<0.4'"
+        )
+    return bundle
+
+
+def page_files() -> dict[str, tuple[str, bytes]]:
+    """Return the live page's files by name: content type and bytes; the page itself is ``""``.
+
+    Raises
+    ------
+    ModelError
+        As :func:`meshcat_bundle`.
+    """
+    names = ("index.html", "viewer.css", *MODULES)
+    files = {name: (f"{CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
+    files[""] = files.pop("index.html")
+    files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())
+    return files
+
+
+def offline_page(messages: Sequence[bytes], title: str) -> str:
+    """Return one HTML file that shows messages without a server: no request leaves it.
+
+    Parameters
+    ----------
+    messages
+        As :mod:`dhkit.viewer.protocol` encodes them, in the order a page needs them.
+    title
+        The page's title.
+    """
+    data = [base64.b64encode(message).decode() for message in messages]
+    return _replaced(
+        _static("index.html"),
+        {
+            "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{OFFLINE_POLICY}">',
+            "<title>dhkit</title>": f"<title>{html.escape(title)}</title>",
+            '<link rel="stylesheet" href="viewer.css">': f"<style>\n{_static('viewer.css')}</style>",
+            '<script src="meshcat.js"></script>': _script(meshcat_bundle().decode()),
+            '<script type="module" src="main.js"></script>': _modules(),
+            "<!-- messages -->": _script(json.dumps(data), ' type="application/json" id="messages"'),
+        },
+    )
+
+
+def _modules() -> str:
+    """Return the modules as an import map of ``data:`` addresses and the first of them inline."""
+    sources = {name: _static(name).replace('from "./', 'from "dhkit/') for name in MODULES}
+    first = sources.pop("main.js")
+    imports = {
+        f"dhkit/{name}": f"data:text/javascript;base64,{base64.b64encode(source.encode()).decode()}"
+        for name, source in sources.items()
+    }
+    return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(first, ' type="module"')
+
+
+def _script(content: str, attributes: str = "") -> str:
+    return f"<script{attributes}>{content.replace('</script', '<\\/script')}</script>"
+
+
+def _replaced(text: str, pieces: dict[str, str]) -> str:
+    for mark, piece in pieces.items():
+        before, found, after = text.partition(mark)
+        assert found, f"index.html has no {mark}"
+        text = before + piece + after
+    return text
+
+
+def _static(name: str) -> str:
+    return (resources.files("dhkit.viewer") / "static" / name).read_text("utf-8")

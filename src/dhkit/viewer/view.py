@@ -1,0 +1,221 @@
+"""An arm in a browser: live through a server of our own, or saved as one offline page."""
+
+from __future__ import annotations
+
+import html
+import threading
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description.files import write_atomically
+from dhkit.description.frames import joint_array
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Description
+from dhkit.errors import ModelError
+from dhkit.viewer import protocol
+from dhkit.viewer.motion import check_motion, sampled
+from dhkit.viewer.page import offline_page
+from dhkit.viewer.scene import build_scene, first_configuration, node_transforms
+from dhkit.viewer.session import Slot
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from dhkit.viewer.server import ViewerServer
+
+__all__ = ["View"]
+
+IFRAME_HEIGHT = 480
+
+
+class View:
+    """A view of an arm, first in its ``ready`` configuration or at zero.
+
+    The server starts with the first use of :attr:`url` or :meth:`open`; a page that opens then shows the present
+    state and follows. :meth:`save_html` needs no server. Safe to use from several threads.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    frames
+        Whether the DH frames are drawn as triads with labels; a page can switch them too.
+
+    Raises
+    ------
+    ModelError
+        A mesh that cannot be read.
+
+    Examples
+    --------
+    >>> from dhkit.description.library import library_robot
+    >>> with View(library_robot("planar2r"), frames=True) as view:
+    ...     view.show([0.3, 0.5])
+    ...     view.play(([0.0, 1.0], [[0.3, 0.5], [1.2, -0.4]]))
+    """
+
+    def __init__(self, description: Description, *, frames: bool = False) -> None:
+        from dhkit.model.shapes import link_parts
+
+        self._description = description
+        self._server: ViewerServer | None = None
+        self._closed = False
+        self._lock = threading.RLock()
+        scene = build_scene(description, link_parts(description))
+        self._state: dict[Slot, bytes] = {Slot.SCENE: protocol.encode_scene(scene)}
+        self.frames(frames)
+        self.show(first_configuration(description))
+
+    @property
+    def description(self) -> Description:
+        """The arm."""
+        return self._description
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds the page; starts the server.
+
+        Raises
+        ------
+        ModelError
+            The view is closed, or the server did not start.
+        """
+        return self._live().url
+
+    def open(self) -> str:
+        """Open the page in the default browser and return where it is."""
+        url = self.url
+        webbrowser.open(url)
+        return url
+
+    def show(self, q: ArrayLike) -> None:
+        """Move the arm; at most as fast as pages can draw, with the latest state always drawn.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+
+        Raises
+        ------
+        ValueError
+            Another shape, or values that are not finite.
+        """
+        q = joint_array(self._description, q)
+        if q.ndim != 1:
+            raise ValueError(f"q has shape {q.shape}; expected ({self._description.n},): play shows a motion")
+        if not np.isfinite(q).all():
+            raise ValueError(f"q is {q.tolist()}; expected finite values")
+        self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
+
+    def play(self, motion: tuple[ArrayLike, ArrayLike], *, trace: bool = True) -> None:
+        """Play a motion; the page can pause, repeat and slow it down.
+
+        Parameters
+        ----------
+        motion
+            Times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m; between them joints move
+            evenly.
+        trace
+            Whether the tool draws its path.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
+        """
+        times, q = sampled(*check_motion(self._description, *motion))
+        transforms = node_transforms(self._description, q)
+        self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace))
+
+    def trace(self, points: ArrayLike | None) -> None:
+        """Draw a line through points, in place of the last; None takes it away.
+
+        Parameters
+        ----------
+        points
+            Shape (N, 3), m, in the world.
+
+        Raises
+        ------
+        ValueError
+            Another shape, or values that are not finite.
+        """
+        line = np.zeros((0, 3)) if points is None else np.asarray(points, dtype=float)
+        if line.ndim != 2 or line.shape[1] != 3:
+            raise ValueError(f"points has shape {line.shape}; expected (N, 3)")
+        if not np.isfinite(line).all():
+            raise ValueError("points has values that are not finite")
+        self._publish(Slot.TRACE, protocol.encode_trace(line))
+
+    def frames(self, visible: bool) -> None:
+        """Show or hide the DH frames."""
+        self._publish(Slot.FRAMES, protocol.encode_frames(visible))
+
+    def wait(self, timeout: float = 10.0) -> None:
+        """Return when a page is connected and every page has drawn the latest state.
+
+        Raises
+        ------
+        TimeoutError
+            Not within so many seconds.
+        """
+        self._live().wait(timeout)
+
+    def html(self) -> str:
+        """Return the present state as one HTML page that needs no server and no network."""
+        with self._lock:
+            messages = [self._state[slot] for slot in sorted(self._state)]
+        return offline_page(messages, f"{self._description.name} · dhkit")
+
+    def save_html(self, path: str | Path) -> Path:
+        """Write :meth:`html` to a file and return its path."""
+        path = Path(path)
+        write_atomically(path, self.html())
+        return path
+
+    def close(self) -> None:
+        """Stop the server; pages say that the connection is lost, and the view cannot be moved any more."""
+        with self._lock:
+            self._closed = True
+            server, self._server = self._server, None
+        if server is not None:
+            server.close()
+
+    def __enter__(self) -> View:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _repr_html_(self) -> str:
+        """Show the page in a notebook: live where the server runs, else the present state."""
+        server = self._server
+        source = f'src="{server.url}"' if server is not None else f'srcdoc="{html.escape(self.html())}"'
+        name = html.escape(self._description.name)
+        style = f"width: 100%; height: {IFRAME_HEIGHT}px; border: 0; border-radius: 8px"
+        return f'<iframe {source} title="{name}" style="{style}"></iframe>'
+
+    def _live(self) -> ViewerServer:
+        from dhkit.viewer.server import ViewerServer
+
+        with self._lock:
+            if self._closed:
+                raise ModelError("the viewer is closed")
+            if self._server is None:
+                self._server = ViewerServer(self._state)
+            return self._server
+
+    def _publish(self, slot: Slot, message: bytes) -> None:
+        with self._lock:
+            if self._closed:
+                raise ModelError("the viewer is closed")
+            self._state[slot] = message
+            if self._server is not None:
+                self._server.publish(slot, message)
