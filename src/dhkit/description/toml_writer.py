@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import tomlkit
-from tomlkit.items import InlineTable, Item, Table
+from tomlkit.items import Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.files import write_atomically
 from dhkit.description.robot import (
@@ -166,7 +166,10 @@ def _entry(value: Expression, unit: Expression = ONE) -> Item:
     text = str(value) if bare is None else Expression.number(bare).text
     if bare is None or "/" in text:
         return tomlkit.item(value.text if value.written is None else text)
-    return tomlkit.integer(text) if bare.denominator == 1 and "e" not in text else tomlkit.float_(text)
+    if bare.denominator == 1 and "e" not in text:
+        return tomlkit.integer(text)
+    # tomlkit.float_ would print the nearest double: the digits are handed over as they are.
+    return Float(float(bare), Trivia(), text)
 
 
 def _list(entries: Iterable[Any]) -> Item:

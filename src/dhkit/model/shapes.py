@@ -1,33 +1,25 @@
 """What an arm looks like: the shapes that its description gives, and links drawn from the table where it gives none.
 
-A link goes from its joint's axis to the next one: by d along the first, then by a along the common normal of the two.
-Drawn, these are a column and a tube. Where it meets the next axis it carries a drum, in which the next link turns on a
-slimmer, longer hub. A prismatic joint is a square bar of the stroke's length in a block. All sizes are shares of the
-arm's reach, so that an arm looks the same whatever its size.
+A link goes from its own joint's axis to the next: by d along the first, then by a along the common normal of the two.
+Drawn, these are a column and a tube. On the next axis it carries a drum, in which the next link turns on a slimmer,
+longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are shares of the arm's reach.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dhkit.description.assets import inside
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
-from dhkit.description.robot import (
-    Box,
-    Convention,
-    Cylinder,
-    Description,
-    Geometry,
-    Mesh,
-    Shape,
-    Sphere,
-)
+from dhkit.description.robot import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
 from dhkit.expressions import Expression, exact, substitute
 
 __all__ = ["Part", "link_parts"]
@@ -39,30 +31,32 @@ BASE_COLOR = "#4a4f57"
 """Foot and gripper: dark, so that they are not taken for links."""
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
 """Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), told apart by colour-blind people too."""
-
 ROOT, TIP = 0.05, 0.028
-"""Radius of the first and of the last drum, shares of the reach; arms taper."""
+"""Radius of the first and of the last drum, shares of the reach: arms taper."""
 TUBE = 0.62
 """Radius of a tube, of the smaller drum at its ends: drums stay seen as drums."""
 FLAT = 0.9
-"""Half the height of a drum, of its radius: higher than the tube is wide, no higher than the arm."""
+"""Half the height of a drum, of its radius: the tube, which is narrower, ends in it."""
 HUB_RADIUS, HUB_LENGTH = 0.8, 1.2
 """A hub, of its drum: slimmer, and seen at both faces."""
 NESTED_RADIUS, NESTED_HALF = 0.78, 1.25
 """Drums about one point get slimmer and longer than the one before, so that each is seen."""
+LOW_DRUM = 0.3
+"""Half the height of the first drum, at most, of the height of the next axis: the drum stays below it."""
 BLOCK = 1.3
 """Half the length of a slider's block, of its half width."""
 BAR, STOP = 0.55, 0.8
-"""Half the width of a slider's bar and of the plates at a rail's ends, of its block's."""
-PLATE, POST_LENGTH = 1.8, 2.0
-"""Radius of the foot's plate and height of the post on it, of the first drum's radius."""
+"""Half widths of a slider's bar and of the stops on a rail's ends, of its block's."""
+PLATE, POST = 1.8, 2.0
+"""Radius of the foot's plate and height of the post between it and a drum at frame 0, of the drum's radius."""
 THIN = 0.25
-"""Thickness of a plate, of the radius of its drum or the half width of its block."""
-UPRIGHT = 0.999
-"""Cosine from which an axis counts as vertical."""
+"""Thickness of plates and stops, of the radius of the drum or the half width of the block."""
+NECK = 1.25
+"""Where the gripper begins on an arm that ends in its last drum, of the drum's and hub's extent."""
 
-ALONG_X = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-"""Lays what stands along z along x."""
+IDENTITY: Array = np.eye(4)
+ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+"""Lays along x what stands along z."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,52 +80,47 @@ def link_parts(description: Description) -> tuple[Part, ...]:
 
     A link with shapes in its description has those. Without, or with a mesh whose file is missing, it is drawn from
     the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has no tool and
-    ends in a common normal, as planar ones do) and closes along its x.
+    ends in a common normal, as planar arms do) and opens along its x.
 
     Examples
     --------
     >>> from dhkit.description.table import from_dh
-    >>> arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)])
-    >>> [part.link for part in link_parts(arm) if isinstance(part.geometry, Cylinder)]
-    [0, 0, 1, 1, 1, 2, 2, 2]
+    >>> parts = link_parts(from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)]))
+    >>> sorted({part.link for part in parts})
+    [0, 1, 2]
     """
-    n, T_last_tool = description.n, description.numbers.T_last_tool
-    values = resolved(description.parameters)
-    arm = _Drawing(description)
+    n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
+    joints, base, tool = description.joints, description.base, description.tool
     parts: list[Part] = []
-    for i in range(n + 1):
-        shapes = description.joints[i - 1].shapes if i else description.base.shapes
+    for i, shapes in enumerate((base.shapes, *(joint.shapes for joint in joints))):
         color = PALETTE[(i - 1) % len(PALETTE)] if i else BASE_COLOR
-        given = _given(description, values, shapes, i, np.eye(4), color)
-        parts += given or (Part(i, geometry, T, color) for geometry, T in arm.link(i))
-    tool = _given(description, values, description.tool.shapes, n, T_last_tool, BASE_COLOR)
-    if not tool and (not given or not np.array_equal(T_last_tool, np.eye(4))):
-        tool = [Part(n, geometry, T, BASE_COLOR) for geometry, T in arm.gripper()]
-    return (*parts, *tool)
+        given = _given(description, shapes, i, IDENTITY, color)
+        parts += given or _parts(i, arm.link(i), color)
+    at_tool = _given(description, tool.shapes, n, T_last_tool, BASE_COLOR)
+    if not at_tool and (not given or not np.array_equal(T_last_tool, IDENTITY)):
+        at_tool = [*_parts(n, arm.neck(), color), *_parts(n, arm.gripper(), BASE_COLOR)]
+    return (*parts, *at_tool)
 
 
-def _given(
-    description: Description,
-    values: Mapping[str, Expression],
-    shapes: Sequence[Shape],
-    link: int,
-    T_link_frame: Array,
-    color: str,
-) -> list[Part]:
-    """Return shapes placed in a frame of a link as parts; none if a mesh's file is missing."""
-    parts = []
+def _parts(link: int, solids: Iterable[Solid], color: str) -> list[Part]:
+    return [Part(link, geometry, T, color) for geometry, T in solids]
+
+
+def _given(description: Description, shapes: Sequence[Shape], link: int, T_link_frame: Array, color: str) -> list[Part]:
+    """Return shapes in a frame of a link as parts; none if a mesh's file is missing."""
+    values, parts = resolved(description.parameters), []
     for shape in shapes:
-        geometry, file = _known(shape.geometry, values), None
+        geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
             file = inside(description.mesh_folder, geometry.path, "shape")
             if file is None or not file.is_file():
                 return []
-        T = T_link_frame @ matrix(shape.placement, dict(values))
-        parts.append(Part(link, geometry, T, shape.color or color, file))
+        T_link_part = T_link_frame @ matrix(shape.placement, values)
+        parts.append(Part(link, _known(geometry, values), T_link_part, shape.color or color, file))
     return parts
 
 
-def _known(geometry: Geometry, values: Mapping[str, Expression]) -> Geometry:
+def _known(geometry: Geometry, values: dict[str, Expression]) -> Geometry:
     """Return a geometry with the parameters' values in it."""
     match geometry:
         case Mesh(path, scale):
@@ -162,16 +151,16 @@ class _Link:
     @property
     def is_parallel(self) -> bool:
         """Whether the axes of its two joints are."""
-        return bool(np.array_equal(np.abs(self.T_corner[:3, 2]), np.abs(self.T_end[:3, 2])))
+        return np.array_equal(np.abs(self.T_corner[:3, 2]), np.abs(self.T_end[:3, 2]))
 
     def is_straight(self, within: float) -> bool:
-        """Whether it ends on the axis that it began on, up to a distance in m."""
+        """Whether it ends on the axis that it begins on, up to a distance in m."""
         return self.is_parallel and abs(self.a) < within
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """The sizes of a joint, m, along its axis from the end of the link before it."""
+    """The sizes of a joint, m; places are along its axis, from the end of the link before it."""
 
     prismatic: bool
     radius: float
@@ -179,54 +168,57 @@ class _Joint:
     half: float
     """Half the drum's height; half the block's length."""
     lift: float = 0.0
-    """Where the drum's centre is."""
+    """The drum's centre."""
     stroke: tuple[float, float] = (0.0, 0.0)
-    """Where a slider's corner can be."""
-    rod: bool = False
-    """Whether the bar slides in a block of the link before, or carries the block."""
+    """The range of a slider's corner."""
     theta: float = 0.0
     """A slider's angle about its axis, rad."""
+    is_rod: bool = False
+    """Whether the slider's bar moves, in a block of the link before; else the block does, on a rail."""
+
+    @property
+    def near(self) -> float:
+        """The end of a slider's stroke next to the link before; 0 if the stroke goes past it."""
+        return float(np.clip(0.0, *self.stroke))
+
+    @property
+    def extent(self) -> float:
+        """How far the joint's solids reach around the corner of the link after it."""
+        return 0.0 if self.is_rod else max(self.radius, HUB_LENGTH * self.half)
 
 
 def _links(description: Description) -> list[_Link]:
     """Return the ways of links 0 to n."""
     numbers = description.numbers
-    normals = [np.eye(4) for _ in range(description.n)]
-    for T, a, c, s in zip(normals, numbers.a, numbers.cos_alpha, numbers.sin_alpha, strict=True):
-        T[:3, 1:] = [[0, 0, a], [c, -s, 0], [s, c, 0]]
-    d, none = [0.0, *map(float, numbers.d)], np.eye(4)
+    rows = np.stack([numbers.a, numbers.cos_alpha, numbers.sin_alpha], axis=1).tolist()
+    d, straight = [0.0, *numbers.d.tolist()], (0.0, 1.0, 0.0)
     # A row's a and alpha lead to the end of its own link; in the modified convention to that of the link before.
     if description.convention is Convention.STANDARD:
-        return [_Link(x, float(T[0, 3]), np.linalg.inv(T), none) for x, T in zip(d, [none, *normals], strict=True)]
-    return [_Link(x, float(T[0, 3]), none, T) for x, T in zip(d, [*normals, none], strict=True)]
+        return [_Link(x, a, _bend(-a, c, -s), IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)]
+    return [_Link(x, a, IDENTITY, _bend(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
 
 
 def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
     """Return the sizes of joints 1 to n."""
     numbers, n = description.numbers, description.n
-    scale = description.reach or float(np.linalg.norm(numbers.T_last_tool[:3, 3])) or 1.0
+    scale = max(description.reach, float(np.linalg.norm(numbers.T_last_tool[:3, 3]))) or 1.0
     joints: list[_Joint] = []
-    for i, before in enumerate(links[:n]):
-        link, prismatic = links[i + 1], bool(numbers.prismatic[i])
-        radius = scale * (ROOT + (TIP - ROOT) * i / n)
+    for i, (before, after) in enumerate(pairwise(links)):
+        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (ROOT + (TIP - ROOT) * i / n), 0.0
         half = radius * (BLOCK if prismatic else FLAT)
-        lift = 0.0
-        if i and abs(before.d) + abs(before.a) < joints[-1].radius and not joints[-1].rod:
-            last = joints[-1]
-            radius = min(radius, NESTED_RADIUS * last.radius)
-            half = max(half, NESTED_HALF * max(last.radius, last.half))
-        if i == 0 and abs(link.d) > radius:  # frame 0 is on the floor: the drum stands on it, below the next axis
-            half = min(half, 0.3 * abs(link.d))
-            lift = float(np.copysign(HUB_LENGTH * half, link.d))
+        if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
+            radius = min(radius, NESTED_RADIUS * joints[-1].radius)
+            half = max(half, NESTED_HALF * joints[-1].extent / HUB_LENGTH)
+        if not joints and abs(after.d) > radius:  # frame 0 is on the floor: the drum stands on it, not in it
+            half = min(half, LOW_DRUM * abs(after.d))
+            lift = float(np.copysign(HUB_LENGTH * half, after.d))
         if not prismatic:
             joints.append(_Joint(False, radius, half, lift))
             continue
-        low, high = (
-            float(x) if np.isfinite(x) else s * scale for x, s in ((numbers.lower[i], -1), (numbers.upper[i], 1))
-        )
-        # What goes on along the bar would be inside a rail. But under a column there is no room for a rod.
-        rod = link.is_straight(radius) and not all(x.is_straight(radius) for x in links[: i + 1])
-        joints.append(_Joint(True, radius, half, 0.0, (link.d + low, link.d + high), rod, float(numbers.theta[i])))
+        low, high = np.clip((numbers.lower[i], numbers.upper[i]), -scale, scale) + after.d
+        # What goes on along the bar would be inside a rail: so the bar moves, but not down through a base's column.
+        is_rod = after.is_straight(radius) and not all(link.is_straight(radius) for link in links[: i + 1])
+        joints.append(_Joint(True, radius, half, 0.0, (low, high), float(numbers.theta[i]), is_rod))
     return joints
 
 
@@ -240,131 +232,130 @@ class _Drawing:
         self.T_last_tool = description.numbers.T_last_tool
 
     def link(self, i: int) -> Iterator[Solid]:
-        """Draw link i in its DH frame: where it begins, its column and tube, where the next one begins."""
+        """Draw link i in its DH frame."""
         link = self.links[i]
-        joint = self.joints[i - 1] if i else None
-        following = self.joints[i] if i < len(self.joints) else None
-        tube = TUBE * min(x.radius for x in (joint, following) if x)
-        if joint:
-            yield from self._beginning(link, joint, tube)
-        elif following and not following.prismatic:
-            yield from self._foot(link)
+        ends = self.joints[max(i - 1, 0) : i + 1]
+        tube = TUBE * min(joint.radius for joint in ends)
+        if i:
+            yield from _inner_side(link, self.joints[i - 1], tube)
+        elif not self.joints[0].prismatic:
+            yield from self._foot()
         if link.a:
             yield _cylinder(link.T_corner @ ALONG_X, tube, 0.0, link.a)
-            if link.d:
-                yield Sphere(_size(tube)), link.T_corner
-        if following:
-            yield from _housing(link, following)
+        if link.a and link.d:
+            yield Sphere(_size(tube)), link.T_corner
+        if i < len(self.joints):
+            yield from _outer_side(link, self.joints[i])
 
-    def _beginning(self, link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
-        if not joint.prismatic:
-            T_start = link.T_corner @ _shift(z=-link.d)
-            half = HUB_LENGTH * joint.half
-            yield _cylinder(T_start, HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
-            if link.d:
-                yield _cylinder(T_start, tube, 0.0, link.d)
-            return
-        T_slider = link.T_corner @ _about_z(-joint.theta)
-        if joint.rod:
-            near = float(np.clip(0.0, *joint.stroke))
-            low, high = _span(near - joint.stroke[1], near - joint.stroke[0], joint.half)
-            yield _box(T_slider, BAR * joint.radius, BAR * joint.radius, low, high)
-        else:
-            yield _box(T_slider, joint.radius, joint.radius, -joint.half, joint.half)
+    def _foot(self) -> Iterator[Solid]:
+        """Draw what an arm stands on: a plate on the floor, and a post to the first drum if that is higher.
 
-    def _foot(self, link: _Link) -> Iterator[Solid]:
-        """Draw what an arm stands on if its first joint turns: a plate on the floor, a post under a raised drum.
-
-        The floor is frame 0's plane if the arm rises from there, the world's z = 0 if frame 0 is above that.
+        The floor is frame 0's plane if the arm rises from it, the world's z = 0 if frame 0 is above that.
         """
-        joint, T_world_end = self.joints[0], self.T_world_base @ link.T_end
+        joint, T_base_end = self.joints[0], self.links[0].T_end
+        T_world_end = self.T_world_base @ T_base_end
         up = -1.0 if joint.lift < 0 else 1.0
-        stands = up * T_world_end[2, 2] > UPRIGHT
-        raised = T_world_end[2, 3] if stands else 0.0
-        depth = max(raised, 0.0 if joint.lift else HUB_LENGTH * joint.half + POST_LENGTH * joint.radius)
-        yield _cylinder(link.T_end, PLATE * joint.radius, -up * depth, -up * (depth - THIN * joint.radius))
+        raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
+        depth = max(raised, 0.0 if joint.lift else joint.extent + POST * joint.radius)
+        yield _cylinder(T_base_end, PLATE * joint.radius, -up * depth, -up * (depth - THIN * joint.radius))
         if depth:
-            yield _cylinder(link.T_end, joint.radius, -up * depth, 0.0)
+            yield _cylinder(T_base_end, joint.radius, -up * depth, joint.lift)
+
+    def neck(self) -> Iterator[Solid]:
+        """Draw what is between the last link and the gripper, in DH frame n."""
+        radius, T_end_gripper, root = TUBE * self.joints[-1].radius, *self._gripper_place()
+        offset = self.T_last_tool[:3, 3]
+        if offset.any():
+            yield _cylinder(_towards(offset), radius, 0.0, float(np.linalg.norm(offset)))
+        if root:
+            yield _cylinder(T_end_gripper, radius, 0.0, root)
 
     def gripper(self) -> Iterator[Solid]:
         """Draw a flange and two fingers at the tool's origin, in DH frame n."""
-        last, joint = self.links[-1], self.joints[-1]
-        T, size = self.T_last_tool, joint.radius
-        offset = float(np.linalg.norm(T[:3, 3]))
-        if offset:
-            yield _cylinder(_towards(T[:3, 3]), TUBE * size, 0.0, offset)
-        if np.array_equal(T, np.eye(4)):
-            T = self._approach()
-        inner = max(size, HUB_LENGTH * joint.half)
-        root = inner if abs(last.d) + abs(last.a) + offset < inner and not joint.rod else 0.0
-        if root:
-            yield _cylinder(T, TUBE * size, 0.0, root)
+        size, T, root = self.joints[-1].radius, *self._gripper_place()
         yield _cylinder(T, 0.9 * size, root, root + 0.3 * size)
-        yield _box(T, 1.05 * size, 0.45 * size, root + 0.3 * size, root + 0.7 * size)
+        yield _box(T, (1.05 * size, 0.45 * size), root + 0.3 * size, root + 0.7 * size)
         for side in (-0.85, 0.85):
-            yield _box(T @ _shift(side * size), 0.2 * size, 0.4 * size, root + 0.7 * size, root + 1.9 * size)
+            yield _box(T @ _shift(x=side * size), (0.2 * size, 0.4 * size), root + 0.7 * size, root + 1.9 * size)
 
-    def _approach(self) -> Array:
-        """Return the pose of the gripper of an arm without a tool: along x_n if its last stretch is a common normal."""
-        before, last = self.links[-2:]
-        flat = last if last.a else before
-        if last.d or not flat.a or (flat is before and (self.joints[-1].prismatic or not before.is_parallel)):
-            return np.eye(4)
-        return _about_z(0.0 if flat.a > 0 else np.pi) @ ALONG_X
+    def _gripper_place(self) -> tuple[Array, float]:
+        """Return the gripper's pose, z ahead, and how far ahead it begins, m: an arm may end inside its last drum."""
+        before, last, joint = *self.links[-2:], self.joints[-1]
+        T = self.T_last_tool
+        length = abs(last.d) + abs(last.a) + float(np.linalg.norm(T[:3, 3]))
+        root = max(0.0, NECK * joint.extent - length)
+        if last.d or not np.array_equal(T, IDENTITY):
+            return T, root
+        a = last.a or (before.a if before.is_parallel and not joint.prismatic else 0.0)
+        return (_about_z(0.0 if a > 0 else np.pi) @ ALONG_X if a else T), root
 
 
-def _housing(link: _Link, joint: _Joint) -> Iterator[Solid]:
-    """Draw what a link holds the next joint in: a drum, a block around a rod, or a rail."""
+def _inner_side(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
+    """Draw what a link moves on: a hub and the column above it, a rod, or a block on a rail."""
     if not joint.prismatic:
-        yield _cylinder(link.T_end, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
-    elif joint.rod:
-        near = float(np.clip(0.0, *joint.stroke))
-        yield _box(link.T_end, joint.radius, joint.radius, min(-joint.half, near), max(joint.half, near))
+        T_start, half = link.T_corner @ _shift(z=-link.d), HUB_LENGTH * joint.half
+        yield _cylinder(T_start, HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
+        if link.d:
+            yield _cylinder(T_start, tube, 0.0, link.d)
+        return
+    T, (low, high), wide = link.T_corner @ _about_z(-joint.theta), joint.stroke, joint.radius
+    if joint.is_rod:
+        yield _box(T, (BAR * wide, BAR * wide), *_span(joint.near - high, joint.near - low, joint.half))
     else:
-        thick, wide = THIN * joint.radius, STOP * joint.radius
-        low, high = _span(*joint.stroke, joint.half + thick)
-        yield _box(link.T_end, BAR * joint.radius, BAR * joint.radius, low, high)
-        yield _box(link.T_end, wide, wide, low, low + thick)
-        yield _box(link.T_end, wide, wide, high - thick, high)
+        yield _box(T, (wide, wide), -joint.half, joint.half)
+
+
+def _outer_side(link: _Link, joint: _Joint) -> Iterator[Solid]:
+    """Draw what the next link moves in or on: a drum, a block around a rod, or a rail with its stops."""
+    T, wide = link.T_end, joint.radius
+    if not joint.prismatic:
+        yield _cylinder(T, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
+    elif joint.is_rod:
+        yield _box(T, (wide, wide), min(-joint.half, joint.near), max(joint.half, joint.near))
+    else:
+        low, high = _span(*joint.stroke, joint.half + THIN * wide)
+        yield _box(T, (BAR * wide, BAR * wide), low, high)
+        yield _box(T, (STOP * wide, STOP * wide), low, low + THIN * wide)
+        yield _box(T, (STOP * wide, STOP * wide), high - THIN * wide, high)
 
 
 def _span(low: float, high: float, margin: float) -> tuple[float, float]:
-    """Return the interval of a bar that begins at 0 and outlasts the block at both ends of its stroke."""
-    return min(0.0, low - margin if low < 0 else 0.0), max(0.0, high + margin if high > 0 else 0.0)
+    """Return the ends of a bar from 0 over a stroke, with a margin for the block where it does not begin."""
+    if low == high == 0:
+        return -margin, margin
+    return min(0.0, low - margin * (low < 0)), max(0.0, high + margin * (high > 0))
 
 
 def _cylinder(T: Array, radius: float, start: float, end: float) -> Solid:
-    """Return a cylinder about z of T, from start to end."""
+    """Return a cylinder about the z axis of T, from start to end."""
     return Cylinder(_size(radius), _size(abs(end - start))), T @ _shift(z=(start + end) / 2)
 
 
-def _box(T: Array, half_x: float, half_y: float, start: float, end: float) -> Solid:
-    """Return a box about z of T, from start to end."""
-    return Box((_size(2 * half_x), _size(2 * half_y), _size(end - start))), T @ _shift(z=(start + end) / 2)
+def _box(T: Array, half: tuple[float, float], start: float, end: float) -> Solid:
+    """Return a box about the z axis of T, from start to end; half widths along x and y."""
+    return Box((_size(2 * half[0]), _size(2 * half[1]), _size(end - start))), T @ _shift(z=(start + end) / 2)
 
 
 def _size(value: float) -> Expression:
-    """Return a length as a short decimal: six digits are a micrometre of a metre."""
+    """Return a length as a short decimal: six digits are a micrometre in a metre."""
     return exact(float(f"{value:.6g}"))
 
 
+def _bend(a: float, cos_alpha: float, sin_alpha: float) -> Array:
+    return np.array([[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]])
+
+
 def _shift(x: float = 0.0, z: float = 0.0) -> Array:
-    T = np.eye(4)
-    T[[0, 2], 3] = x, z
-    return T
+    return np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1.0]])
 
 
 def _about_z(angle: float) -> Array:
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    return T
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
 def _towards(point: Array) -> Array:
-    """Return a frame at the origin whose z points to a point other than it."""
+    """Return a frame at the origin whose z axis points to a point other than it."""
     T = np.eye(4)
-    T[:3, 2] = point / np.linalg.norm(point)
-    across = np.cross(T[:3, 2], np.eye(3)[np.argmin(np.abs(point))])
-    T[:3, 0] = across / np.linalg.norm(across)
-    T[:3, 1] = np.cross(T[:3, 2], T[:3, 0])
+    T[:3, :3] = Rotation.align_vectors([point], [(0, 0, 1)])[0].as_matrix()
     return T

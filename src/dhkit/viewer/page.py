@@ -14,7 +14,17 @@ from dhkit.errors import ModelError
 
 __all__ = ["SECURITY_POLICY", "meshcat_bundle", "offline_page", "page_files"]
 
-MODULES = ("main.js", "stage.js", "player.js", "trace.js", "labels.js", "readout.js", "messages.js", "connection.js")
+MODULES = (
+    "main.js",
+    "stage.js",
+    "player.js",
+    "trace.js",
+    "labels.js",
+    "smooth.js",
+    "readout.js",
+    "messages.js",
+    "connection.js",
+)
 """The page's ES modules; ``main.js`` imports the others."""
 
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
@@ -101,7 +111,8 @@ def _modules() -> str:
 
 
 def _script(content: str, attributes: str = "") -> str:
-    return f"<script{attributes}>{content.replace('</script', '<\\/script')}</script>"
+    inert = content.replace("</script", r"<\/script")
+    return f"<script{attributes}>{inert}</script>"
 
 
 def _replaced(text: str, pieces: dict[str, str]) -> str:

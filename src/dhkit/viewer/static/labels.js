@@ -1,0 +1,46 @@
+// The names of frames, written beside their origins.
+
+const GAP = 9, HEIGHT = 20; // px
+
+export class Labels {
+  constructor(container) {
+    this.container = container;
+    this.container.hidden = true;
+    this.labels = [];
+  }
+
+  set(labels) {
+    this.container.replaceChildren();
+    this.labels = labels.map(({ frame, text }) => {
+      const element = document.createElement("span");
+      element.textContent = text;
+      this.container.append(element);
+      return { frame, element, width: 0 };
+    });
+  }
+
+  show(visible) {
+    this.container.hidden = !visible;
+  }
+
+  // project: frame -> {x, y} in px, or null behind the camera.
+  place(project) {
+    if (this.container.hidden) return;
+    const taken = [];
+    for (const label of this.labels) {
+      const point = project(label.frame);
+      label.element.style.visibility = point ? "" : "hidden";
+      if (!point) continue;
+      label.width ||= label.element.offsetWidth;
+      const box = { left: point.x + GAP, top: point.y - HEIGHT, right: point.x + GAP + label.width };
+      // Frames that only happen to coincide: write below the label that is there.
+      while (taken.some((other) => overlaps(box, other))) box.top += HEIGHT;
+      taken.push(box);
+      label.element.style.transform = `translate(${box.left.toFixed(1)}px, ${box.top.toFixed(1)}px)`;
+    }
+  }
+}
+
+function overlaps(a, b) {
+  return a.left < b.right && b.left < a.right && Math.abs(a.top - b.top) < HEIGHT;
+}

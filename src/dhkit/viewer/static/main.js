@@ -1,0 +1,194 @@
+// The viewer's page, live and offline: messages from Python move the scene, the person moves the rest.
+
+import { Connection } from "./connection.js";
+import { ANIMATION, FRAMES, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
+import { Player } from "./player.js";
+import { Readout } from "./readout.js";
+import { Stage, THREE } from "./stage.js";
+
+const element = (id) => document.getElementById(id);
+const STEP = 1 / 30; // s that an arrow key moves an animation
+
+class Page {
+  constructor() {
+    this.stage = new Stage(element("pane"), element("labels"), insets);
+    this.readout = new Readout(element("readout"));
+    this.player = new Player(element("player"), { show: (time) => this.showTime(time) });
+    this.motion = null; // what is on show: {q, positions, quaternions}, for an animation with times and more
+    this.drawn = []; // sequences to acknowledge after the next picture
+    this.controls();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  receive(buffer) {
+    const message = decode(buffer);
+    const take = {
+      [SCENE]: () => this.takeScene(message),
+      [POSE]: () => this.takePose(message),
+      [ANIMATION]: () => this.takeAnimation(message),
+      [TRACE]: () => this.stage.setTrace(this.stage.given, message.points),
+      [FRAMES]: () => this.showFrames(message.flag),
+    };
+    take[message.type]();
+    this.drawn.push(message.sequence);
+    // A page in the background draws nothing; it has the state all the same.
+    if (document.hidden) this.acknowledge();
+  }
+
+  takeScene(message) {
+    this.stage.build(message);
+    this.readout.set(message.about);
+    element("tools").hidden = false;
+    document.body.dataset.ready = "true";
+  }
+
+  takePose(message) {
+    if (this.player.active) {
+      this.player.unload();
+      this.stage.drawn.clear();
+      this.stage.forget();
+    }
+    this.motion = { q: message.q, ...placements(message.transforms, THREE) };
+    this.stage.include(this.motion);
+    this.showState(this.motion);
+  }
+
+  takeAnimation(message) {
+    const motion = { ...message, ...placements(message.transforms, THREE) };
+    this.motion = motion;
+    this.player.reveal();
+    this.stage.forget();
+    this.stage.include(motion);
+    const tool = 3 * (motion.nodes - 1), points = new Float32Array(message.flag ? 3 * motion.times.length : 0);
+    for (let i = 0; i < points.length / 3; i++) {
+      points.set(motion.positions.subarray(3 * i * motion.nodes + tool, 3 * i * motion.nodes + tool + 3), 3 * i);
+    }
+    this.stage.setTrace(this.stage.drawn, points);
+    this.player.load(motion.times[motion.times.length - 1]);
+  }
+
+  // Samples are at equal steps: dhkit/viewer/motion.py.
+  showTime(time) {
+    const { times, q, joints, nodes, positions, quaternions } = this.motion;
+    const last = times.length - 1;
+    const at = (time / times[last]) * last;
+    const k = Math.min(last - 1, Math.floor(at)), share = at - k;
+    this.stage.drawn.draw(Math.round(at));
+    this.showState({
+      q: mix(q, joints, k, share),
+      positions: mix(positions, 3 * nodes, k, share),
+      quaternions: turn(quaternions, nodes, k, share),
+    });
+  }
+
+  showState({ q, positions, quaternions }) {
+    this.stage.place(positions, quaternions);
+    this.readout.show(q, [...positions.slice(-3)]);
+  }
+
+  showFrames(visible) {
+    element("frames").setAttribute("aria-pressed", String(visible));
+    this.stage.showFrames(visible);
+  }
+
+  showTraces(visible) {
+    element("trace").setAttribute("aria-pressed", String(visible));
+    this.stage.showTraces(visible);
+  }
+
+  tick(now) {
+    requestAnimationFrame((next) => this.tick(next));
+    this.player.tick(now);
+    this.stage.render();
+    this.acknowledge();
+  }
+
+  acknowledge() {
+    for (const sequence of this.drawn.splice(0)) this.connection?.shown(sequence);
+  }
+
+  controls() {
+    const flip = (id) => element(id).getAttribute("aria-pressed") !== "true";
+    const frames = () => this.showFrames(flip("frames"));
+    const trace = () => this.showTraces(flip("trace"));
+    const reset = () => this.stage.resetCamera();
+    element("frames").addEventListener("click", frames);
+    element("trace").addEventListener("click", trace);
+    element("reset").addEventListener("click", reset);
+    element("readout").addEventListener("toggle", () => this.stage.refit());
+    const { player } = this;
+    const keys = {
+      f: frames,
+      t: trace,
+      r: reset,
+      l: () => player.active && player.repeat(!player.loop),
+      " ": () => player.active && player.toggle(),
+      Home: () => player.active && player.step(-Infinity),
+      End: () => player.active && player.step(Infinity),
+      ArrowLeft: () => player.active && player.step(-STEP),
+      ArrowRight: () => player.active && player.step(STEP),
+    };
+    addEventListener("keydown", (event) => {
+      const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      if (!act || !this.motion || event.ctrlKey || event.metaKey || event.altKey || keepsKey(event)) return;
+      event.preventDefault();
+      act();
+    });
+  }
+}
+
+// Whether the focused control has its own use for a key: a slider for arrows, a button for space, a list for letters.
+function keepsKey({ target, key }) {
+  if (target.matches("select")) return true;
+  if (target.matches("input")) return key !== " " && key.length > 1;
+  return key === " " && target.matches("button, summary");
+}
+
+// What panels cover, px; on a phone the read-out opens over the arm.
+function insets() {
+  const right = 12, top = 60, bottom = element("player").hidden ? 14 : 66;
+  const readout = element("readout"), beside = readout.open && !readout.hidden && innerWidth > 560;
+  return { left: beside ? readout.getBoundingClientRect().right : 12, top, right, bottom };
+}
+
+function mix(values, width, k, share) {
+  const row = new Float32Array(width);
+  for (let i = 0; i < width; i++) row[i] = (1 - share) * values[k * width + i] + share * values[(k + 1) * width + i];
+  return row;
+}
+
+function turn(quaternions, nodes, k, share) {
+  const row = new Float32Array(4 * nodes);
+  for (let i = 0; i < nodes; i++) {
+    THREE.Quaternion.slerpFlat(row, 4 * i, quaternions, 4 * (k * nodes + i), quaternions, 4 * ((k + 1) * nodes + i), share);
+  }
+  return row;
+}
+
+function banner(text) {
+  element("banner").textContent = text;
+  element("banner").hidden = !text;
+}
+
+function start() {
+  const page = new Page();
+  globalThis.dhkit = page;
+  const inlined = element("messages");
+  if (inlined) {
+    for (const text of JSON.parse(inlined.textContent)) page.receive(bytes(text));
+    return;
+  }
+  const url = new URL("socket", location.href.replace(/^http/, "ws"));
+  page.connection = new Connection(url, { receive: (data) => page.receive(data), status: banner });
+}
+
+function bytes(base64) {
+  return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer;
+}
+
+try {
+  start();
+} catch (error) {
+  banner(`This page could not start: ${error.message}`);
+  throw error;
+}

@@ -1,0 +1,62 @@
+// Messages from Python: the layout is described in dhkit/viewer/protocol.py.
+
+export const SCENE = 1, POSE = 2, ANIMATION = 3, TRACE = 4, FRAMES = 5;
+const HEADER = 16, FLAG = 1;
+const PER_TRANSFORM = 12;
+
+export function decode(buffer) {
+  const view = new DataView(buffer);
+  const header = {
+    type: view.getUint8(0),
+    flag: Boolean(view.getUint8(1) & FLAG),
+    joints: view.getUint16(2, true),
+    sequence: view.getUint32(4, true),
+    time: view.getFloat64(8, true),
+  };
+  return { ...header, ...BODIES[header.type](buffer, view, header) };
+}
+
+const BODIES = {
+  [SCENE]: (buffer, view) => {
+    const blocks = [];
+    for (let at = HEADER; at < buffer.byteLength; ) {
+      const length = view.getUint32(at, true);
+      // A copy: meshcat hands an STL's buffer to its loader whole.
+      blocks.push(new Uint8Array(buffer.slice(at + 4, at + 4 + length)));
+      at += 4 + length;
+    }
+    return { about: JSON.parse(new TextDecoder().decode(blocks[0])), commands: blocks.slice(1) };
+  },
+  [POSE]: (buffer, view, { joints }) => {
+    const numbers = new Float32Array(buffer, HEADER);
+    return { q: numbers.subarray(0, joints), transforms: numbers.subarray(joints) };
+  },
+  [ANIMATION]: (buffer, view, { joints }) => {
+    const count = view.getUint32(HEADER, true);
+    const start = HEADER + 8;
+    const numbers = new Float32Array(buffer, start + 8 * count);
+    return {
+      joints,
+      nodes: joints + 2,
+      times: new Float64Array(buffer, start, count),
+      q: numbers.subarray(0, count * joints),
+      transforms: numbers.subarray(count * joints, count * (joints + (joints + 2) * PER_TRANSFORM)),
+    };
+  },
+  [TRACE]: (buffer) => ({ points: new Float32Array(buffer, HEADER) }),
+  [FRAMES]: () => ({}),
+};
+
+// Positions (3 a node) and unit quaternions (x y z w, 4 a node) of transforms given as rows of 3 x 4 matrices.
+export function placements(transforms, THREE) {
+  const count = transforms.length / PER_TRANSFORM;
+  const positions = new Float32Array(3 * count), quaternions = new Float32Array(4 * count);
+  const matrix = new THREE.Matrix4(), quaternion = new THREE.Quaternion();
+  for (let i = 0; i < count; i++) {
+    const m = transforms.subarray(PER_TRANSFORM * i, PER_TRANSFORM * (i + 1));
+    matrix.set(...m, 0, 0, 0, 1);
+    quaternion.setFromRotationMatrix(matrix).normalize().toArray(quaternions, 4 * i);
+    positions.set([m[3], m[7], m[11]], 3 * i);
+  }
+  return { positions, quaternions };
+}

@@ -1,0 +1,295 @@
+// The scene on screen: meshcat's viewer without its panels, our camera, light and colors.
+
+import { Labels } from "./labels.js";
+import { smoothNormals } from "./smooth.js";
+import { Trace } from "./trace.js";
+
+const { THREE } = MeshCat;
+const FIELD = 34; // degrees of view, vertically
+const MARGIN = 1.07; // around the arm
+const SAMPLES = 60; // states of an animation that the camera must take in
+const TRACE_RADIUS = 0.0035; // share of the arm's size
+const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/scene.py
+
+export class Stage {
+  // insets(): how many px at the left, top, right and bottom are covered by panels.
+  constructor(pane, labels, insets) {
+    this.pane = pane;
+    this.insets = insets;
+    this.viewer = new MeshCat.Viewer(pane, false);
+    this.labels = new Labels(labels);
+    this.nodes = [];
+    this.seen = new THREE.Box3();
+    this.framed = new THREE.Box3();
+    this.touched = false;
+    this.placement = null; // what the camera takes in
+    this.framesShown = false;
+    this.tameViewer();
+    this.light();
+    this.given = new Trace(this.viewer.scene, THREE);
+    this.drawn = new Trace(this.viewer.scene, THREE);
+    const scheme = matchMedia("(prefers-color-scheme: dark)");
+    scheme.addEventListener("change", () => this.color());
+    this.color();
+    new ResizeObserver(() => this.resize()).observe(pane);
+    this.resize();
+  }
+
+  // meshcat sizes itself by the window, hangs a panel of unnamed inputs on the page and paints a gradient.
+  tameViewer() {
+    const { viewer } = this;
+    viewer.set_3d_pane_size = () => this.resize();
+    viewer.gui.domElement.remove();
+    viewer.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    viewer.hide_background();
+    for (const name of ["Lights", "Grid", "Axes"]) viewer.set_property([name], "visible", false);
+  }
+
+  light() {
+    this.sky = new THREE.HemisphereLight(0xffffff, 0xffffff, 0.68);
+    this.sky.position.set(0, 0, 1);
+    this.key = new THREE.DirectionalLight(0xffffff, 0.52);
+    this.key.castShadow = true;
+    this.key.shadow.mapSize.set(1024, 1024);
+    this.key.shadow.radius = 4;
+    this.fill = new THREE.DirectionalLight(0xffffff, 0.16);
+    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.16 }));
+    this.floor.receiveShadow = true;
+    this.viewer.scene.add(this.sky, this.key, this.key.target, this.fill, this.floor);
+  }
+
+  color() {
+    const style = getComputedStyle(document.documentElement);
+    const value = (name) => style.getPropertyValue(name).trim();
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    this.grid?.material.color.set(value("--grid"));
+    this.sky.groundColor.set(dark ? 0x6a7080 : 0xb4b8c4);
+    this.floor.material.opacity = dark ? 0.35 : 0.13;
+    for (const trace of [this.given, this.drawn]) trace.color(value("--accent"));
+    this.dirty();
+  }
+
+  dirty() {
+    this.viewer.set_dirty();
+  }
+
+  resize() {
+    const width = Math.max(1, this.pane.clientWidth), height = Math.max(1, this.pane.clientHeight);
+    this.viewer.camera.aspect = width / height;
+    this.viewer.renderer.setSize(width, height);
+    this.refit();
+    this.dirty();
+  }
+
+  build({ about, commands, joints }) {
+    const { viewer } = this;
+    viewer.delete_path(["dhkit"]);
+    for (const command of commands) viewer.handle_command_bytearray(command);
+    const root = viewer.scene_tree.find(["dhkit"]).object;
+    root.traverse((object) => object.isMesh && smoothNormals(object.geometry, THREE));
+    const node = (...path) => viewer.scene_tree.find(["dhkit", ...path]).object;
+    this.nodes = [];
+    for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
+    this.nodes.push(node("tool"));
+    // Looked up among the children: finding a path in the tree would create it.
+    this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
+    for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
+    this.grid = node("grid", "<object>");
+    this.grid.castShadow = this.grid.receiveShadow = false;
+    this.grid.material.depthWrite = false;
+    this.size = about.size;
+    this.up = new THREE.Vector3(...about.up);
+    this.labels.set(about.labels);
+    this.boxes = this.nodes.map((n) => localBox(n));
+    this.seen.makeEmpty();
+    this.framed.makeEmpty();
+    this.setUp();
+    this.color();
+  }
+
+  setUp() {
+    const { viewer, size } = this;
+    const camera = viewer.camera;
+    camera.fov = FIELD;
+    camera.near = size / 100;
+    camera.far = 60 * size;
+    if (!this.touched) {
+      // The turning rule is fixed when controls are made, so a new up needs new controls.
+      camera.up.copy(inView(this.up));
+      viewer.controls.dispose();
+      viewer.set_camera(camera);
+      viewer.controls.addEventListener("start", () => (this.touched = true));
+    }
+    const place = (light, x, y, z) => light.position.set(x * size, y * size, z * size);
+    place(this.key, 0.7, -2.1, 2.6);
+    place(this.fill, -2, 1, 0.5);
+    const shadow = this.key.shadow.camera;
+    Object.assign(shadow, { left: -1.5 * size, right: 1.5 * size, top: 1.5 * size, bottom: -1.5 * size });
+    Object.assign(shadow, { near: 0.1 * size, far: 6 * size });
+    shadow.updateProjectionMatrix();
+    this.key.shadow.bias = -0.0015;
+    this.key.shadow.normalBias = 0.004 * size;
+    this.floor.scale.setScalar(6 * size);
+    this.floor.position.z = -0.0005 * size;
+  }
+
+  // positions, quaternions: of all nodes, in order.
+  place(positions, quaternions) {
+    this.nodes.forEach((node, i) => {
+      node.position.fromArray(positions, 3 * i);
+      node.quaternion.fromArray(quaternions, 4 * i);
+    });
+    this.dirty();
+  }
+
+  // Keep what was seen so far in view, unless someone has turned the camera.
+  include(placement) {
+    this.placement = placement;
+    const { positions, quaternions } = placement;
+    const count = positions.length / (3 * this.nodes.length);
+    const stride = Math.max(1, Math.floor(count / SAMPLES));
+    for (let k = 0; k < count; k += stride) this.seen.union(this.boxAt(positions, quaternions, k));
+    this.seen.union(this.boxAt(positions, quaternions, count - 1));
+    if (this.touched || this.framed.containsBox(this.seen)) return;
+    this.frame(this.seen);
+  }
+
+  // What is in view stays in view when the free part of the pane changes.
+  refit() {
+    if (!this.touched && !this.framed.isEmpty()) this.frame(this.framed);
+  }
+
+  // Frame anew what is on show.
+  reframe() {
+    this.forget();
+    if (this.placement) this.include(this.placement);
+  }
+
+  forget() {
+    this.seen.makeEmpty();
+    this.framed.makeEmpty();
+  }
+
+  boxAt(positions, quaternions, k) {
+    const around = this.framesShown ? TRIAD * this.size : 0;
+    const whole = new THREE.Box3(), pose = new THREE.Matrix4(), one = new THREE.Vector3(1, 1, 1);
+    this.boxes.forEach((box, i) => {
+      const at = k * this.boxes.length + i;
+      const position = new THREE.Vector3().fromArray(positions, 3 * at);
+      whole.union(new THREE.Box3(position, position).expandByScalar(around));
+      if (box.isEmpty()) return;
+      pose.compose(position, new THREE.Quaternion().fromArray(quaternions, 4 * at), one);
+      whole.union(box.clone().applyMatrix4(pose));
+    });
+    return whole;
+  }
+
+  // Look at a box from the side, so that its corners fill the picture.
+  frame(box) {
+    this.framed.copy(box);
+    const { camera, controls } = this.viewer;
+    const centre = inView(box.getCenter(new THREE.Vector3()));
+    const direction = inView(this.direction(box)).normalize();
+    const right = new THREE.Vector3().crossVectors(camera.up, direction).normalize();
+    const above = new THREE.Vector3().crossVectors(direction, right);
+    const { wide, tall } = this.freeField();
+    let distance = this.size * 0.3;
+    for (const corner of corners(box)) {
+      const p = inView(corner).sub(centre);
+      const across = Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(above)) / tall);
+      distance = Math.max(distance, p.dot(direction) + across * MARGIN);
+    }
+    camera.position.copy(centre).addScaledVector(direction, distance);
+    controls.target.copy(centre);
+    controls.update();
+    this.dirty();
+  }
+
+  // Put the middle of the view into the middle of what panels leave free; return half its width and height at 1 m.
+  freeField() {
+    const { camera } = this.viewer;
+    const width = this.pane.clientWidth, height = this.pane.clientHeight;
+    const { left, top, right, bottom } = this.insets();
+    camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
+    const perPixel = (2 * Math.tan((FIELD * Math.PI) / 360)) / height;
+    const half = (free) => (perPixel * Math.max(80, free)) / 2;
+    return { wide: half(width - left - right), tall: half(height - top - bottom) };
+  }
+
+  // From where to look, z up: an arm that moves in a vertical plane from the front, others from the side and above.
+  direction(box) {
+    if (Math.abs(this.up.z) < 0.5) return new THREE.Vector3(0.18, 0, 1).addScaledVector(this.up, 0.14);
+    const span = box.getSize(new THREE.Vector3());
+    const flat = span.z < 0.25 * Math.max(span.x, span.y);
+    return new THREE.Vector3(0.62, -0.78, (flat ? 0.85 : 0.36) * Math.sign(this.up.z));
+  }
+
+  resetCamera() {
+    this.touched = false;
+    this.setUp();
+    this.reframe();
+  }
+
+  showFrames(visible) {
+    for (const triad of this.triads ?? []) if (triad) triad.visible = visible;
+    this.labels.show(visible);
+    this.framesShown = visible;
+    if (!this.touched) this.reframe();
+    this.dirty();
+  }
+
+  showTraces(visible) {
+    this.given.show(visible);
+    this.drawn.show(visible);
+    this.dirty();
+  }
+
+  setTrace(trace, points) {
+    trace.set(points, TRACE_RADIUS * this.size);
+    this.dirty();
+  }
+
+  render() {
+    const { viewer } = this;
+    if (!viewer.needs_render) return;
+    viewer.render();
+    this.labels.place((frame) => this.project(this.nodes[frame].position));
+  }
+
+  // A point of the world in px from the pane's upper left corner; null behind the camera.
+  project(point) {
+    const p = inView(point).project(this.viewer.camera);
+    if (p.z > 1) return null;
+    return { x: ((p.x + 1) * this.pane.clientWidth) / 2, y: ((1 - p.y) * this.pane.clientHeight) / 2 };
+  }
+}
+
+// meshcat lays the world (z up) on its back inside a scene with y up, where its camera is.
+function inView(v) {
+  return new THREE.Vector3(v.x, v.z, -v.y);
+}
+
+function corners(box) {
+  const { min, max } = box;
+  const points = [];
+  for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) points.push(new THREE.Vector3(x, y, z));
+  return points;
+}
+
+// The box around a node's parts, triads left out, in the node's own axes.
+function localBox(node) {
+  const box = new THREE.Box3();
+  node.updateMatrixWorld(true);
+  const inverse = node.matrixWorld.clone().invert();
+  for (const part of node.children.filter((child) => child.name !== "frame")) {
+    part.traverse((object) => {
+      if (!object.geometry) return;
+      if (!object.geometry.boundingBox) object.geometry.computeBoundingBox();
+      const own = object.geometry.boundingBox.clone();
+      box.union(own.applyMatrix4(new THREE.Matrix4().multiplyMatrices(inverse, object.matrixWorld)));
+    });
+  }
+  return box;
+}
+
+export { THREE };

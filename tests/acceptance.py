@@ -1,0 +1,110 @@
+"""Laws with a sample size: small in `make test`, full in `make accept`, which writes down what was seen.
+
+A test takes the fixture ``law``; ``law.samples(1000)`` is 1,000 under DHKIT_ACCEPT=1 and a twentieth of it otherwise;
+``law.holds("frames", seen, required)`` keeps the worst of each quantity and fails where it is too large.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+ACCEPTING = os.environ.get("DHKIT_ACCEPT") == "1"
+RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "acceptance.json"
+SHARE = 20
+LEAST = 5
+
+
+def sample_size(full: int) -> int:
+    """Return how many samples this run takes of a law stated with ``full``."""
+    return full if ACCEPTING else max(min(full, LEAST), full // SHARE)
+
+
+class Law:
+    """What one test has seen, quantity by quantity."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.size = 0
+        self.worst: dict[str, tuple[float, float]] = {}
+
+    def samples(self, full: int) -> int:
+        self.size = sample_size(full)
+        return self.size
+
+    def holds(self, quantity: str, seen: float, required: float, where: object = None) -> None:
+        """Record a figure and fail if it exceeds what is required; NaN fails."""
+        seen = float(seen)
+        before, _ = self.worst.get(quantity, (-math.inf, required))
+        if math.isnan(seen) or seen > before:
+            self.worst[quantity] = (seen, required)
+        assert seen <= required, f"{quantity}: {seen:.3g}, required at most {required:.3g}" + (
+            f" at {where}" if where is not None else ""
+        )
+
+    def rows(self) -> list[dict[str, object]]:
+        return [
+            {"law": self.name, "quantity": q, "samples": self.size, "seen": seen, "required": required,
+             "holds": seen <= required}
+            for q, (seen, required) in self.worst.items()
+        ]  # fmt: skip
+
+
+class Recorder:
+    """Pytest plugin: collects the laws of a session."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict[str, object]] = []
+
+    @pytest.fixture
+    def law(self, request: pytest.FixtureRequest):
+        request.applymarker(pytest.mark.law)
+        law = Law(request.node.nodeid.split("tests/", 1)[-1])
+        yield law
+        self.rows += law.rows()
+        if ACCEPTING:
+            for row in law.rows():
+                print(f"\n  {row['quantity']}: {row['seen']:.3g} of at most {row['required']:.3g}", end="")
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows:
+            return
+        packages = ("numpy", "pin", "yourdfpy", "hypothesis")
+        RESULTS.parent.mkdir(parents=True, exist_ok=True)
+        RESULTS.write_text(
+            json.dumps(
+                {
+                    "python": platform.python_version(),
+                    "machine": platform.machine(),
+                    "packages": {package: version(package) for package in packages},
+                    "laws": sorted(self.rows, key=lambda row: (str(row["law"]), str(row["quantity"]))),
+                },
+                indent=1,
+            )
+            + "\n"
+        )
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if not ACCEPTING or not self.rows:
+            return
+        worst: dict[str, tuple[float, float, int]] = {}
+        for row in self.rows:
+            name = f"{str(row['law']).split('[')[0]}: {row['quantity']}"
+            seen, count = max(worst.get(name, (-math.inf, 0.0, 0))[0], row["seen"]), worst.get(name, (0, 0, 0))[2] + 1
+            worst[name] = (seen, row["required"], count)
+        terminalreporter.section("laws: worst seen, required")
+        for name, (seen, required, count) in worst.items():
+            terminalreporter.write_line(f"{seen:10.2e} {required:10.1e}  {name} ({count})")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what takes the fixture, so that -m law finds it."""
+    for item in items:
+        if "law" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.law)

@@ -1,0 +1,40 @@
+"""Sample sizes, Hypothesis profiles and what a machine must have."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import acceptance
+import pytest
+from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "dhkit",
+    deadline=None,
+    max_examples=acceptance.sample_size(1000),
+    derandomize=not acceptance.ACCEPTING,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+    print_blob=True,
+)
+settings.load_profile("dhkit")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(acceptance.Recorder(), "dhkit-laws")
+
+
+@pytest.fixture(scope="session")
+def check_urdf() -> str:
+    """Path of urdfdom's check_urdf; skips where it is missing and not required."""
+    return require("check_urdf", "Debian's liburdfdom-tools has it")
+
+
+def require(program: str, hint: str) -> str:
+    path = shutil.which(program)
+    if path is None and program in os.environ.get("DHKIT_REQUIRE", "").split(","):
+        pytest.fail(f"{program} is required (DHKIT_REQUIRE) and missing: {hint}")
+    if path is None:
+        pytest.skip(f"no {program}: {hint}")
+    return path

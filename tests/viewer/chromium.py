@@ -1,0 +1,187 @@
+"""A headless Chromium for tests, spoken to by the DevTools protocol; and what to do where there is none."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from tornado.websocket import WebSocketClientConnection, websocket_connect
+
+BINARY = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+FLAGS = (
+    "--headless --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
+    "--disable-background-networking --disable-component-update --disable-sync --remote-debugging-port=0 "
+    "--hide-scrollbars"
+).split()
+START_TIMEOUT = 30.0
+TIMEOUT = 20.0
+
+
+def require_chromium() -> None:
+    """Skip the test where Chromium is missing; fail where DHKIT_REQUIRE names it."""
+    if BINARY is not None:
+        return
+    if "chromium" in os.environ.get("DHKIT_REQUIRE", "").split(","):
+        pytest.fail("Chromium is required by DHKIT_REQUIRE and not installed")
+    pytest.skip("Chromium is not installed (apt-get install chromium)")
+
+
+class Chromium:
+    """A browser process with an empty profile; pages are opened one at a time by :meth:`page`."""
+
+    def __init__(self) -> None:
+        self.profile = tempfile.TemporaryDirectory(prefix="dhkit-chromium-", ignore_cleanup_errors=True)
+        self.process = subprocess.Popen(
+            [str(BINARY), *FLAGS, f"--user-data-dir={self.profile.name}", "about:blank"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        self.loop = asyncio.new_event_loop()
+        self.port = self._port()
+
+    def _port(self) -> int:
+        announced = Path(self.profile.name) / "DevToolsActivePort"
+        deadline = time.monotonic() + START_TIMEOUT
+        while not (announced.exists() and announced.read_text().count("\n")):
+            assert self.process.poll() is None and time.monotonic() < deadline, "Chromium did not start"
+            time.sleep(0.05)
+        return int(announced.read_text().split()[0])
+
+    def page(self, width: int = 900, height: int = 700, *, dark: bool = False, scale: float = 1.0) -> Page:
+        """Open an empty page of a size in CSS px."""
+        request = urllib.request.Request(f"http://127.0.0.1:{self.port}/json/new", method="PUT")
+        with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
+            target = json.load(answer)
+        page = Page(self.loop, target["webSocketDebuggerUrl"])
+        page.resize(width, height, scale)
+        page.scheme("dark" if dark else "light")
+        return page
+
+    def close(self) -> None:
+        """End the process group that this browser started."""
+        os.killpg(self.process.pid, signal.SIGTERM)
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+        self.loop.close()
+        self.profile.cleanup()
+
+
+class Page:
+    """One page, with every address that it has asked for and every error that it has logged."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, address: str) -> None:
+        self.loop = loop
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.count = 0
+        self.socket = loop.run_until_complete(_connect(address))
+        for domain in ("Network", "Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: object) -> dict:
+        """Return a DevTools command's result."""
+        self.count += 1
+        return self.loop.run_until_complete(asyncio.wait_for(self._call(self.count, method, parameters), TIMEOUT))
+
+    async def _call(self, number: int, method: str, parameters: dict) -> dict:
+        await self.socket.write_message(json.dumps({"id": number, "method": method, "params": parameters}))
+        while True:
+            text = await self.socket.read_message()
+            assert text is not None, "Chromium closed the page"
+            message = json.loads(text)
+            if message.get("id") == number:
+                assert "error" not in message, message
+                return message["result"]
+            self._note(message)
+
+    def _note(self, event: dict) -> None:
+        parameters = event.get("params", {})
+        match event.get("method"):
+            case "Network.requestWillBeSent":
+                self.requests.append(parameters["request"]["url"])
+            case "Network.webSocketCreated":
+                self.requests.append(parameters["url"])
+            case "Runtime.exceptionThrown":
+                details = parameters["exceptionDetails"]
+                self.errors.append(details.get("exception", {}).get("description", details["text"]))
+            case "Log.entryAdded" if parameters["entry"]["level"] == "error":
+                self.errors.append(parameters["entry"]["text"])
+            case "Runtime.consoleAPICalled" if parameters["type"] == "error":
+                self.errors.append(str([argument.get("value") for argument in parameters["args"]]))
+
+    def resize(self, width: int, height: int, scale: float = 1.0) -> None:
+        """Change the size, CSS px."""
+        self.call(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=width < 500
+        )
+
+    def scheme(self, name: str, motion: str = "no-preference") -> None:
+        """Prefer light or dark, and motion or ``reduce``."""
+        features = [
+            {"name": "prefers-color-scheme", "value": name},
+            {"name": "prefers-reduced-motion", "value": motion},
+        ]
+        self.call("Emulation.setEmulatedMedia", features=features)
+
+    def open(self, url: str) -> None:
+        """Go to an address and wait until an arm is shown there."""
+        self.call("Page.navigate", url=url)
+        self.until("document.body?.dataset.ready === 'true' && Boolean(dhkit.motion)")
+        self.settle()
+
+    def evaluate(self, expression: str) -> object:
+        """Return a JavaScript expression's value."""
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
+
+    def until(self, condition: str, timeout: float = TIMEOUT) -> None:
+        """Wait for a JavaScript condition."""
+        deadline = time.monotonic() + timeout
+        while not self.evaluate(f"Boolean({condition})"):
+            assert time.monotonic() < deadline, f"{condition} not true after {timeout} s; errors: {self.errors}"
+            time.sleep(0.02)
+
+    def settle(self) -> None:
+        """Wait until two more pictures have been drawn."""
+        self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+
+    def press(self, key: str) -> None:
+        """Press and release a key."""
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    def screenshot(self, file: Path | None = None) -> np.ndarray:
+        """Return the picture, shape (height, width, 3), 0 to 255; write it as PNG if a file is given."""
+        self.settle()
+        content = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        if file is not None:
+            file.write_bytes(content)
+        return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
+
+    def close(self) -> None:
+        """Close the page."""
+        self.call("Page.close")
+        self.socket.close()
+
+
+async def _connect(address: str) -> WebSocketClientConnection:
+    return await websocket_connect(address, max_message_size=1 << 30)
