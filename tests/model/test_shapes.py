@@ -174,6 +174,15 @@ def test_each_drum_of_a_spherical_wrist_is_seen_behind_the_one_before():
     assert sixth < fifth and length6 > max(2 * fifth, length5)
 
 
+def test_a_bar_is_not_twisted_in_its_block():
+    arm = from_dh([(0, 0.3, 0, "pi/2"), ("pi/3", 0.1, 0, 0)], kinds="RP")
+    T = world_to_frames(arm, [0.4, 0.2])
+    block, bar, *_ = [part for part in link_parts(arm) if isinstance(part.geometry, Box)]
+    assert (block.link, bar.link) == (1, 2)
+    block_axes, bar_axes = ((T[part.link] @ part.T_link_part)[:3, :3] for part in (block, bar))
+    assert np.allclose(block_axes, bar_axes, atol=ROUNDING)
+
+
 def test_given_shapes_keep_their_place_color_and_parameters():
     turned = Placement((exact(0.1), ZERO, parse("h", ("h",))), (ZERO, parse("pi/2"), ZERO))
     ball, box = Shape(Sphere(parse("h", ("h",))), turned, "#c8102e"), Shape(Box((parse("h/2", ("h",)),) * 3))

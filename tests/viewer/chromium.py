@@ -20,12 +20,22 @@ import pytest
 from PIL import Image
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-BINARY = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
-FLAGS = (
-    "--headless --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run "
-    "--disable-background-networking --disable-component-update --disable-sync --remote-debugging-port=0 "
-    "--hide-scrollbars"
-).split()
+BINARY = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--remote-debugging-port=0",
+]
 START_TIMEOUT = 30.0
 TIMEOUT = 20.0
 
@@ -129,7 +139,11 @@ class Page:
     def resize(self, width: int, height: int, scale: float = 1.0) -> None:
         """Change the size, CSS px."""
         self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=width < 500
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=scale,
+            mobile=width < 500,
         )
 
     def scheme(self, name: str, motion: str = "no-preference") -> None:

@@ -103,6 +103,9 @@ def _references(model: PinocchioModel, q: Array, names: list[str]) -> Iterator[t
         pin.computeJointJacobians(model, data, state)
         pin.updateFramePlacements(model, data)
         frames = np.array([data.oMf[i].homogeneous for i in ids])
-        world = pin.getFrameJacobian(model, data, ids[-1], pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).copy()
-        tool = pin.getFrameJacobian(model, data, ids[-1], pin.ReferenceFrame.LOCAL).copy()
+        world, tool = (
+            # eigenpy hands a matrix of one column over as a vector.
+            np.reshape(pin.getFrameJacobian(model, data, ids[-1], axes), (6, model.nv))
+            for axes in (pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, pin.ReferenceFrame.LOCAL)
+        )
         yield frames, (world, tool)

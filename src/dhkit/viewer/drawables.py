@@ -27,9 +27,12 @@ AXIS_COLORS = np.array([[0.898, 0.282, 0.302], [0.188, 0.643, 0.424], [0.231, 0.
 ROUND_SIDES = 48
 """Sides of what is round; a multiple of 4, so that the silhouette has the true radius."""
 
+FRONT, DOUBLE = 0, 2
+"""three.js's sides of a surface: files may have triangles the wrong way round, at twice the cost."""
+
 ARROW_SIDES = 8
-GRID_FADE = 6
-"""Pieces of a half grid line, each with its own opacity."""
+GRID_FADE = 3
+"""Pieces of a half grid line: opacity is linear along each, and every piece costs time without a graphics card."""
 
 
 def part_object(part: Part, name: str) -> Lowered:
@@ -47,9 +50,10 @@ def part_object(part: Part, name: str) -> Lowered:
     ModelError
         A mesh without a readable STL, OBJ or DAE file.
     """
-    from meshcat.geometry import MeshPhongMaterial  # type: ignore[import-untyped]
+    from meshcat.geometry import MeshPhongMaterial
 
-    material = MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222)
+    side = DOUBLE if isinstance(part.geometry, Mesh) else FRONT
+    material = MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
     return _lowered("Mesh", _geometry(part), material, name)
 
 
@@ -58,12 +62,12 @@ def part_transform(part: Part) -> Array:
 
     That is the part's own pose with the mesh's scale or, for cylinders and capsules, the turn from y to z.
     """
+    T = part.T_link_part.copy()
     if isinstance(part.geometry, Mesh):
-        scale = float(part.geometry.scale)
-        return part.T_link_part @ np.diag([scale, scale, scale, 1.0])
+        T[:3, :3] *= float(part.geometry.scale)
     if isinstance(part.geometry, Cylinder | Capsule):
-        return part.T_link_part @ Y_TO_Z
-    return part.T_link_part
+        T = np.matmul(T, Y_TO_Z)
+    return T
 
 
 def triad_object(length: float, name: str) -> Lowered:
@@ -121,8 +125,9 @@ def grid_object(size: float, name: str) -> Lowered:
     along = np.linspace(-half, half, 2 * GRID_FADE + 1)
     x, y = np.meshgrid(along, across)
     line = np.stack([x, y, np.zeros_like(x)], axis=-1)
-    segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 3)
-    points = np.concatenate([segments, segments[:, [1, 0, 2]]])
+    segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 3)
+    segments = segments[np.linalg.norm(segments, axis=2).min(axis=1) < half]  # the corners are fully faded
+    points = np.concatenate([segments, segments[..., [1, 0, 2]]]).reshape(-1, 3)
     opacity = np.clip(1 - np.hypot(points[:, 0], points[:, 1]) / half, 0, 1)
     colors = np.concatenate([np.ones((3, len(points))), opacity[None]])
     geometry = PointsGeometry(points.T.astype(np.float32), colors.astype(np.float32))
@@ -144,7 +149,7 @@ def _geometry(part: Part) -> Any:
     shape = part.geometry
     match shape:
         case Mesh():
-            return _mesh(part)
+            return _mesh(part, shape)
         case Box():
             return meshcat.Box([float(edge) for edge in shape.size])
         case Sphere():
@@ -158,7 +163,7 @@ def _geometry(part: Part) -> Any:
             return _lathe(np.concatenate([_arc(radius, -half, -90, 0), _arc(radius, half, 0, 90)]))
 
 
-def _mesh(part: Part) -> Any:
+def _mesh(part: Part, shape: Mesh) -> Any:
     from meshcat import geometry as meshcat
 
     readers = {
@@ -166,11 +171,8 @@ def _mesh(part: Part) -> Any:
         ".obj": meshcat.ObjMeshGeometry,
         ".dae": meshcat.DaeMeshGeometry,
     }
-    assert isinstance(part.geometry, Mesh)
     if part.file is None:
-        raise ModelError(
-            f"link {part.link}: mesh {part.geometry.path!r} has no folder; expected a robot read from a file"
-        )
+        raise ModelError(f"link {part.link}: mesh {shape.path!r} has no folder; expected a robot read from a file")
     reader = readers.get(part.file.suffix.lower())
     if reader is None:
         raise ModelError(

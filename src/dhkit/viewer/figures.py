@@ -29,6 +29,10 @@ TRIAD = 0.11
 """Length of a triad as a share of the arm's size."""
 FLAT = 1e-9
 """An arm whose frames leave a plane by less than this share of its size is drawn in it."""
+SLIMMEST = 0.5
+"""Shortest edge of the box around an arm, as a share of the longest: slimmer boxes have no room for their ticks."""
+ZOOM = 0.86
+"""Leaves the labels of a box's axes inside the figure."""
 
 
 @singledispatch
@@ -156,6 +160,8 @@ def _draw_links(axes: Any, description: Description, frames: Array, line: Array)
 
 def _draw_triads(axes: Any, description: Description, T: Array) -> None:
     """Draw frames 0 ... n and the tool, T of shape (n + 2, 4, 4)."""
+    from matplotlib.patheffects import withStroke
+
     length = TRIAD * scene_size(description)
     for k, color in enumerate(AXIS_COLORS):
         start = T[:, :3, 3]
@@ -163,10 +169,10 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
         for end in ends:
             axes.plot(*end.T, color=color, lw=1.5, zorder=4)
         axes.plot([], [], [], color=color, lw=1.5, label="xyz"[k])
+    halo = [withStroke(linewidth=3, foreground="white")]
     for label in frame_labels(description):
-        place = T[label.frame, :3, 3] - 0.28 * length * T[label.frame, :3, :3].sum(axis=1)
-        style = {"fontsize": 9, "ha": "center", "va": "center", "zorder": 6}
-        axes.text(*place, label.text, bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.7}, **style)
+        place = T[label.frame, :3, 3]
+        axes.text(*place, f"   {label.text}", fontsize=9, va="bottom", path_effects=halo, zorder=6)
     axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3, handlelength=1, columnspacing=1)
 
 
@@ -206,11 +212,11 @@ def _frame_space(axes: Any, points: Array, margin: float) -> None:
     """Set equal axes around points, shape (k, 3); look at what lies in a plane z = constant from above."""
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high[2] - low[2] <= FLAT * max(float((high - low).max()), 1e-12)
-    half = np.maximum((high - low) / 2 + margin, 0.25 * float((high - low).max() / 2 + margin))
+    half = np.maximum((high - low) / 2 + margin, SLIMMEST * float((high - low).max() / 2 + margin))
     centre = (low + high) / 2
     for set_limits, c, h in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, half, strict=True):
         set_limits(c - h, c + h)
-    axes.set_box_aspect(half)
+    axes.set_box_aspect(half, zoom=ZOOM)
     axes.view_init(elev=24, azim=-58)
     if flat:
         axes.view_init(elev=90, azim=-90)

@@ -57,5 +57,5 @@ def sampled(times: Array, q: Array) -> tuple[Array, Array]:
     return grid - times[0], np.stack([np.interp(grid, times, column) for column in q.T], axis=1)
 
 
-def _first(wrong: np.ndarray) -> int:  # type: ignore[type-arg]
+def _first(wrong: np.ndarray) -> int:
     return int(np.argwhere(wrong)[0, 0])

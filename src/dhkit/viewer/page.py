@@ -17,10 +17,12 @@ __all__ = ["SECURITY_POLICY", "meshcat_bundle", "offline_page", "page_files"]
 MODULES = (
     "main.js",
     "stage.js",
+    "boxes.js",
     "player.js",
     "trace.js",
     "labels.js",
     "smooth.js",
+    "quality.js",
     "readout.js",
     "messages.js",
     "connection.js",
@@ -52,7 +54,8 @@ def meshcat_bundle() -> bytes:
     try:
         bundle = path.read_bytes()
     except OSError as error:
-        raise ModelError(f"{path}: {error.strerror}; expected meshcat's viewer: pip install --force-reinstall meshcat")
+        expected = "meshcat's viewer: pip install --force-reinstall meshcat"
+        raise ModelError(f"{path}: {error.strerror}; expected {expected}") from None
     if b"MeshCat" not in bundle or b"handle_command_bytearray" not in bundle:
         raise ModelError(
             f"{path} is not the viewer of meshcat 0.3: pip install --force-reinstall 'meshcat>=0.3.2,<0.4'"
@@ -117,8 +120,7 @@ def _script(content: str, attributes: str = "") -> str:
 
 def _replaced(text: str, pieces: dict[str, str]) -> str:
     for mark, piece in pieces.items():
-        before, found, after = text.partition(mark)
-        assert found, f"index.html has no {mark}"
+        before, after = text.split(mark)
         text = before + piece + after
     return text
 

@@ -107,7 +107,7 @@ class Animation:
 
 def encode_scene(scene: Scene) -> bytes:
     """Return a scene message."""
-    import umsgpack  # type: ignore[import-untyped]
+    import umsgpack
 
     about = json.dumps(scene.about, separators=(",", ":"), allow_nan=False).encode()
     blocks = [about, *(umsgpack.packb(command) for command in scene.commands)]

@@ -1,15 +1,11 @@
 """A web server on the loopback interface that shows a scene's latest state to every page that opens it.
 
-It runs in a daemon thread with an event loop of its own. Who may talk to it: requests whose Host is the server's own
-address (against DNS rebinding), whose Origin, if any, is too (a websocket must have one), and that know the random
-token in the path.
+It runs in a daemon thread with an event loop of its own; :mod:`dhkit.viewer.handlers` says who may talk to it.
 """
 
 from __future__ import annotations
 
 import asyncio
-import hmac
-import json
 import logging
 import secrets
 import threading
@@ -21,12 +17,12 @@ from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
-from tornado.web import Application, HTTPError, RequestHandler
-from tornado.websocket import WebSocketClosedError, WebSocketHandler
+from tornado.web import Application
 
 from dhkit.errors import ModelError
-from dhkit.viewer.page import SECURITY_POLICY, page_files
-from dhkit.viewer.protocol import ProtocolError, decode_shown, stamped
+from dhkit.viewer.handlers import File, Page, Refused
+from dhkit.viewer.page import page_files
+from dhkit.viewer.protocol import stamped
 from dhkit.viewer.session import Session, Slot
 
 __all__ = ["ViewerServer"]
@@ -59,12 +55,12 @@ class ViewerServer:
 
     def __init__(self, state: Mapping[Slot, bytes]) -> None:
         self.token = secrets.token_urlsafe(16)
-        self._files = page_files()
+        self.files = page_files()
         self._lock = threading.Lock()
         self._sequence = 0
         self._state: dict[Slot, tuple[int, bytes]] = {}
         self._changed: set[Slot] = set()
-        self._pages: set[Page] = set()
+        self.pages: set[Page] = set()
         self._closed = False
         for slot, message in state.items():
             self._keep(slot, message)
@@ -80,11 +76,6 @@ class ViewerServer:
     def hosts(self) -> tuple[str, str]:
         """What a browser may call us."""
         return f"{ADDRESS}:{self.port}", f"localhost:{self.port}"
-
-    @property
-    def pages(self) -> int:
-        """How many pages are connected."""
-        return len(self._pages)
 
     def publish(self, slot: Slot, message: bytes) -> None:
         """Make a message the latest of its slot and send it to every page that has drawn the one before.
@@ -114,9 +105,9 @@ class ViewerServer:
         """
         self._soon(lambda: None)
         deadline = time.monotonic() + timeout
-        while not self._pages or self._changed or not all(page.session.settled for page in tuple(self._pages)):
+        while not self.pages or self._changed or not all(page.session.settled for page in tuple(self.pages)):
             if time.monotonic() > deadline:
-                what = "no page is connected" if not self._pages else "a page has not drawn the latest state"
+                what = "no page is connected" if not self.pages else "a page has not drawn the latest state"
                 raise TimeoutError(f"{what} after {timeout:g} s; it is at {self.url}")
             if not self._thread.is_alive():
                 raise ModelError("the viewer's server has ended")
@@ -157,7 +148,7 @@ class ViewerServer:
         with self._lock:
             latest = {slot: self._state[slot] for slot in self._changed}
             self._changed.clear()
-        for page in tuple(self._pages):
+        for page in tuple(self.pages):
             for slot, (sequence, message) in latest.items():
                 page.session.offer(slot, sequence, message)
             page.send()
@@ -169,7 +160,7 @@ class ViewerServer:
         try:
             return started.result(START_TIMEOUT)
         except (OSError, FutureTimeout) as error:
-            raise ModelError(f"the viewer's server did not start on {ADDRESS}: {error or 'no answer'}") from None
+            raise ModelError(f"the viewer's server did not start on {ADDRESS}: {str(error) or 'no answer'}") from None
 
     def _run(self, started: Future[int]) -> None:
         try:
@@ -185,132 +176,28 @@ class ViewerServer:
         self._stop = asyncio.Event()
         routes = [(r"/([^/]*)/socket", Page, {"server": self}), (r"/([^/]*)/(.*)", File, {"server": self})]
         application = Application(
-            routes,  # type: ignore[arg-type]  # tornado's own type leaves out what it accepts
+            routes,
             default_handler_class=Refused,
             default_handler_args={"server": self},
             log_function=lambda handler: LOG.debug("%s %s", handler.get_status(), handler.request.method),
             websocket_ping_interval=PING,
             websocket_max_message_size=MAX_MESSAGE,
         )
-        sockets = bind_sockets(0, ADDRESS)
+        self.sockets = bind_sockets(0, ADDRESS)
         http = HTTPServer(application)
-        http.add_sockets(sockets)
-        self.port = sockets[0].getsockname()[1]
+        http.add_sockets(self.sockets)
+        self.port = self.sockets[0].getsockname()[1]
         started.set_result(self.port)
         beat = asyncio.create_task(self._beat())
         await self._stop.wait()
         beat.cancel()
         http.stop()
-        for page in tuple(self._pages):
+        for page in tuple(self.pages):
             page.close(1001, "closed")
         await http.close_all_connections()
 
     async def _beat(self) -> None:
         while True:
             await asyncio.sleep(BEAT)
-            for page in tuple(self._pages):
+            for page in tuple(self.pages):
                 page.say({"type": "beat"})
-
-
-class Guarded(RequestHandler):
-    """A request that is refused unless it comes from our own page and knows the token."""
-
-    def initialize(self, server: ViewerServer) -> None:
-        """Know the server."""
-        self.server = server
-
-    def prepare(self) -> None:
-        """Refuse strangers before anything else is done."""
-        origin = self.request.headers.get("Origin")
-        if self.request.host not in self.server.hosts:
-            raise HTTPError(403, reason="Foreign Host")
-        if origin is not None and origin not in [f"http://{host}" for host in self.server.hosts]:
-            raise HTTPError(403, reason="Foreign Origin")
-        if not hmac.compare_digest((self.path_args or [""])[0].encode(), self.server.token.encode()):
-            raise HTTPError(403, reason="Missing token")
-
-    def set_default_headers(self) -> None:
-        """Say as little as possible, to as few as possible."""
-        self.clear_header("Server")
-        self.set_header("Content-Security-Policy", SECURITY_POLICY)
-        self.set_header("X-Content-Type-Options", "nosniff")
-        self.set_header("Referrer-Policy", "no-referrer")
-        self.set_header("Cache-Control", "no-store")
-
-    def write_error(self, status_code: int, **_: Any) -> None:
-        """Answer with one line."""
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(f"{status_code} {self._reason}\n")
-
-
-class Refused(Guarded):
-    """Any other address."""
-
-    def prepare(self) -> None:
-        """Refuse."""
-        super().prepare()
-        raise HTTPError(404)
-
-
-class File(Guarded):
-    """One of the page's files, by its exact name."""
-
-    def get(self, _token: str, name: str) -> None:
-        """Send the file."""
-        if name not in self.server._files:
-            raise HTTPError(404)
-        content_type, content = self.server._files[name]
-        self.set_header("Content-Type", content_type)
-        self.finish(content)
-
-
-class Page(Guarded, WebSocketHandler):
-    """The websocket of one page."""
-
-    session: Session
-
-    def prepare(self) -> None:
-        """Refuse strangers, and who does not say where it comes from: browsers do."""
-        super().prepare()
-        if "Origin" not in self.request.headers:
-            raise HTTPError(403, reason="Missing Origin")
-
-    def check_origin(self, origin: str) -> bool:
-        """Accept: :meth:`prepare` has looked at it."""
-        return True
-
-    def open(self, *_: str) -> None:
-        """Send the page everything."""
-        self.set_nodelay(True)
-        self.session = self.server.replay()
-        self.server._pages.add(self)
-        self.send()
-
-    def on_message(self, message: str | bytes) -> None:
-        """Take an acknowledgement, and send what has come up meanwhile."""
-        try:
-            self.session.shown(decode_shown(message))
-        except ProtocolError as error:
-            self.say({"type": "error", "error": str(error)})
-            return
-        self.send()
-
-    def on_close(self) -> None:
-        """Forget the page."""
-        self.server._pages.discard(self)
-
-    def send(self) -> None:
-        """Send what may be sent."""
-        message = self.session.next()
-        if message is not None:
-            self._write(message, binary=True)
-
-    def say(self, message: dict[str, str]) -> None:
-        """Send a line of JSON."""
-        self._write(json.dumps(message), binary=False)
-
-    def _write(self, message: str | bytes, binary: bool) -> None:
-        try:
-            self.write_message(message, binary=binary)
-        except WebSocketClosedError:
-            self.server._pages.discard(self)

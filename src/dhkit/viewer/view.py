@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
-from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol

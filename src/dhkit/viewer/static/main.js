@@ -99,7 +99,7 @@ class Page {
   tick(now) {
     requestAnimationFrame((next) => this.tick(next));
     this.player.tick(now);
-    this.stage.render();
+    this.stage.render(now);
     this.acknowledge();
   }
 

@@ -1,6 +1,8 @@
 // The scene on screen: meshcat's viewer without its panels, our camera, light and colors.
 
+import { corners, inView, localBox } from "./boxes.js";
 import { Labels } from "./labels.js";
+import { Quality } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
 import { Trace } from "./trace.js";
 
@@ -26,6 +28,8 @@ export class Stage {
     this.framesShown = false;
     this.tameViewer();
     this.light();
+    this.quality = new Quality([() => this.withoutShadows(), () => this.withoutGloss()]);
+    this.plain = false;
     this.given = new Trace(this.viewer.scene, THREE);
     this.drawn = new Trace(this.viewer.scene, THREE);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -56,6 +60,19 @@ export class Stage {
     this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.16 }));
     this.floor.receiveShadow = true;
     this.viewer.scene.add(this.sky, this.key, this.key.target, this.fill, this.floor);
+  }
+
+  withoutShadows() {
+    this.key.castShadow = false;
+    this.floor.visible = false;
+    this.dirty();
+  }
+
+  withoutGloss() {
+    this.plain = true;
+    this.viewer.renderer.setPixelRatio(1);
+    for (const node of this.nodes) node.traverse(matt);
+    this.resize();
   }
 
   color() {
@@ -91,6 +108,7 @@ export class Stage {
     this.nodes = [];
     for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
     this.nodes.push(node("tool"));
+    if (this.plain) this.nodes.forEach((n) => n.traverse(matt));
     // Looked up among the children: finding a path in the tree would create it.
     this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
     for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
@@ -249,10 +267,11 @@ export class Stage {
     this.dirty();
   }
 
-  render() {
+  render(now) {
     const { viewer } = this;
     if (!viewer.needs_render) return;
     viewer.render();
+    this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
   }
 
@@ -264,32 +283,11 @@ export class Stage {
   }
 }
 
-// meshcat lays the world (z up) on its back inside a scene with y up, where its camera is.
-function inView(v) {
-  return new THREE.Vector3(v.x, v.z, -v.y);
-}
-
-function corners(box) {
-  const { min, max } = box;
-  const points = [];
-  for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) points.push(new THREE.Vector3(x, y, z));
-  return points;
-}
-
-// The box around a node's parts, triads left out, in the node's own axes.
-function localBox(node) {
-  const box = new THREE.Box3();
-  node.updateMatrixWorld(true);
-  const inverse = node.matrixWorld.clone().invert();
-  for (const part of node.children.filter((child) => child.name !== "frame")) {
-    part.traverse((object) => {
-      if (!object.geometry) return;
-      if (!object.geometry.boundingBox) object.geometry.computeBoundingBox();
-      const own = object.geometry.boundingBox.clone();
-      box.union(own.applyMatrix4(new THREE.Matrix4().multiplyMatrices(inverse, object.matrixWorld)));
-    });
-  }
-  return box;
+function matt(object) {
+  if (object.material?.type !== "MeshPhongMaterial") return;
+  const { color, side } = object.material;
+  object.material.dispose();
+  object.material = new THREE.MeshLambertMaterial({ color, side });
 }
 
 export { THREE };

@@ -1,0 +1,25 @@
+// What a slow machine can do without: after a run of late pictures the scene is drawn more plainly, for good.
+
+const LATE = 42; // ms between pictures of a motion
+const PATIENCE = 6; // late pictures more than timely ones
+const PAUSE = 400; // ms: nothing moved in between
+
+export class Quality {
+  // savings: functions to call, one after the other, the least missed first.
+  constructor(savings) {
+    this.savings = [...savings];
+    this.late = 0;
+    this.last = 0;
+  }
+
+  // Called for every picture that was drawn; now in ms.
+  drawn(now) {
+    const interval = now - this.last;
+    this.last = now;
+    if (interval > PAUSE || !this.savings.length) return;
+    this.late = Math.max(0, this.late + (interval > LATE ? 1 : -1));
+    if (this.late < PATIENCE) return;
+    this.late = 0;
+    this.savings.shift()();
+  }
+}

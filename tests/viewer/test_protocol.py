@@ -1,0 +1,116 @@
+"""Laws of the protocol: what is encoded comes back, and what is no message is refused."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from dhkit.description import library_robot
+from dhkit.model.shapes import link_parts
+from dhkit.viewer import protocol
+from dhkit.viewer.protocol import MessageType, ProtocolError
+from dhkit.viewer.scene import build_scene
+
+number = st.floats(-1e3, 1e3, width=32)
+joints = st.integers(1, 9)
+
+
+def drawn(draw, *shape):
+    return draw(arrays(float, shape, elements=number))
+
+
+@given(st.data(), joints, st.floats(0, 1e6))
+def test_a_pose_comes_back(data, n, time):
+    q, T = drawn(data.draw, n), drawn(data.draw, n + 2, 4, 4)
+    message = protocol.encode_pose(q, T, time)
+    pose = protocol.decode_pose(message)
+    assert np.array_equal(pose.q, q)
+    assert np.array_equal(pose.transforms, T[:, :3])
+    header = protocol.decode_header(message)
+    assert (header.type, header.joints, header.sequence, header.time) == (MessageType.POSE, n, 0, time)
+
+
+@given(st.data(), joints, st.integers(1, 5), st.booleans())
+def test_an_animation_comes_back(data, n, count, trace):
+    times = np.sort(data.draw(arrays(float, count, elements=st.floats(0, 1e5))))
+    q, T = drawn(data.draw, count, n), drawn(data.draw, count, n + 2, 4, 4)
+    back = protocol.decode_animation(protocol.encode_animation(times, q, T, trace=trace))
+    assert np.array_equal(back.times, times)
+    assert np.array_equal(back.q, q)
+    assert np.array_equal(back.transforms, T[:, :, :3])
+    assert back.trace is trace
+
+
+@given(st.data(), st.integers(0, 20))
+def test_a_trace_comes_back(data, count):
+    points = drawn(data.draw, count, 3)
+    assert np.array_equal(protocol.decode_trace(protocol.encode_trace(points)), points)
+
+
+@pytest.mark.parametrize("name", ["planar2r", "puma560"])
+def test_a_scene_comes_back(name):
+    arm = library_robot(name)
+    scene = build_scene(arm, link_parts(arm))
+    about, commands = protocol.decode_scene(protocol.encode_scene(scene))
+    assert about == scene.about
+    assert [c["path"] for c in commands] == [c["path"] for c in scene.commands]
+    assert commands == list(scene.commands)
+
+
+@given(st.integers(0, 2**40), st.booleans())
+def test_a_stamp_changes_the_sequence_only(sequence, visible):
+    message = protocol.encode_frames(visible)
+    stamped = protocol.stamped(message, sequence)
+    header = protocol.decode_header(stamped)
+    assert header.sequence == sequence % 2**32
+    assert header.flags == visible
+    assert protocol.stamped(stamped, 0) == message
+
+
+def test_a_pose_of_a_six_axis_arm_is_small():
+    message = protocol.encode_pose(np.zeros(6), np.zeros((8, 4, 4)))
+    assert len(message) == 16 + 4 * 6 + 48 * 8
+
+
+@given(st.binary(max_size=40))
+def test_foreign_bytes_are_refused_or_a_header(content):
+    try:
+        assert protocol.decode_header(content).type in MessageType
+    except ProtocolError:
+        assert len(content) < 16 or content[0] not in list(MessageType)
+
+
+def test_a_message_of_another_kind_is_named():
+    with pytest.raises(ProtocolError, match="message type is FRAMES; expected POSE"):
+        protocol.decode_pose(protocol.encode_frames(True))
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_an_acknowledgement_is_read(sequence):
+    assert protocol.decode_shown(f'{{"type": "shown", "sequence": {sequence}}}') == sequence
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("{", "no JSON"),
+        (b"\xff", "no JSON"),
+        ("[" * 100_000, "no JSON"),
+        ("[1]", "type is 'list'"),
+        ('{"type": "eval"}', "type is 'eval'; expected 'shown'"),
+        ('{"type": "shown"}', "sequence is None"),
+        ('{"type": "shown", "sequence": true}', "sequence is True"),
+        ('{"type": "shown", "sequence": -1}', "sequence is -1"),
+        ('{"type": "shown", "sequence": 1.0}', "sequence is 1.0"),
+    ],
+)
+def test_what_is_no_acknowledgement_is_named(text, complaint):
+    with pytest.raises(ProtocolError, match=complaint):
+        protocol.decode_shown(text)
+
+
+def test_header_is_sixteen_bytes_little_endian():
+    assert protocol.stamped(protocol.encode_trace(np.zeros((0, 3))), 7) == struct.pack("<BBHId", 4, 0, 0, 7, 0.0)

@@ -1,0 +1,257 @@
+"""Who may talk to the server, what a new page is told, and that nothing hangs."""
+
+import asyncio
+import http.client
+import json
+import threading
+import time
+
+import pytest
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import websocket_connect
+
+from dhkit.errors import ModelError
+from dhkit.viewer.page import MODULES
+from dhkit.viewer.protocol import decode_header, encode_frames
+from dhkit.viewer.server import ViewerServer
+from dhkit.viewer.session import Slot
+
+CONNECTIONS = 200
+PATIENCE = 10.0
+
+
+def message(flag=False):
+    return encode_frames(flag)
+
+
+@pytest.fixture
+def server():
+    running = ViewerServer({Slot.SCENE: message(), Slot.MOTION: message(True)})
+    yield running
+    running.close()
+
+
+def get(server, path, **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer.status, answer.headers, content
+
+
+async def connect(server, **headers):
+    headers = {"Origin": f"http://127.0.0.1:{server.port}", **headers}
+    url = server.url.replace("http", "ws") + "socket"
+    return await websocket_connect(HTTPRequest(url, headers={k: v for k, v in headers.items() if v}))
+
+
+def run(coroutine):
+    return asyncio.run(asyncio.wait_for(coroutine, PATIENCE * 3))
+
+
+async def read(socket):
+    """Return the next binary message; beats are text."""
+    while isinstance(text := await asyncio.wait_for(socket.read_message(), PATIENCE), str):
+        assert json.loads(text)["type"] == "beat"
+    return text
+
+
+async def shown(socket, content):
+    sequence = decode_header(content).sequence
+    await socket.write_message(json.dumps({"type": "shown", "sequence": sequence}))
+
+
+def test_the_page_and_its_files_are_served(server):
+    path = f"/{server.token}/"
+    status, headers, content = get(server, path)
+    assert status == 200
+    assert content.startswith(b"<!doctype html>")
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert "Server" not in headers
+    for name in ("viewer.css", "meshcat.js", *MODULES):
+        status, headers, _ = get(server, path + name)
+        assert status == 200
+        assert headers["Content-Type"].startswith(("text/css", "text/javascript"))
+
+
+def test_it_listens_on_the_loopback_interface_only(server):
+    assert server.url.startswith("http://127.0.0.1:")
+    own = asyncio.run_coroutine_threadsafe(listening(server), server._loop).result(PATIENCE)
+    assert own == {"127.0.0.1"}
+
+
+async def listening(server):
+    return {sock.getsockname()[0] for sock in server.sockets}
+
+
+@pytest.mark.parametrize("name", ["", "main.js", "socket"])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Host": "127.0.0.1"},
+        {"Host": "127.0.0.1:1"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "https://127.0.0.1:{port}"},
+        {"Origin": "null"},
+    ],
+)
+def test_a_foreign_host_or_origin_is_refused(server, name, headers):
+    headers = {key: value.format(port=server.port) for key, value in headers.items()}
+    status, _, content = get(server, f"/{server.token}/{name}", **headers)
+    assert status == 403
+    assert server.token.encode() not in content
+
+
+@pytest.mark.parametrize("path", ["/", "/main.js", "//", "/x/", "/socket", "/{half}/", "/{token}x/main.js"])
+def test_a_missing_token_is_refused(server, path):
+    path = path.format(token=server.token, half=server.token[:8])
+    assert get(server, path)[0] == 403
+
+
+@pytest.mark.parametrize("name", ["../server.py", "%2e%2e/server.py", "index.html", "static/main.js", "favicon.ico"])
+def test_only_the_pages_own_files_are_there(server, name):
+    assert get(server, f"/{server.token}/{name}")[0] in (403, 404)
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", ""])
+def test_a_websocket_of_another_site_is_refused(server, origin):
+    with pytest.raises(HTTPClientError, match="403"):
+        run(connect(server, Origin=origin))
+
+
+def test_a_websocket_without_the_token_is_refused(server):
+    server.token, token = "guess", server.token  # noqa: S105 - the client's guess
+
+    async def guess():
+        url = f"ws://127.0.0.1:{server.port}/{token}/socket"
+        await websocket_connect(HTTPRequest(url, headers={"Origin": f"http://127.0.0.1:{server.port}"}))
+
+    with pytest.raises(HTTPClientError, match="403"):
+        run(guess())
+
+
+def test_a_new_page_is_told_the_latest_state(server):
+    server.publish(Slot.MOTION, message(False))
+    server.publish(Slot.TRACE, message(True))
+
+    async def replayed():
+        socket, flags = await connect(server), []
+        for _ in range(3):
+            content = await read(socket)
+            flags.append(decode_header(content).flags)
+            await shown(socket, content)
+        socket.close()
+        return flags
+
+    assert run(replayed()) == [0, 1, 0]  # scene, trace, motion
+
+
+def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
+    async def slow():
+        socket = await connect(server)
+        first = await read(socket)
+        for k in range(500):
+            server.publish(Slot.MOTION, message(k == 499))
+        await shown(socket, first)
+        latest = await read(socket)
+        await shown(socket, latest)
+        with pytest.raises(asyncio.TimeoutError):
+            while True:
+                assert isinstance(await asyncio.wait_for(socket.read_message(), 0.2), str)
+        socket.close()
+        return decode_header(latest).flags
+
+    assert run(slow()) == 1
+
+
+def test_it_survives_many_connections(server):
+    async def come_and_go():
+        for _ in range(CONNECTIONS):
+            socket = await connect(server)
+            await read(socket)
+            socket.close()
+        socket = await connect(server)
+        content = await read(socket)
+        await shown(socket, content)
+        content = await read(socket)
+        socket.close()
+        return decode_header(content).flags
+
+    assert run(come_and_go()) == 1
+    deadline = time.monotonic() + PATIENCE
+    while server.pages and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not server.pages
+
+
+def test_nonsense_from_a_page_gets_an_error_and_the_page_lives(server):
+    async def babble():
+        socket, errors = await connect(server), []
+        first = await read(socket)
+        for text in ("{", '{"type": "eval", "code": "1"}', b"\x00"):
+            await socket.write_message(text, binary=isinstance(text, bytes))
+            while (answer := json.loads(await socket.read_message()))["type"] == "beat":
+                pass
+            errors.append(answer["type"])
+        await shown(socket, first)
+        await read(socket)
+        socket.close()
+        return errors
+
+    assert run(babble()) == ["error"] * 3
+
+
+def test_a_page_hears_a_sign_of_life(server, monkeypatch):
+    async def listen():
+        socket = await connect(server)
+        await read(socket)
+        beat = await asyncio.wait_for(socket.read_message(), PATIENCE)
+        socket.close()
+        return json.loads(beat)
+
+    assert run(listen()) == {"type": "beat"}
+
+
+def test_waiting_without_a_page_ends(server):
+    with pytest.raises(TimeoutError, match=r"no page is connected after 0.05 s; it is at http://127.0.0.1"):
+        server.wait(0.05)
+
+
+def test_waiting_for_a_page_that_does_not_draw_ends(server):
+    async def idle():
+        socket = await connect(server)
+        await read(socket)
+        loop = asyncio.get_running_loop()
+        with pytest.raises(TimeoutError, match="a page has not drawn the latest state"):
+            await loop.run_in_executor(None, server.wait, 0.05)
+        socket.close()
+
+    run(idle())
+
+
+def test_a_closed_server_is_gone_and_says_so():
+    threads = threading.active_count()
+    server = ViewerServer({})
+    port = server.port
+    server.close()
+    server.close()
+    assert threading.active_count() == threads
+    for call in (lambda: server.publish(Slot.MOTION, message()), lambda: server.wait(1.0)):
+        with pytest.raises(ModelError, match="the viewer is closed"):
+            call()
+    with pytest.raises(ConnectionRefusedError):
+        http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE).connect()
+
+
+def test_a_page_is_told_good_bye(server):
+    async def last_words():
+        socket = await connect(server)
+        await read(socket)
+        await asyncio.get_running_loop().run_in_executor(None, server.close)
+        while (text := await asyncio.wait_for(socket.read_message(), PATIENCE)) is not None:
+            assert isinstance(text, str)
+        return socket.close_code
+
+    assert run(last_words()) == 1001
