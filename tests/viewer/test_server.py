@@ -5,6 +5,7 @@ import http.client
 import json
 import threading
 import time
+from contextlib import asynccontextmanager
 
 import pytest
 from tornado.httpclient import HTTPClientError, HTTPRequest
@@ -40,10 +41,15 @@ def get(server, path, **headers):
     return answer.status, answer.headers, content
 
 
+@asynccontextmanager
 async def connect(server, **headers):
     headers = {"Origin": f"http://127.0.0.1:{server.port}", **headers}
     url = server.url.replace("http", "ws") + "socket"
-    return await websocket_connect(HTTPRequest(url, headers={k: v for k, v in headers.items() if v}))
+    socket = await websocket_connect(HTTPRequest(url, headers={k: v for k, v in headers.items() if v}))
+    yield socket
+    socket.close()
+    while await asyncio.wait_for(socket.read_message(), PATIENCE) is not None:
+        pass
 
 
 def run(coroutine):
@@ -117,8 +123,12 @@ def test_only_the_pages_own_files_are_there(server, name):
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", ""])
 def test_a_websocket_of_another_site_is_refused(server, origin):
+    async def intrude():
+        async with connect(server, Origin=origin):
+            pass
+
     with pytest.raises(HTTPClientError, match="403"):
-        run(connect(server, Origin=origin))
+        run(intrude())
 
 
 def test_a_websocket_without_the_token_is_refused(server):
@@ -137,12 +147,12 @@ def test_a_new_page_is_told_the_latest_state(server):
     server.publish(Slot.TRACE, message(True))
 
     async def replayed():
-        socket, flags = await connect(server), []
-        for _ in range(3):
-            content = await read(socket)
-            flags.append(decode_header(content).flags)
-            await shown(socket, content)
-        socket.close()
+        flags = []
+        async with connect(server) as socket:
+            for _ in range(3):
+                content = await read(socket)
+                flags.append(decode_header(content).flags)
+                await shown(socket, content)
         return flags
 
     assert run(replayed()) == [0, 1, 0]  # scene, trace, motion
@@ -150,18 +160,16 @@ def test_a_new_page_is_told_the_latest_state(server):
 
 def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
     async def slow():
-        socket = await connect(server)
-        first = await read(socket)
-        for k in range(500):
-            server.publish(Slot.MOTION, message(k == 499))
-        await shown(socket, first)
-        latest = await read(socket)
-        await shown(socket, latest)
-        with pytest.raises(asyncio.TimeoutError):
-            while True:
-                assert isinstance(await asyncio.wait_for(socket.read_message(), 0.2), str)
-        socket.close()
-        return decode_header(latest).flags
+        async with connect(server) as socket:
+            first = await read(socket)
+            for k in range(500):
+                server.publish(Slot.MOTION, message(k == 499))
+            await shown(socket, first)
+            latest = await read(socket)
+            await shown(socket, latest)
+            await asyncio.sleep(0.1)
+            assert all(page.session.settled for page in server.pages)
+            return decode_header(latest).flags
 
     assert run(slow()) == 1
 
@@ -169,15 +177,11 @@ def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
 def test_it_survives_many_connections(server):
     async def come_and_go():
         for _ in range(CONNECTIONS):
-            socket = await connect(server)
-            await read(socket)
-            socket.close()
-        socket = await connect(server)
-        content = await read(socket)
-        await shown(socket, content)
-        content = await read(socket)
-        socket.close()
-        return decode_header(content).flags
+            async with connect(server) as socket:
+                await read(socket)
+        async with connect(server) as socket:
+            await shown(socket, await read(socket))
+            return decode_header(await read(socket)).flags
 
     assert run(come_and_go()) == 1
     deadline = time.monotonic() + PATIENCE
@@ -188,28 +192,26 @@ def test_it_survives_many_connections(server):
 
 def test_nonsense_from_a_page_gets_an_error_and_the_page_lives(server):
     async def babble():
-        socket, errors = await connect(server), []
-        first = await read(socket)
-        for text in ("{", '{"type": "eval", "code": "1"}', b"\x00"):
-            await socket.write_message(text, binary=isinstance(text, bytes))
-            while (answer := json.loads(await socket.read_message()))["type"] == "beat":
-                pass
-            errors.append(answer["type"])
-        await shown(socket, first)
-        await read(socket)
-        socket.close()
+        errors = []
+        async with connect(server) as socket:
+            first = await read(socket)
+            for text in ("{", '{"type": "eval", "code": "1"}', b"\x00"):
+                await socket.write_message(text, binary=isinstance(text, bytes))
+                while (answer := json.loads(await socket.read_message()))["type"] == "beat":
+                    pass
+                errors.append(answer["type"])
+            await shown(socket, first)
+            await read(socket)
         return errors
 
     assert run(babble()) == ["error"] * 3
 
 
-def test_a_page_hears_a_sign_of_life(server, monkeypatch):
+def test_a_page_hears_a_sign_of_life(server):
     async def listen():
-        socket = await connect(server)
-        await read(socket)
-        beat = await asyncio.wait_for(socket.read_message(), PATIENCE)
-        socket.close()
-        return json.loads(beat)
+        async with connect(server) as socket:
+            await read(socket)
+            return json.loads(await asyncio.wait_for(socket.read_message(), PATIENCE))
 
     assert run(listen()) == {"type": "beat"}
 
@@ -221,12 +223,11 @@ def test_waiting_without_a_page_ends(server):
 
 def test_waiting_for_a_page_that_does_not_draw_ends(server):
     async def idle():
-        socket = await connect(server)
-        await read(socket)
-        loop = asyncio.get_running_loop()
-        with pytest.raises(TimeoutError, match="a page has not drawn the latest state"):
-            await loop.run_in_executor(None, server.wait, 0.05)
-        socket.close()
+        async with connect(server) as socket:
+            await read(socket)
+            loop = asyncio.get_running_loop()
+            with pytest.raises(TimeoutError, match="a page has not drawn the latest state"):
+                await loop.run_in_executor(None, server.wait, 0.05)
 
     run(idle())
 
@@ -247,11 +248,9 @@ def test_a_closed_server_is_gone_and_says_so():
 
 def test_a_page_is_told_good_bye(server):
     async def last_words():
-        socket = await connect(server)
-        await read(socket)
-        await asyncio.get_running_loop().run_in_executor(None, server.close)
-        while (text := await asyncio.wait_for(socket.read_message(), PATIENCE)) is not None:
-            assert isinstance(text, str)
+        async with connect(server) as socket:
+            await read(socket)
+            await asyncio.get_running_loop().run_in_executor(None, server.close)
         return socket.close_code
 
     assert run(last_words()) == 1001

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -12,12 +12,14 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     PlainValidator,
     ValidationError,
     WithJsonSchema,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
 from dhkit.errors import DescriptionError
 
@@ -57,10 +59,28 @@ def _one_or_two(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
+class _Also:
+    """Tells the JSON Schema what a field takes besides its type, before its validator brings it into that."""
+
+    def __init__(self, other: Callable[[JsonSchemaValue], JsonSchemaValue]) -> None:
+        self.other = other
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        own = handler(schema)
+        return {"anyOf": [own, self.other(own)]}
+
+
+NUMBER = {"type": ["number", "string"]}
+THREE_BY_THREE = {
+    "type": "array",
+    "items": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
+    "minItems": 3,
+    "maxItems": 3,
+}
 Number = Annotated[
     Entry,
     PlainValidator(_entry),
-    WithJsonSchema({"type": ["number", "string"], "description": "a number in the file's units, or text in SI"}),
+    WithJsonSchema(NUMBER | {"description": "a number in the file's units, or text in SI"}),
 ]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -96,7 +116,7 @@ class BodyForm(Form):
 
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
-    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia)] = InertiaForm()
+    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _Also(lambda _: THREE_BY_THREE)] = InertiaForm()
     unphysical: bool = False
 
 
@@ -110,14 +130,7 @@ class DriveForm(Form):
         list[Number],
         BeforeValidator(_one_or_two),
         Field(min_length=1, max_length=2),
-        WithJsonSchema(
-            {
-                "anyOf": [
-                    {"type": ["number", "string"]},
-                    {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 2},
-                ]
-            }
-        ),
+        _Also(lambda _: NUMBER),
     ] = [0]
 
 
@@ -162,6 +175,7 @@ Shapes = Annotated[
     list[ShapeForm],
     BeforeValidator(_one_or_several),
     Field(max_length=50, default=[]),
+    _Also(lambda several: several["items"]),
 ]
 
 

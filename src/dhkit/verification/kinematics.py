@@ -56,9 +56,9 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     ModelError
         Pinocchio is not installed, or refuses the model.
     """
+    model = pinocchio_model(description)
     import pinocchio as pin
 
-    model = pinocchio_model(description)
     q = random_states(description, samples, seed)
     T_world_frames, T_world_tool = world_to_frames(description, q), world_to_tool(description, q)
     J_world, J_tool = jacobian(description, q), jacobian(description, q, frame="tool")

@@ -50,10 +50,9 @@ def part_object(part: Part, name: str) -> Lowered:
     ModelError
         A mesh without a readable STL, OBJ or DAE file.
     """
-    from meshcat.geometry import MeshPhongMaterial
-
+    meshcat = _meshcat()
     side = DOUBLE if isinstance(part.geometry, Mesh) else FRONT
-    material = MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
+    material = meshcat.MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
     return _lowered("Mesh", _geometry(part), material, name)
 
 
@@ -80,16 +79,15 @@ def triad_object(length: float, name: str) -> Lowered:
     name
         As for :func:`part_object`.
     """
-    from meshcat.geometry import MeshBasicMaterial, TriangularMeshGeometry
-
+    meshcat = _meshcat()
     vertices, faces = _arrow()
     along = [np.roll(vertices, axis, axis=1) for axis in range(3)]  # cyclic: x, y and z keep the triangles' sense
-    geometry = TriangularMeshGeometry(
+    geometry = meshcat.TriangularMeshGeometry(
         length * np.concatenate(along),
         np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
         np.repeat(AXIS_COLORS, len(vertices), axis=0),
     )
-    material = MeshBasicMaterial(vertexColors=True, depthTest=False, transparent=True)
+    material = meshcat.MeshBasicMaterial(vertexColors=True, depthTest=False, transparent=True)
     return _lowered("Mesh", geometry, material, name)
 
 
@@ -116,8 +114,7 @@ def grid_object(size: float, name: str) -> Lowered:
     name
         As for :func:`part_object`.
     """
-    from meshcat.geometry import LineBasicMaterial, PointsGeometry
-
+    meshcat = _meshcat()
     step = grid_step(size)
     lines = int(np.ceil(1.3 * size / step))
     half = lines * step
@@ -130,22 +127,29 @@ def grid_object(size: float, name: str) -> Lowered:
     points = np.concatenate([segments, segments[..., [1, 0, 2]]]).reshape(-1, 3)
     opacity = np.clip(1 - np.hypot(points[:, 0], points[:, 1]) / half, 0, 1)
     colors = np.concatenate([np.ones((3, len(points))), opacity[None]])
-    geometry = PointsGeometry(points.T.astype(np.float32), colors.astype(np.float32))
-    return _lowered("LineSegments", geometry, LineBasicMaterial(vertexColors=True, transparent=True), name)
+    geometry = meshcat.PointsGeometry(points.T.astype(np.float32), colors.astype(np.float32))
+    return _lowered("LineSegments", geometry, meshcat.LineBasicMaterial(vertexColors=True, transparent=True), name)
+
+
+def _meshcat() -> Any:
+    """Return meshcat's geometry module; its package imports half a second of things, and warns about one of them."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=DeprecationWarning, message="zmq")
+        from meshcat import geometry
+    return geometry
 
 
 def _lowered(kind: str, geometry: Any, material: Any, name: str) -> Lowered:
-    import meshcat.geometry
-
-    drawn = getattr(meshcat.geometry, kind)(geometry, material)
+    drawn = getattr(_meshcat(), kind)(geometry, material)
     geometry.uuid, material.uuid, drawn.uuid = f"{name}/geometry", f"{name}/material", name
     lowered: Lowered = drawn.lower()
     return lowered
 
 
 def _geometry(part: Part) -> Any:
-    from meshcat import geometry as meshcat
-
+    meshcat = _meshcat()
     shape = part.geometry
     match shape:
         case Mesh():
@@ -164,8 +168,7 @@ def _geometry(part: Part) -> Any:
 
 
 def _mesh(part: Part, shape: Mesh) -> Any:
-    from meshcat import geometry as meshcat
-
+    meshcat = _meshcat()
     readers = {
         ".stl": meshcat.StlMeshGeometry,
         ".obj": meshcat.ObjMeshGeometry,
@@ -187,9 +190,7 @@ def _mesh(part: Part, shape: Mesh) -> Any:
 
 def _lathe(outline: Array) -> Any:
     """Return three.js's surface of revolution about y of an outline, shape (k, 2): distance from y, height."""
-    from meshcat.geometry import Geometry
-
-    class Lathe(Geometry):  # type: ignore[misc]  # meshcat-python has none
+    class Lathe(_meshcat().Geometry):  # type: ignore[misc]  # meshcat-python has none
         def lower(self, object_data: Lowered) -> Lowered:
             points = [{"x": float(x), "y": float(y)} for x, y in outline]
             return {"uuid": self.uuid, "type": "LatheGeometry", "points": points, "segments": ROUND_SIDES}

@@ -1,0 +1,114 @@
+"""Robot files that describe no robot, each with what its refusal must say."""
+
+JOINT = """
+[[joint]]
+name = "elbow"
+type = "revolute"
+a = 0.5
+alpha = 0
+d = 0
+theta = 0
+"""
+HEAD = """
+format = 1
+name = "bad"
+convention = "standard"
+"""
+GOOD = HEAD + JOINT
+BODY = "body = { mass = 1, com = [0, 0, 0], inertia = { xx = 1, yy = 1, zz = 1 } }\n"
+
+
+def changed(old: str, new: str, text: str = GOOD) -> str:
+    assert old in text
+    return text.replace(old, new)
+
+
+BAD = {
+    "wrong type": (changed("a = 0.5", "a = [1]"), r"joint 1 \(elbow\): a: found \[1\]; expected a number"),
+    "boolean": (changed("a = 0.5", "a = true"), "expected a number"),
+    "date": (changed("a = 0.5", "a = 2020-01-01"), "expected a number"),
+    "text where a table belongs": (GOOD + 'body = "heavy"', "body: .*expected a table"),
+    "unknown joint key": (changed("alpha", "alfa"), "unknown key 'alfa'; did you mean 'alpha'|key 'alpha' is missing"),
+    "unknown top key": (changed("format = 1", "format = 1\nauthor = 'x'"), "unknown key 'author'"),
+    "unknown body key": (GOOD + changed("mass", "weight", BODY), "body"),
+    "unknown inertia key": (GOOD + changed("zz = 1", "zz = 1, ixx = 2", BODY), "unknown key 'ixx'"),
+    "missing theta": (changed("theta = 0\n", ""), r"joint 1 \(elbow\): key 'theta' is missing"),
+    "missing format": (changed("format = 1", ""), "key 'format' is missing"),
+    "missing name": (changed('name = "bad"', ""), "key 'name' is missing"),
+    "missing convention": (changed('convention = "standard"', ""), "key 'convention' is missing"),
+    "missing mass": (GOOD + "body = { com = [0, 0, 0] }", "body: key 'mass' is missing"),
+    "NaN": (changed("a = 0.5", "a = nan"), "a: .*not finite"),
+    "infinity": (changed("a = 0.5", "a = inf"), "a: .*not finite"),
+    "minus infinity": (changed("a = 0.5", "a = -inf"), "a: .*not finite"),
+    "1e400": (changed("a = 0.5", "a = 1e400"), "beyond the range of a double"),
+    "1e400 in quotes": (changed("a = 0.5", 'a = "1e400"'), "beyond the range of a double"),
+    "a huge exponent": (changed("a = 0.5", "a = 1e99999999999999999999"), "beyond the range of a double"),
+    "a long integer": (changed("a = 0.5", "a = 1" + "0" * 5000), "not TOML|beyond the range"),
+    "negative mass": (GOOD + changed("mass = 1", "mass = -1", BODY), r"body.mass is -1 kg; expected none below 0"),
+    "impossible inertia": (GOOD + changed("xx = 1", "xx = -1", BODY), "eigenvalue -1 kg m"),
+    "impossible products": (GOOD + changed("xx = 1", "xx = 1, xy = 2", BODY), "eigenvalue -1 kg m"),
+    "six-list inertia": (GOOD + "body = { mass = 1, inertia = [1, 0, 0, 1, 0, 1] }", "inertia: .*order plain lists"),
+    "unsymmetric inertia": (
+        GOOD + "body = { mass = 1, inertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]] }", "inertia: .*symmetric matrix",
+    ),
+    "com of two": (GOOD + changed("com = [0, 0, 0]", "com = [0, 0]", BODY), "com: found 2 entries; expected at least 3"),
+    "limits reversed": (GOOD + "limits = [1, -1]", r"limits \[1, -1\] are the wrong way round"),
+    "one limit": (GOOD + "limits = [1]", "limits: found 1 entries"),
+    "negative velocity": (GOOD + "velocity = -1", "velocity is -1; expected a positive"),
+    "zero effort": (GOOD + "effort = 0", "effort is 0; expected a positive"),
+    "gear zero": (GOOD + "drive = { gear = 0 }", "drive.gear is 0"),
+    "negative rotor": (GOOD + "drive = { rotor_inertia = -1 }", "drive.rotor_inertia is -1"),
+    "coulomb signs": (GOOD + "drive = { coulomb = [-1, 1] }", r"drive.coulomb is \[-1, 1\]"),
+    "unknown unit": (changed("format = 1", "format = 1\nunits = { length = 'ft' }"), "units.length: found 'ft'; expected"),
+    "unknown type": (changed("revolute", "spherical"), "type: found 'spherical'; expected 'revolute' or 'prismatic'"),
+    "unknown convention": (changed("standard", "craig"), "convention: found 'craig'"),
+    "undefined parameter": (changed("a = 0.5", 'a = "l1"'), r"joint 1 \(elbow\): a: unknown name 'l1'"),
+    "undefined in parameters": (GOOD + '[parameters]\nl1 = "2*l2"', "parameters.l1: unknown name 'l2'"),
+    "parameter cycle": (GOOD + '[parameters]\nl1 = "l2"\nl2 = "l3"\nl3 = "l1"', "l1 -> l2 -> l3 -> l1 is a cycle"),
+    "parameter is itself": (GOOD + '[parameters]\nl1 = "l1"', "l1 -> l1 is a cycle"),
+    "parameter named pi": (GOOD + "[parameters]\npi = 3", "'pi' is taken"),
+    "parameter with a hyphen": (GOOD + "[parameters]\n'l-1' = 3", "'l-1' is no name"),
+    "division by a zero parameter": (changed("a = 0.5", 'a = "1/l1"') + "[parameters]\nl1 = 0", "a: division by zero"),
+    "import": (changed("a = 0.5", "a = \"__import__('os').system('touch pwned')\""), "unexpected character"),
+    "tower of powers": (changed("a = 0.5", 'a = "10**10**10"'), "a: "),
+    "10,000 brackets": (changed("a = 0.5", f'a = "{"(" * 10_000}1{")" * 10_000}"'), "characters"),
+    "4,000 brackets": (changed("a = 0.5", f'a = "{"(" * 4_000}1{")" * 4_000}"'), "nested more than"),
+    "a thousand expansions": (
+        HEAD + "[parameters]\n" + "\n".join(f'p{i} = "(p{i + 1}+p{i + 2}+1)^9"' for i in range(150)) + "\np150 = 1\np151 = 1\n" + JOINT,
+        "too many terms|too long|more than",
+    ),
+    "deeply nested TOML": (GOOD + "limits = " + "[" * 5000 + "]" * 5000, "nested too deep|not TOML"),
+    "deeply nested tables": (GOOD + "body = " + "{a=" * 3000 + "1" + "}" * 3000, "nested too deep|not TOML"),
+    "deeply dotted keys": (GOOD + "a" + ".a" * 50_000 + " = 1", "nested too deep"),
+    "not TOML": ("<robot/>", "not TOML"),
+    "duplicate key": (GOOD + "a = 2", "not TOML"),
+    "empty": ("", "key 'format' is missing"),
+    "mesh outside the folder": (GOOD + 'shape = { mesh = "../../etc/passwd" }', "mesh is '../../etc/passwd'"),
+    "absolute mesh": (GOOD + 'shape = { mesh = "/etc/passwd" }', "expected a relative path"),
+    "mesh by URL": (GOOD + 'shape = { mesh = "file:///etc/passwd" }', "expected a relative path"),
+    "mesh by backslash": (GOOD + "shape = { mesh = '..\\..\\x.stl' }", "expected a relative path"),
+    "two geometries": (GOOD + 'shape = { mesh = "a.stl", box = [1, 1, 1] }', "exactly one of"),
+    "no geometry": (GOOD + 'shape = { color = "#ffffff" }', "exactly one of"),
+    "negative box": (GOOD + "shape = { box = [1, -1, 1] }", r"shape.box\[1\] is -1"),
+    "bad color": (GOOD + 'shape = { box = [1, 1, 1], color = "red" }', "color is 'red'; expected '#rrggbb'"),
+    "zero joints": (HEAD + "joint = []", "joint: found 0 entries; expected at least 1"),
+    "no joints": (HEAD, "key 'joint' is missing"),
+    "200 joints": (HEAD + JOINT.replace('name = "elbow"\n', "") * 200, "joint: found 200 entries; expected at most 32"),
+    "joint is a table": (HEAD + "joint = { a = 1 }", "joint"),
+    "unknown format": (changed("format = 1", "format = 2"), "format: found 2; expected 1"),
+    "format as text": (changed("format = 1", 'format = "1"'), "format: found '1'; expected 1"),
+    "same name twice": (GOOD + JOINT, "joint 2: name 'elbow' is another joint's already"),
+    "reserved name": (changed("elbow", "link1"), "'link1' is taken"),
+    "name with a slash": (changed('"bad"', '"../bad"'), "name: found '../bad'"),
+    "configuration too short": (GOOD + "[configurations]\nready = []", "configurations.ready: 0 numbers; expected 1"),
+    "configuration of text": (GOOD + '[configurations]\nready = ["q"]', r"configurations.ready\[0\]: unknown name 'q'"),
+    "assumed what": (GOOD + 'assumed = ["everything"]', r"assumed\[0\]: found 'everything'"),
+    "gravity of two": (changed("format = 1", "format = 1\ngravity = [0, 0]"), "gravity: found 2 entries"),
+}  # fmt: skip
+
+BAD_BYTES = {
+    "binary": (bytes(range(256)) * 10, "not UTF-8 text"),
+    "wrong encoding": (GOOD.replace("bad", "bäd").encode("utf-16"), "not UTF-8 text"),
+    "latin-1": (GOOD.replace("bad", "bäd").encode("latin-1"), "not UTF-8 text"),
+    "null bytes": (b"\0" * 100, "not TOML"),
+}

@@ -1,0 +1,118 @@
+"""The command as a person and as a machine use it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dhkit import Arm, robots
+from dhkit.cli import main
+
+
+@pytest.fixture
+def dhkit(capsys):
+    """Run the command in this process; return its status, stdout and stderr."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as exit:
+            main(arguments)
+        out, err = capsys.readouterr()
+        return exit.value.code, out, err
+
+    return run
+
+
+def test_robots_are_listed(dhkit):
+    status, out, err = dhkit("robots")
+    assert (status, err) == (0, "")
+    assert all(name in out for name in robots())
+    listed = json.loads(dhkit("robots", "--json")[1])
+    assert [robot["name"] for robot in listed] == list(robots())
+
+
+@pytest.mark.parametrize("name", robots())
+def test_info_shows_what_the_robot_is(dhkit, name):
+    status, out, err = dhkit("info", name)
+    assert (status, err) == (0, "")
+    arm = Arm.load(name)
+    assert str(arm.dh) in out
+    assert "m/s²" in out
+    assert "[kg]" in out
+    for warning in arm.description.warnings:
+        assert warning in out
+    facts = json.loads(dhkit("info", name, "--json")[1])
+    assert facts["n"] == arm.n
+    assert facts["joints"][0]["alpha"] == arm.description.numbers.alpha[0]
+
+
+def test_fk_takes_configurations_expressions_and_degrees(dhkit):
+    arm = Arm.load("puma560")
+    expected = arm.fk(arm.configurations["ready"])
+    for arguments in (
+        ["ready"], ["0", "pi/2", "-pi/2", "0", "0", "0"], ["0,90,-90,0,0,0", "--degrees"], ["0", "90", "-90", "0", "0", "0", "--degrees"],
+    ):  # fmt: skip
+        status, out, _ = dhkit("fk", "puma560", *arguments, "--json")
+        assert status == 0
+        assert np.allclose(json.loads(out)["T"], expected, atol=1e-15)
+    status, out, _ = dhkit("fk", "puma560", "ready", "--frames")
+    assert "frame 6" in out
+    assert "1.535430" in out
+
+
+def test_build_writes_a_urdf_with_its_meshes(dhkit, tmp_path):
+    status, out, _ = dhkit("build", "puma560", "-o", str(tmp_path / "arm.urdf"))
+    assert status == 0
+    assert out.count("wrote") == 8
+    assert (tmp_path / "meshes" / "puma560" / "base.stl").is_file()
+
+
+def test_verify_says_how_well_and_fails_where_it_does_not(dhkit, monkeypatch):
+    status, out, _ = dhkit("verify", "ur5", "--samples", "10")
+    assert status == 0
+    assert "agrees" in out
+    report = json.loads(dhkit("verify", "ur5", "--samples", "10", "--json")[1])
+    assert report["ok"]
+    assert {a["quantity"] for a in report["agreements"]} == {
+        "frame positions", "frame rotations", "Jacobian (world)", "Jacobian (tool)",
+    }  # fmt: skip
+    # Our frames off by a nanometre: the check must see it.
+    import dhkit.verification.kinematics as kinematics
+
+    right = kinematics.world_to_tool
+    monkeypatch.setattr(kinematics, "world_to_tool", lambda arm, q: right(arm, q) + 1e-9)
+    status, out, _ = dhkit("verify", "ur5", "--samples", "10")
+    assert status == 1
+    assert "DISAGREES at q" in out
+
+
+def test_the_schema_is_printed(dhkit):
+    assert json.loads(dhkit("schema", "robot")[1])["title"] == "dhkit robot file, format 1"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["info", "pume560"], "no robot 'pume560' in the library; did you mean 'puma560'?"),
+        (["info", "none.toml"], "none.toml: no such file"),
+        (["info"], "Missing argument"),
+        (["nonsense"], "No such command"),
+        (["info", "ur5", "--jsn"], "No such option"),
+        (["fk", "ur5", "raedy"], "no configuration 'raedy'; it has zero, ready"),
+        (["fk", "ur5", "1", "2"], "2 joint values; expected 6"),
+        (["fk", "planar2r", "nan", "1"], "unknown name 'nan'"),
+        (["fk", "planar2r", "1/0", "1"], "division by zero"),
+        (["verify", "ur5", "--samples", "0"], "Invalid value"),
+        (["verify", "ur5", "--samples", "many"], "Invalid value"),
+        (["build", "ur5", "-o", "/nowhere/at/all.urdf"], "no such folder"),
+        (["schema", "cake"], "no schema 'cake'; expected robot"),
+        (["demo", "--robot", "cake"], "no robot 'cake'"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(dhkit, arguments, complaint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = dhkit(*arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("dhkit: ")
+    assert err.count("\n") == 1
+    assert complaint in err
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,90 @@
+"""The front door: a value, shared freely; every method leads somewhere."""
+
+import copy
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import dhkit
+from dhkit import Arm
+
+
+@pytest.mark.parametrize("name", dhkit.robots())
+def test_an_arm_is_a_value(name):
+    arm = Arm.load(name)
+    assert arm.fk(np.zeros(arm.n)).shape == (4, 4)
+    arm.model  # noqa: B018 - what is cached must not get into copies
+    for other in (pickle.loads(pickle.dumps(arm)), copy.copy(arm), copy.deepcopy(arm), Arm(arm.description)):
+        assert other == arm
+        assert hash(other) == hash(arm)
+        assert np.array_equal(other.fk(np.ones(arm.n)), arm.fk(np.ones(arm.n)))
+    assert arm != Arm.load("planar2r" if name != "planar2r" else "planar3r")
+    assert arm != name
+
+
+def test_ten_threads_may_use_one_arm():
+    arm = Arm.load("puma560").with_tool(dhkit.pose((0, 0, 0.1)))  # nothing computed yet
+    q = np.random.default_rng(0).uniform(-3, 3, (200, 6))
+
+    def work(_):
+        return arm.fk(q), arm.jacobian(q), arm.frames(q), arm.model.nq, str(arm.dh), arm.verify(3).ok
+
+    with ThreadPoolExecutor(10) as pool:
+        results = list(pool.map(work, range(20)))
+    for result in results:
+        assert all(np.array_equal(a, b) for a, b in zip(result[:3], results[0][:3], strict=True))
+        assert result[3:] == (6, results[0][4], True)
+
+
+def test_nothing_in_an_arm_can_be_changed():
+    arm = Arm.load("puma560")
+    with pytest.raises(ValueError, match="read-only"):
+        arm.configurations["ready"][0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        arm.description.numbers.a[0] = 1.0
+    with pytest.raises(AttributeError):
+        arm.description.name = "other"
+    with pytest.raises(AttributeError):
+        arm.name = "other"
+    model = arm.model
+    model.gravity.linear = np.zeros(3)
+    assert np.array_equal(arm.model.gravity.linear, [0, 0, -9.81])
+
+
+def test_arms_come_from_the_library_from_files_and_from_tables(tmp_path):
+    from dhkit.description import write_robot
+
+    arm = Arm.load("planar2r")
+    write_robot(arm.description, tmp_path / "mine.toml")
+    assert Arm.load(tmp_path / "mine.toml") == arm
+    assert Arm.load(str(tmp_path / "mine.toml")) == arm
+    assert Arm.from_dh([(0, 0, 1, 0)]).n == 1
+    with pytest.raises(dhkit.DescriptionError, match="no such file"):
+        Arm.load(tmp_path / "none.toml")
+    with pytest.raises(dhkit.DescriptionError, match="URDF"):
+        Arm.load("arm.urdf")
+
+
+def test_new_arms_leave_the_old_one_alone():
+    arm = Arm.load("planar3r")
+    before = pickle.dumps(arm)
+    assert arm.lock({0: 0.1}).n == 2
+    assert arm.with_payload(1.0, (0.1, 0, 0)).description.numbers.mass[2] > arm.description.numbers.mass[2]
+    assert arm.with_parameters(l1=2).description.numbers.a[0] == 2
+    assert arm.with_uniform_links([1, 2, 3]).description.numbers.mass.tolist() == [1, 2, 3]
+    assert arm.with_base(dhkit.pose((1, 0, 0))).fk(np.zeros(3))[0, 3] == arm.fk(np.zeros(3))[0, 3] + 1
+    assert pickle.dumps(arm) == before
+    assert repr(arm) == "<Arm planar3r: RRR, standard DH>"
+    assert "<table>" in arm._repr_html_()
+    assert arm.urdf().startswith("<?xml")
+    assert arm.jacobian_dot(np.zeros(3), np.ones(3), frame="tool").shape == (6, 3)
+
+
+def test_the_public_names_are_there():
+    assert set(dhkit.__all__) <= set(dir(dhkit))
+    for name in dhkit.__all__:
+        assert getattr(dhkit, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        dhkit.nothing  # noqa: B018

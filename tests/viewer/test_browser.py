@@ -1,0 +1,278 @@
+"""The page in a headless Chromium: it shows the arm, where it should be, offline and live, and serves a person."""
+
+import html
+import json
+import re
+import time
+
+import numpy as np
+import pytest
+from viewer.pictures import MINIMUM, centre, green, orange, shows_the_arm
+from viewer.test_view import motion
+
+from dhkit.description import library_robot, world_to_tool
+from dhkit.model.shapes import link_parts
+from dhkit.viewer import View
+from dhkit.viewer.drawables import part_transform
+from dhkit.viewer.page import offline_page
+from dhkit.viewer.protocol import encode_pose, encode_scene
+from dhkit.viewer.scene import build_scene, node_transforms
+
+PIXELS = 4.0  # a ball's outline is a little off its centre in perspective
+FLOAT32 = 2e-6  # m, on an arm of 2 m
+LOST = 2.0  # s until a page says that the connection is lost
+STATES = [(0.4, 0.2), (-0.9, 0.9), (2.2, -0.3)]
+
+
+@pytest.fixture
+def page(chromium):
+    opened = chromium.page()
+    yield opened
+    opened.close()
+
+
+def open_offline(page, view, folder):
+    page.open(f"file://{view.save_html(folder / 'arm.html')}")
+
+
+def hosts(page):
+    """Return the addresses that a page has asked for outside itself."""
+    return [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))]
+
+
+def projected(page, point):
+    """Return where a point of the world is on the picture, from the camera's matrices alone; px."""
+    camera = page.evaluate("(c => [c.projectionMatrix.elements, c.matrixWorldInverse.elements])(dhkit.stage.viewer.camera)")
+    projection, view = (np.reshape(matrix, (4, 4)).T for matrix in camera)
+    x, y, z = point
+    clip = projection @ view @ (x, z, -y, 1)
+    width, height = page.evaluate("[innerWidth, innerHeight]")
+    return np.array([(1 + clip[0] / clip[3]) * width / 2, (1 - clip[1] / clip[3]) * height / 2])
+
+
+def check_tool(page, picture, arm, q):
+    expected = projected(page, world_to_tool(arm, q)[:3, 3])
+    assert np.linalg.norm(centre(green(picture)) - expected) < PIXELS
+
+
+def test_an_offline_file_shows_the_arm_and_asks_nobody(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    view.show(STATES[0])
+    open_offline(page, view, tmp_path)
+    picture = page.screenshot()
+    assert shows_the_arm(picture)
+    check_tool(page, picture, signal_arm, STATES[0])
+    assert hosts(page) == []
+    assert page.errors == []
+
+
+def test_an_empty_scene_shows_no_arm(page, signal_arm, tmp_path):
+    scene, q = build_scene(signal_arm, ()), np.zeros(2)
+    messages = [encode_scene(scene), encode_pose(q, node_transforms(signal_arm, q))]
+    (tmp_path / "empty.html").write_text(offline_page(messages, "empty"))
+    page.open(f"file://{tmp_path}/empty.html")
+    picture = page.screenshot()
+    assert not shows_the_arm(picture)
+    assert green(picture).sum() < MINIMUM / 10
+
+
+def test_a_live_page_follows(page, signal_arm):
+    with View(signal_arm) as view:
+        page.open(view.url)
+        for q in STATES:
+            view.show(q)
+            view.wait()
+            picture = page.screenshot()
+            assert shows_the_arm(picture)
+            check_tool(page, picture, signal_arm, q)
+        assert page.errors == []
+        own = view.url.removeprefix("http://").split("/")[0]
+        assert {url.split("/")[2] for url in hosts(page)} == {own}
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford"])
+def test_every_drawn_part_stands_where_python_says(page, name):
+    arm, in_view = library_robot(name), np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    q = np.random.default_rng(1).uniform(-1, 1, arm.n)
+    parts = link_parts(arm)
+    with View(arm) as view:
+        view.show(q)
+        page.open(view.url)
+        view.wait()
+        drawn = page.evaluate(
+            "dhkit.stage.nodes.map(node => { node.updateMatrixWorld(true); return node.children"
+            ".filter(c => c.name.startsWith('part')).map(c => [c.name, c.matrixWorld.elements]); })"
+        )
+    nodes, count = node_transforms(arm, q), {}
+    for part in parts:
+        k = count[part.link] = count.get(part.link, -1) + 1
+        seen = np.reshape(dict(drawn[part.link])[f"part{k}"], (4, 4)).T
+        assert np.abs(seen - in_view @ nodes[part.link] @ part_transform(part)).max() < FLOAT32
+    assert sum(map(len, drawn)) == len(parts)
+
+
+def test_the_page_invents_no_nodes(page):
+    arm = library_robot("planar2r")
+    with View(arm) as view:
+        page.open(view.url)
+        names = page.evaluate("Object.keys(dhkit.stage.viewer.scene_tree.children.dhkit.children)")
+    assert sorted(names) == ["grid", "link0", "link1", "link2", "tool"]
+
+
+def test_a_motion_plays_pauses_and_draws_its_path(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    view.play(([0, 4], [(0.3, 0.0), (1.8, 0.9)]))
+    open_offline(page, view, tmp_path)
+    page.until("dhkit.player.time > 0.1")
+    page.press(" ")
+    assert page.evaluate("dhkit.player.playing") is False
+    seen = []
+    for time_ in (0.0, 1.0, 2.5, 4.0):
+        page.evaluate(f"dhkit.player.seek({time_})")
+        picture = page.screenshot()
+        q = np.array([0.3, 0.0]) + time_ / 4 * np.array([1.5, 0.9])
+        check_tool(page, picture, signal_arm, q)
+        seen.append(orange(picture)[:620].sum())
+        degrees = page.evaluate("[...document.querySelectorAll('#joints td')].map(cell => cell.textContent)")
+        assert [float(x[:-1].replace("\u2212", "-")) for x in degrees] == pytest.approx(np.degrees(q), abs=0.051)
+    assert seen == sorted(seen)
+    assert seen[0] < 50 < seen[1] < seen[2] < seen[3]
+    page.press("t")
+    assert orange(page.screenshot())[:620].sum() < 50
+    page.press(" ")  # from the end: once more
+    page.until("dhkit.player.playing && dhkit.player.time < 3.5")
+    assert hosts(page) == []
+
+
+def test_the_whole_motion_is_in_view(page, tmp_path):
+    arm = library_robot("stanford")
+    view = View(arm)
+    view.play(motion(arm, seed=4))
+    open_offline(page, view, tmp_path)
+    page.press(" ")
+    for time_ in np.linspace(0, 2, 5):
+        page.evaluate(f"dhkit.player.seek({time_})")
+        page.settle()
+        places = page.evaluate("dhkit.stage.nodes.map(node => dhkit.stage.project(node.position))")
+        for place in places:
+            assert 0 < place["x"] < 900
+            assert 0 < place["y"] < 700
+
+
+def test_someone_who_asked_for_less_motion_gets_a_still(page, signal_arm, tmp_path):
+    page.scheme("light", motion="reduce")
+    view = View(signal_arm)
+    view.play(([0, 1], np.zeros((2, 2)) + [[0], [1]]))
+    open_offline(page, view, tmp_path)
+    page.settle()
+    assert page.evaluate("dhkit.player.playing") is False
+    assert page.evaluate("dhkit.player.time") == 0
+
+
+def test_frames_and_labels_come_on_request(page):
+    with View(library_robot("puma560")) as view:
+        page.open(view.url)
+        shown = "[...document.querySelectorAll('#labels span')].filter(s => s.offsetWidth).map(s => s.textContent)"
+        triads = "dhkit.stage.triads.filter(triad => triad && triad.visible).length"
+        assert page.evaluate(shown) == []
+        assert page.evaluate(triads) == 0
+        view.frames(True)
+        view.wait()
+        assert page.evaluate(shown) == ["0", "1", "2", "3", "4, 5, 6 = tool"]
+        assert page.evaluate(triads) == 7  # 6 is the tool's
+        page.press("f")
+        assert page.evaluate(shown) == []
+
+
+def test_a_lost_page_comes_back_with_the_latest_state(page, signal_arm):
+    with View(signal_arm) as view:
+        page.open(view.url)
+        server = view._server
+        for connected in tuple(server.pages):
+            server._loop.call_soon_threadsafe(connected.close)
+        view.show(STATES[1])
+        page.until("!document.getElementById('banner').hidden")
+        page.until("document.getElementById('banner').hidden")
+        view.wait()
+        check_tool(page, page.screenshot(), signal_arm, STATES[1])
+
+
+def test_a_page_says_when_python_is_gone(page, signal_arm):
+    view = View(signal_arm)
+    page.open(view.url)
+    started = time.monotonic()
+    view.close()
+    page.until("/lost/.test(document.getElementById('banner').textContent)")
+    assert time.monotonic() - started < LOST
+
+
+def test_a_notebook_shows_the_arm(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    frame = view._repr_html_().replace("<iframe", '<iframe sandbox="allow-scripts"')
+    (tmp_path / "notebook.html").write_text(f"<!doctype html><body>{frame}<script>document.body.dataset.ready=1</script>")
+    page.call("Page.navigate", url=f"file://{tmp_path}/notebook.html")
+    deadline = time.monotonic() + 20
+    while not shows_the_arm(page.screenshot()):
+        assert time.monotonic() < deadline, page.errors
+    assert hosts(page) == []
+
+
+@pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1200, 800), (844, 390)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal_arm, tmp_path, size, dark):
+    page.resize(*size)
+    page.scheme("dark" if dark else "light")
+    view = View(signal_arm, frames=True)
+    view.play(([0, 1], [STATES[0], STATES[1]]))
+    open_offline(page, view, tmp_path)
+    page.press(" ")
+    panels = page.evaluate(
+        "['readout', 'tools', 'player'].map(id => document.getElementById(id).getBoundingClientRect().toJSON())"
+    )
+    for panel in panels:
+        assert 0 <= panel["left"] < panel["right"] <= size[0]
+        assert 0 <= panel["top"] < panel["bottom"] <= size[1]
+    for k, a in enumerate(panels):
+        for b in panels[:k]:
+            across = a["left"] < b["right"] and b["left"] < a["right"]
+            assert not (across and a["top"] < b["bottom"] and b["top"] < a["bottom"])
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    unnamed = page.evaluate(
+        "[...document.querySelectorAll('input, select, button, summary')]"
+        ".filter(e => !(e.ariaLabel || e.textContent.trim())).map(e => e.outerHTML)"
+    )
+    assert unnamed == []
+    picture = page.screenshot()
+    assert shows_the_arm(picture)
+    assert (picture[size[1] // 2, 2].mean() < 80) is dark
+
+
+def test_the_whole_page_works_by_keyboard(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    view.play(([0, 1], [STATES[0], STATES[1]]))
+    open_offline(page, view, tmp_path)
+    page.press("End")
+    assert page.evaluate("dhkit.player.time") == 1
+    page.press("ArrowLeft")
+    assert page.evaluate("dhkit.player.time") == pytest.approx(1 - 1 / 30)
+    page.press("Home")
+    assert page.evaluate("dhkit.player.time") == 0
+    page.press("l")
+    assert page.evaluate("dhkit.player.loop") is True
+    names = []
+    for _ in range(9):
+        page.call("Input.dispatchKeyEvent", type="keyDown", key="Tab", code="Tab", windowsVirtualKeyCode=9)
+        names.append(page.evaluate("document.activeElement.id || document.activeElement.localName"))
+    assert names[:9] == ["summary", "frames", "trace", "reset", "play", "time", "speed", "loop", "body"]
+
+
+def test_a_name_cannot_become_markup(page, tmp_path):
+    from dataclasses import replace
+
+    arm = replace(library_robot("planar2r"), name="<img src=x onerror=alert(1)>")
+    view = View(arm)
+    open_offline(page, view, tmp_path)
+    assert page.evaluate("document.querySelector('h1').textContent") == arm.name
+    assert page.evaluate("document.images.length") == 0
+    assert html.escape(arm.name) in re.sub(r"\s+", " ", view.html())
+    assert json.dumps(hosts(page)) == "[]"
