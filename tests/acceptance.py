@@ -50,10 +50,16 @@ class Law:
 
     def rows(self) -> list[dict[str, object]]:
         return [
-            {"law": self.name, "quantity": q, "samples": self.size, "seen": seen, "required": required,
-             "holds": seen <= required}
+            {
+                "law": self.name,
+                "quantity": q,
+                "samples": self.size,
+                "seen": seen,
+                "required": required,
+                "holds": seen <= required,
+            }
             for q, (seen, required) in self.worst.items()
-        ]  # fmt: skip
+        ]
 
 
 class Recorder:

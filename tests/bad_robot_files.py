@@ -49,9 +49,13 @@ BAD = {
     "impossible products": (GOOD + changed("xx = 1", "xx = 1, xy = 2", BODY), "eigenvalue -1 kg m"),
     "six-list inertia": (GOOD + "body = { mass = 1, inertia = [1, 0, 0, 1, 0, 1] }", "inertia: .*order plain lists"),
     "unsymmetric inertia": (
-        GOOD + "body = { mass = 1, inertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]] }", "inertia: .*symmetric matrix",
+        GOOD + "body = { mass = 1, inertia = [[1, 2, 0], [0, 1, 0], [0, 0, 1]] }",
+        "inertia: .*symmetric matrix",
     ),
-    "com of two": (GOOD + changed("com = [0, 0, 0]", "com = [0, 0]", BODY), "com: found 2 entries; expected at least 3"),
+    "com of two": (
+        GOOD + changed("com = [0, 0, 0]", "com = [0, 0]", BODY),
+        "com: found 2 entries; expected at least 3",
+    ),
     "limits reversed": (GOOD + "limits = [1, -1]", r"limits \[1, -1\] are the wrong way round"),
     "one limit": (GOOD + "limits = [1]", "limits: found 1 entries"),
     "negative velocity": (GOOD + "velocity = -1", "velocity is -1; expected a positive"),
@@ -59,7 +63,10 @@ BAD = {
     "gear zero": (GOOD + "drive = { gear = 0 }", "drive.gear is 0"),
     "negative rotor": (GOOD + "drive = { rotor_inertia = -1 }", "drive.rotor_inertia is -1"),
     "coulomb signs": (GOOD + "drive = { coulomb = [-1, 1] }", r"drive.coulomb is \[-1, 1\]"),
-    "unknown unit": (changed("format = 1", "format = 1\nunits = { length = 'ft' }"), "units.length: found 'ft'; expected"),
+    "unknown unit": (
+        changed("format = 1", "format = 1\nunits = { length = 'ft' }"),
+        "units.length: found 'ft'; expected",
+    ),
     "unknown type": (changed("revolute", "spherical"), "type: found 'spherical'; expected 'revolute' or 'prismatic'"),
     "unknown convention": (changed("standard", "craig"), "convention: found 'craig'"),
     "undefined parameter": (changed("a = 0.5", 'a = "l1"'), r"joint 1 \(elbow\): a: unknown name 'l1'"),
@@ -74,7 +81,11 @@ BAD = {
     "10,000 brackets": (changed("a = 0.5", f'a = "{"(" * 10_000}1{")" * 10_000}"'), "characters"),
     "4,000 brackets": (changed("a = 0.5", f'a = "{"(" * 4_000}1{")" * 4_000}"'), "nested more than"),
     "a thousand expansions": (
-        HEAD + "[parameters]\n" + "\n".join(f'p{i} = "(p{i + 1}+p{i + 2}+1)^9"' for i in range(150)) + "\np150 = 1\np151 = 1\n" + JOINT,
+        HEAD
+        + "[parameters]\n"
+        + "\n".join(f'p{i} = "(p{i + 1}+p{i + 2}+1)^9"' for i in range(150))
+        + "\np150 = 1\np151 = 1\n"
+        + JOINT,
         "too many terms|too long|more than",
     ),
     "deeply nested TOML": (GOOD + "limits = " + "[" * 5000 + "]" * 5000, "nested too deep|not TOML"),
@@ -104,7 +115,7 @@ BAD = {
     "configuration of text": (GOOD + '[configurations]\nready = ["q"]', r"configurations.ready\[0\]: unknown name 'q'"),
     "assumed what": (GOOD + 'assumed = ["everything"]', r"assumed\[0\]: found 'everything'"),
     "gravity of two": (changed("format = 1", "format = 1\ngravity = [0, 0]"), "gravity: found 2 entries"),
-}  # fmt: skip
+}
 
 BAD_BYTES = {
     "binary": (bytes(range(256)) * 10, "not UTF-8 text"),

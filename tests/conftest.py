@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 
-import acceptance
 import pytest
-from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
 from hypothesis import HealthCheck, settings
+
+import acceptance
+from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
 
 settings.register_profile(
     "dhkit",

@@ -11,12 +11,10 @@ from hypothesis import strategies as st
 from dhkit.description import Body, Description, Drive, Inertia, from_dh, pose, with_base, with_tool
 from dhkit.expressions import exact
 
-length = st.one_of(st.just(0.0), st.floats(-1.0, 1.0), st.integers(-10**6, 10**6).map(lambda um: um * 1e-6))
+length = st.one_of(st.just(0.0), st.floats(-1.0, 1.0), st.integers(-(10**6), 10**6).map(lambda um: um * 1e-6))
 """m"""
 right_angle = st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi])
-near_right_angle = st.builds(
-    lambda side, off: side * np.pi / 2 + off, st.sampled_from([-1, 1]), st.floats(-1e-9, 1e-9)
-)
+near_right_angle = st.builds(lambda side, off: side * np.pi / 2 + off, st.sampled_from([-1, 1]), st.floats(-1e-9, 1e-9))
 angle = st.one_of(right_angle, near_right_angle, st.floats(-np.pi, np.pi), st.sampled_from(["pi/6", "-pi/4", "1e-9"]))
 """rad; what makes reading angles back out of matrices hard is drawn often"""
 
@@ -54,8 +52,10 @@ def random_body(rng: np.random.Generator) -> Body:
     levers = points - com
     I = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(masses, levers, strict=True))  # noqa: E741
     I = I + 0.01 * np.eye(3)  # noqa: E741
-    numbers = {key: exact(Fraction(float(I[ij]))) for key, ij in
-               {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}.items()}  # fmt: skip
+    numbers = {
+        key: exact(Fraction(float(I[ij])))
+        for key, ij in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}.items()
+    }
     return Body(exact(float(masses.sum())), tuple(exact(float(x)) for x in com), Inertia(**numbers))
 
 

@@ -4,7 +4,19 @@ import subprocess
 import sys
 import time
 
-HEAVY = ("numpy", "scipy", "pinocchio", "pydantic", "meshcat", "matplotlib", "trimesh", "tornado", "typer", "rich", "tomlkit")
+HEAVY = (
+    "numpy",
+    "scipy",
+    "pinocchio",
+    "pydantic",
+    "meshcat",
+    "matplotlib",
+    "trimesh",
+    "tornado",
+    "typer",
+    "rich",
+    "tomlkit",
+)
 
 WITHOUT_PINOCCHIO = """
 import sys

@@ -49,8 +49,11 @@ def test_fk_takes_configurations_expressions_and_degrees(dhkit):
     arm = Arm.load("puma560")
     expected = arm.fk(arm.configurations["ready"])
     for arguments in (
-        ["ready"], ["0", "pi/2", "-pi/2", "0", "0", "0"], ["0,90,-90,0,0,0", "--degrees"], ["0", "90", "-90", "0", "0", "0", "--degrees"],
-    ):  # fmt: skip
+        ["ready"],
+        ["0", "pi/2", "-pi/2", "0", "0", "0"],
+        ["0,90,-90,0,0,0", "--degrees"],
+        ["0", "90", "-90", "0", "0", "0", "--degrees"],
+    ):
         status, out, _ = dhkit("fk", "puma560", *arguments, "--json")
         assert status == 0
         assert np.allclose(json.loads(out)["T"], expected, atol=1e-15)
@@ -73,8 +76,11 @@ def test_verify_says_how_well_and_fails_where_it_does_not(dhkit, monkeypatch):
     report = json.loads(dhkit("verify", "ur5", "--samples", "10", "--json")[1])
     assert report["ok"]
     assert {a["quantity"] for a in report["agreements"]} == {
-        "frame positions", "frame rotations", "Jacobian (world)", "Jacobian (tool)",
-    }  # fmt: skip
+        "frame positions",
+        "frame rotations",
+        "Jacobian (world)",
+        "Jacobian (tool)",
+    }
     # Our frames off by a nanometre: the check must see it.
     import dhkit.verification.kinematics as kinematics
 

@@ -6,10 +6,11 @@ import sys
 import time
 
 import pytest
-from bad_robot_files import BAD, BAD_BYTES, BODY, GOOD
 
+from bad_robot_files import BAD, BAD_BYTES, BODY, GOOD
 from dhkit.description import from_toml, read_robot
 from dhkit.errors import DescriptionError
+
 
 def test_the_file_that_the_others_are_made_from_is_good():
     assert from_toml(GOOD + BODY).n == 1
@@ -73,8 +74,12 @@ def test_the_command_says_so_with_status_2_and_writes_nothing(name, tmp_path):
         arguments = [*command, "bad.toml", *(["0"] if command == ["fk"] else [])]
         done = subprocess.run(
             [sys.executable, "-c", "from dhkit.cli import main; main()", *arguments],
-            cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
-        )  # fmt: skip
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
         assert done.returncode == 2, done
         assert done.stdout == ""
         assert done.stderr.startswith("dhkit: bad.toml: ")

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from random_arms import states, tables
 
 from dhkit.description import (
     from_dh,
@@ -20,6 +19,7 @@ from dhkit.description import (
 )
 from dhkit.errors import DescriptionError
 from dhkit.expressions import PI
+from random_arms import states, tables
 
 ROUNDED = 3e-15
 
@@ -59,7 +59,7 @@ def test_parameters_change_the_arm_and_nothing_else():
         with_parameters(arm, l9=1)
     with pytest.raises(DescriptionError, match=r"l1 -> l2 -> l1 is a cycle"):
         with_parameters(arm, l1="l2", l2="l1")
-    with pytest.raises(DescriptionError, match="body.mass is -1"):
+    with pytest.raises(DescriptionError, match=r"body\.mass is -1"):
         with_parameters(arm, m1=-1)
 
 

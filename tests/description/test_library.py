@@ -21,10 +21,30 @@ from dhkit.description import (
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
 
-EXPECTED = (
-    "adept_viper_s850 al5d ax12_arm cart_pendulum cobra600 irb140 jaco kr5 kuka_kr30_3 pan_tilt panda planar2r planar3r "
-    "polar_rp puma560 puma560_akb puma560_cao puma560_cao_printed stanford ur10 ur3 ur5"
-).split()
+EXPECTED = [
+    "adept_viper_s850",
+    "al5d",
+    "ax12_arm",
+    "cart_pendulum",
+    "cobra600",
+    "irb140",
+    "jaco",
+    "kr5",
+    "kuka_kr30_3",
+    "pan_tilt",
+    "panda",
+    "planar2r",
+    "planar3r",
+    "polar_rp",
+    "puma560",
+    "puma560_akb",
+    "puma560_cao",
+    "puma560_cao_printed",
+    "stanford",
+    "ur10",
+    "ur3",
+    "ur5",
+]
 PUBLISHED_BODIES = {"puma560", "puma560_akb", "ur10", "panda"}
 ROUNDED = 1e-15  # of coordinates of about 1 m, a few roundings
 
@@ -118,7 +138,7 @@ def test_every_number_of_the_collected_data_is_here():
 
 
 def test_corkes_and_the_seeds_puma_are_the_same_kind_of_arm_with_other_numbers_and_the_shoulder_on_the_other_side():
-    """Same twists up to sign, so the same handedness of the wrist; lengths of two models of the 560, in two roundings."""
+    """Same twists up to sign, so the same handedness of the wrist; lengths of two models of the 560."""
     corke, cao = library_robot("puma560"), library_robot("puma560_cao")
     assert np.array_equal(np.abs(np.sin(corke.numbers.alpha)), np.abs(np.sin(cao.numbers.alpha)))
     # The waist's twist has the other sign: the seed's z1 points to +y0, Corke's to -y0; the offsets have too.
@@ -157,7 +177,7 @@ def test_the_seeds_table_is_corkes_with_its_own_lengths_and_three_joints_turned(
 
 
 def test_the_seeds_table_as_printed_only_lifts_the_base():
-    """d_2 in row 1 moves the arm along z0; in row 2 it is the shoulder's offset along z1. The tools differ by just that."""
+    """d_2 in row 1 moves the arm along z0, in row 2 along z1: the tools differ by just that."""
     printed, meant = library_robot("puma560_cao_printed"), library_robot("puma560_cao")
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (100, 6))
     d2 = float(exact(-6.75) * exact(0.0254))

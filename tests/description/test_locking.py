@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from random_arms import arms, states
 
 from dhkit.description import (
     library_robot,
@@ -21,6 +20,7 @@ from dhkit.description import (
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
 from dhkit.model import pinocchio_model
+from random_arms import arms, states
 
 AGREES = 1e-12
 held_values = st.one_of(
@@ -142,9 +142,16 @@ def test_names_and_places_mean_the_same():
 
 @pytest.mark.parametrize(
     ("joints", "complaint"),
-    [({6: 0}, "no joint 6"), ({-1: 0}, "no joint -1"), ({"knee": 0}, "no joint 'knee'"), ({2: np.nan}, "not finite"),
-     ({2: 0, "elbow": 0}, "given twice"), (dict.fromkeys(range(6), 0), "all 6 joints locked"), ({2: "x"}, "unknown name")],
-)  # fmt: skip
+    [
+        ({6: 0}, "no joint 6"),
+        ({-1: 0}, "no joint -1"),
+        ({"knee": 0}, "no joint 'knee'"),
+        ({2: np.nan}, "not finite"),
+        ({2: 0, "elbow": 0}, "given twice"),
+        (dict.fromkeys(range(6), 0), "all 6 joints locked"),
+        ({2: "x"}, "unknown name"),
+    ],
+)
 def test_what_cannot_be_locked_is_said(joints, complaint):
     with pytest.raises(DescriptionError, match=complaint):
         lock(library_robot("puma560"), joints)

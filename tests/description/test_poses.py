@@ -18,9 +18,11 @@ ORDERS = [
     for order in ("".join(axes), "".join(axes).lower())
 ]
 angle = st.one_of(
-    st.floats(-np.pi, np.pi), st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi]),
-    st.floats(-1e-7, 1e-7).map(lambda off: np.pi / 2 + off), st.floats(-1e-7, 1e-7),
-)  # fmt: skip
+    st.floats(-np.pi, np.pi),
+    st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi]),
+    st.floats(-1e-7, 1e-7).map(lambda off: np.pi / 2 + off),
+    st.floats(-1e-7, 1e-7),
+)
 
 
 def test_there_are_24_orders():

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given
-from random_arms import arms
 
 from dhkit.description import DHTable, Units, from_toml, library_robot, read_robot, robots, to_toml, write_robot
 from dhkit.expressions import PI, exact
+from random_arms import arms
 
 INCHES_AND_DEGREES = """
 format = 1

@@ -5,15 +5,26 @@ from importlib import resources
 
 import jsonschema
 import pytest
-from bad_robot_files import BAD
 
+from bad_robot_files import BAD
 from dhkit.description import robots
 from dhkit.description.schema import robot_schema
 
 STRUCTURAL = [
-    "wrong type", "unknown top key", "unknown inertia key", "missing theta", "missing convention", "missing mass",
-    "com of two", "unknown unit", "unknown type", "zero joints", "200 joints", "unknown format", "one limit",
-]  # fmt: skip
+    "wrong type",
+    "unknown top key",
+    "unknown inertia key",
+    "missing theta",
+    "missing convention",
+    "missing mass",
+    "com of two",
+    "unknown unit",
+    "unknown type",
+    "zero joints",
+    "200 joints",
+    "unknown format",
+    "one limit",
+]
 
 
 def test_the_schema_is_one():

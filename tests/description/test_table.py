@@ -55,7 +55,9 @@ def test_what_is_no_table_is_said(arguments, complaint):
 
 
 def test_a_table_of_symbols_prints_symbols():
-    arm = from_dh([("pi/3", "l1 + 3*mm", 0, 0.3), (0, 0, 0, 0)], kinds="RP", parameters={"l1": 1}, convention="modified")
+    arm = from_dh(
+        [("pi/3", "l1 + 3*mm", 0, 0.3), (0, 0, 0, 0)], kinds="RP", parameters={"l1": 1}, convention="modified"
+    )
     text = str(DHTable.of(arm))
     assert "q1 + 60°" in text
     assert "l1 + 0.003" in text

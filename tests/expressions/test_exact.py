@@ -21,9 +21,7 @@ rationals = st.fractions(min_value=-100, max_value=100, max_denominator=1000)
 
 @st.composite
 def expressions(draw):
-    leaf = st.one_of(
-        rationals.map(Expression.number), st.sampled_from(NAMES).map(Expression.symbol), st.just(PI)
-    )
+    leaf = st.one_of(rationals.map(Expression.number), st.sampled_from(NAMES).map(Expression.symbol), st.just(PI))
     combine = st.recursive(
         leaf,
         lambda inner: st.one_of(
@@ -96,14 +94,23 @@ def test_only_the_nearest_double_is_taken_for_a_part_of_a_turn(step):
 
 @pytest.mark.parametrize(
     ("number", "value"),
-    [(0.1, Fraction(1, 10)), (Decimal("0.67183"), Fraction(67183, 100_000)), (np.float32(0.5), Fraction(1, 2)),
-     (Fraction(1, 3), Fraction(1, 3)), (np.int64(-7), Fraction(-7)), (2e-4, Fraction(1, 5000)), (-1e-30, -Fraction(1, 10**30))],
-)  # fmt: skip
+    [
+        (0.1, Fraction(1, 10)),
+        (Decimal("0.67183"), Fraction(67183, 100_000)),
+        (np.float32(0.5), Fraction(1, 2)),
+        (Fraction(1, 3), Fraction(1, 3)),
+        (np.int64(-7), Fraction(-7)),
+        (2e-4, Fraction(1, 5000)),
+        (-1e-30, -Fraction(1, 10**30)),
+    ],
+)
 def test_numbers_are_what_was_written(number, value):
     assert exact(number).rational == value
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, Decimal("NaN"), Decimal("1e400"), "1", True, None, 1j])
+@pytest.mark.parametrize(
+    "number", [math.nan, math.inf, -math.inf, Decimal("NaN"), Decimal("1e400"), "1", True, None, 1j]
+)
 def test_what_is_no_finite_number_is_refused(number):
     with pytest.raises(ExpressionError):
         exact(number)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from random_arms import states, tables
 
 from dhkit.description import library_robot, link_transforms
 from dhkit.kinematics import forward_kinematics, frames, jacobian, jacobian_dot
 from dhkit.kinematics.batches import BLOCK
+from random_arms import states, tables
 
 FUNCTIONS = (forward_kinematics, frames, jacobian)
 
@@ -73,7 +73,7 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
         (lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((4, 4), np.float32)), ValueError, "float64"),
         (lambda arm: forward_kinematics(arm, np.zeros(6), threads=0), ValueError, "threads is 0"),
     ],
-)  # fmt: skip
+)
 def test_arguments_of_the_wrong_shape_or_type_are_said(call, error, complaint):
     with pytest.raises(error, match=complaint):
         call(library_robot("puma560"))

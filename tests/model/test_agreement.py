@@ -7,12 +7,12 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 from hypothesis import given
-from random_arms import arms, states, tables
 
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
 from dhkit.kinematics import jacobian, jacobian_dot
 from dhkit.model import pinocchio_model, urdf_text, write_urdf
 from dhkit.verification import random_states, verify
+from random_arms import arms, states, tables
 
 FRAMES = 1e-13
 JACOBIANS = 1e-12

@@ -55,7 +55,9 @@ def test_limits_and_friction_are_those_of_the_description():
 
 def test_what_is_unlimited_gets_numbers_in_the_urdf_and_none_in_the_model():
     arm = from_dh([(0, 0, 3, 0), (0, 0, 0, 0)], kinds="RP")
-    revolute, prismatic = (joint.find("limit") for joint in parsed(arm).findall("joint") if joint.find("limit") is not None)
+    revolute, prismatic = (
+        joint.find("limit") for joint in parsed(arm).findall("joint") if joint.find("limit") is not None
+    )
     assert float(revolute.get("upper")) == 2 * math.pi
     assert float(prismatic.get("lower")) == -3.0
     assert float(prismatic.get("effort")) == UNLIMITED

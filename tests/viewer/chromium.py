@@ -194,7 +194,12 @@ class Page:
     def close(self) -> None:
         """Close the page."""
         self.call("Page.close")
+        self.loop.run_until_complete(asyncio.wait_for(self._close(), TIMEOUT))
+
+    async def _close(self) -> None:
         self.socket.close()
+        while await self.socket.read_message() is not None:
+            pass
 
 
 async def _connect(address: str) -> WebSocketClientConnection:
