@@ -34,7 +34,7 @@ class Arm:
     >>> arm.n, arm.name
     (6, 'puma560')
     >>> arm.fk(arm.configurations["ready"])[:3, 3].round(4)
-    array([-0.0203, -0.15  ,  1.5354])
+    array([ 0.0203, -0.15  ,  1.5354])
     """
 
     __slots__ = ("__dict__", "_description")

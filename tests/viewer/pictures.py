@@ -31,6 +31,6 @@ def shows_the_arm(picture: np.ndarray) -> bool:
 
 
 def centre(mask: np.ndarray) -> np.ndarray:
-    """Return the middle of marked pixels, (x, y) in px."""
+    """Return the middle of the box around marked pixels, (x, y) in px: a highlight does not move it."""
     y, x = np.nonzero(mask)
-    return np.array([x.mean() + 0.5, y.mean() + 0.5])
+    return np.array([x.min() + x.max() + 1, y.min() + y.max() + 1]) / 2

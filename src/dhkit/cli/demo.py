@@ -115,10 +115,12 @@ def _verify(arm: Arm, samples: int, reports: list[VerificationReport]) -> str:
 
 
 def _figure(arm: Arm, path: Path) -> str:
-    from dhkit.viewer import plot
+    from dhkit.viewer import plot_arm
 
+    configurations = arm.configurations
+    shown = next((name for name in ("nominal", "ready", "zero") if name in configurations), None)
     buffer = io.BytesIO()
-    plot(arm.description).savefig(buffer, format="png", dpi=120)
+    plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)).savefig(buffer, format="png", dpi=120)
     write_atomically(path, buffer.getvalue())
     return str(path)
 

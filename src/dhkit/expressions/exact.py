@@ -97,8 +97,8 @@ class Expression:
     >>> from dhkit.expressions import parse
     >>> parse("17*inch") == exact(0.4318)
     True
-    >>> str(parse("m*l^2/12") * 2)
-    'l^2*m/6'
+    >>> str(parse("m1*l1^2/12", names=["l1", "m1"]) * 2)
+    'l1^2*m1/6'
     """
 
     terms: tuple[tuple[Monomial, Fraction], ...] = ()
