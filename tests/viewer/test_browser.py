@@ -41,7 +41,9 @@ def hosts(page):
 
 def projected(page, point):
     """Return where a point of the world is on the picture, from the camera's matrices alone; px."""
-    camera = page.evaluate("(c => [c.projectionMatrix.elements, c.matrixWorldInverse.elements])(dhkit.stage.viewer.camera)")
+    camera = page.evaluate(
+        "(c => [c.projectionMatrix.elements, c.matrixWorldInverse.elements])(dhkit.stage.viewer.camera)"
+    )
     projection, view = (np.reshape(matrix, (4, 4)).T for matrix in camera)
     x, y, z = point
     clip = projection @ view @ (x, z, -y, 1)
@@ -208,7 +210,9 @@ def test_a_page_says_when_python_is_gone(page, signal_arm):
 def test_a_notebook_shows_the_arm(page, signal_arm, tmp_path):
     view = View(signal_arm)
     frame = view._repr_html_().replace("<iframe", '<iframe sandbox="allow-scripts"')
-    (tmp_path / "notebook.html").write_text(f"<!doctype html><body>{frame}<script>document.body.dataset.ready=1</script>")
+    (tmp_path / "notebook.html").write_text(
+        f"<!doctype html><body>{frame}<script>document.body.dataset.ready=1</script>"
+    )
     page.call("Page.navigate", url=f"file://{tmp_path}/notebook.html")
     deadline = time.monotonic() + 20
     while not shows_the_arm(page.screenshot()):

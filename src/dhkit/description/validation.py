@@ -22,6 +22,8 @@ MAX_JOINTS = 32
 MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
 MAX_SHAPES = 50
+MAX_MESH_BYTES = 50_000_000
+"""A million triangles: more than a browser shows well."""
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
 RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of the URDF's links and fixed joints: a joint of the same name would confuse Pinocchio."""
@@ -184,6 +186,8 @@ def _check_geometry(geometry: Geometry, where: str, value: Value, description: D
     if isinstance(geometry, Mesh):
         sizes = {"scale": geometry.scale}
         file = inside(description.mesh_folder, geometry.path, where)
+        if file is not None and file.is_file() and file.stat().st_size > MAX_MESH_BYTES:
+            raise DescriptionError(f"{where}.mesh: {geometry.path!r} has more than {MAX_MESH_BYTES / 1e6:g} MB")
         if file is not None and not file.is_file():
             yield f"{where}.mesh: no file {geometry.path!r}; the link is drawn from the table"
     elif isinstance(geometry, Box):

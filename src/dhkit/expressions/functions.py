@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import cache
 
 from dhkit.errors import ExpressionError
 from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression
@@ -157,19 +158,15 @@ def _steps(angle: Expression) -> int | None:
     half_turns = angle.half_turns
     if half_turns is None or (half_turns * STEPS_IN_PI).denominator != 1:
         return None
-    return int(half_turns * STEPS_IN_PI)
+    return int(half_turns * STEPS_IN_PI) % (2 * STEPS_IN_PI)
 
 
+@cache
 def _sine_of_steps(steps: int) -> Expression:
     """Return sin(steps 15 degrees), in Q(sqrt 2, sqrt 3)."""
     half_circle, step = divmod(steps, STEPS_IN_PI)
-    sign = -1 if half_circle % 2 else 1
-    return _first_quadrant(min(step, STEPS_IN_PI - step)) * sign
-
-
-def _first_quadrant(step: int) -> Expression:
     two, three, six = (sqrt(Expression.number(n)) for n in (2, 3, 6))
-    return (
+    first_quadrant = (
         ZERO,
         (six - two) / 4,
         Expression.number(Fraction(1, 2)),
@@ -177,7 +174,8 @@ def _first_quadrant(step: int) -> Expression:
         three / 2,
         (six + two) / 4,
         Expression.number(1),
-    )[step]
+    )
+    return first_quadrant[min(step, STEPS_IN_PI - step)] * (-1 if half_circle % 2 else 1)
 
 
 def _inverse(

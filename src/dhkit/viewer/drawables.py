@@ -190,6 +190,7 @@ def _mesh(part: Part, shape: Mesh) -> Any:
 
 def _lathe(outline: Array) -> Any:
     """Return three.js's surface of revolution about y of an outline, shape (k, 2): distance from y, height."""
+
     class Lathe(_meshcat().Geometry):  # type: ignore[misc]  # meshcat-python has none
         def lower(self, object_data: Lowered) -> Lowered:
             points = [{"x": float(x), "y": float(y)} for x, y in outline]

@@ -1,0 +1,41 @@
+"""README's commands and files are run as they stand; its Python is run as doctests."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from dhkit.cli import main
+from dhkit.description import read_robot
+
+README = (Path(__file__).resolve().parents[1] / "README.md").read_text("utf-8")
+COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)
+FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as exit:
+        main(shlex.split(command))
+    assert exit.value.code == 0, capsys.readouterr()
+
+
+def test_there_are_commands_and_a_file_to_run():
+    assert len(COMMANDS) >= 6
+    assert len(FILES) == 1
+
+
+def test_the_robot_file_of_the_readme_is_one(tmp_path):
+    path = tmp_path / "two_rods.toml"
+    path.write_text(FILES[0])
+    arm = read_robot(path)
+    assert float(arm.numbers.a.sum()) == 0.8
+    assert not arm.warnings
+
+
+def test_the_documents_that_the_readme_names_are_there():
+    root = Path(__file__).resolve().parents[1]
+    for name in re.findall(r"\]\(([\w./-]+)\)", README):
+        assert (root / name).is_file(), name
