@@ -1,9 +1,9 @@
 """One headless browser for all tests of a run, and a small arm in colors that nothing else on the page has."""
 
 import pytest
-from viewer.chromium import Chromium, require_chromium
 
 from dhkit.description.robot_file import from_toml
+from viewer.chromium import Chromium, require_chromium
 
 ARM = """
 format = 1

@@ -4,8 +4,6 @@ import time
 
 import numpy as np
 import pytest
-from viewer.pictures import MINIMUM, centre, green, orange, shows_the_arm
-from viewer.test_view import motion
 
 from dhkit.description import library_robot, world_to_tool
 from dhkit.model.shapes import link_parts
@@ -14,6 +12,8 @@ from dhkit.viewer.drawables import part_transform
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.protocol import encode_pose, encode_scene
 from dhkit.viewer.scene import build_scene, node_transforms
+from viewer.pictures import MINIMUM, centre, green, orange, shows_the_arm
+from viewer.test_view import motion
 
 PIXELS = 4.0  # a ball's outline is a little off its centre in perspective
 FLOAT32 = 2e-6  # m, on an arm of 2 m
@@ -163,7 +163,7 @@ def test_the_whole_motion_is_in_view(page, tmp_path):
 def test_someone_who_asked_for_less_motion_gets_a_still(page, signal_arm, tmp_path):
     page.scheme("light", motion="reduce")
     view = View(signal_arm)
-    view.play(([0, 1], np.zeros((2, 2)) + [[0], [1]]))
+    view.play(([0, 1], [[0, 0], [1, 1]]))
     open_offline(page, view, tmp_path)
     page.settle()
     assert page.evaluate("dhkit.player.playing") is False
@@ -220,8 +220,10 @@ def test_a_notebook_shows_the_arm(page, signal_arm, tmp_path):
     assert hosts(page) == []
 
 
-@pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1200, 800), (844, 390)])
-@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize(
+    ("size", "dark"),
+    [((390, 844), False), ((390, 844), True), ((768, 1024), True), ((1200, 800), False), ((844, 390), True)],
+)
 def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal_arm, tmp_path, size, dark):
     page.resize(*size)
     page.scheme("dark" if dark else "light")
@@ -240,6 +242,9 @@ def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal
             across = a["left"] < b["right"] and b["left"] < a["right"]
             assert not (across and a["top"] < b["bottom"] and b["top"] < a["bottom"])
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    edges = page.evaluate("[...document.querySelectorAll('#labels span')].map(s => s.getBoundingClientRect().right)")
+    assert len(edges) == 3
+    assert max(edges) <= size[0]
     unnamed = page.evaluate(
         "[...document.querySelectorAll('input, select, button, summary')]"
         ".filter(e => !(e.ariaLabel || e.textContent.trim())).map(e => e.outerHTML)"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from random_arms import states, tables
 
 from dhkit.description import Capsule, Cylinder, Mesh, from_dh, library_robot, robots, world_to_frames, world_to_tool
 from dhkit.model.shapes import link_parts
 from dhkit.viewer.scene import build_scene, first_configuration, frame_labels, node_transforms, scene_size
+from random_arms import states, tables
 
 ROUNDING = 1e-13  # times the arm's size: two orders of one product of a dozen matrices
 EVERY_STATE = 5

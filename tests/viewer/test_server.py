@@ -132,7 +132,7 @@ def test_a_websocket_of_another_site_is_refused(server, origin):
 
 
 def test_a_websocket_without_the_token_is_refused(server):
-    server.token, token = "guess", server.token  # noqa: S105 - the client's guess
+    server.token, token = "guess", server.token
 
     async def guess():
         url = f"ws://127.0.0.1:{server.port}/{token}/socket"

@@ -117,5 +117,5 @@ def test_opening_shows_the_page_in_the_browser(monkeypatch):
 
 def test_a_view_needs_neither_matplotlib_nor_a_server_to_be_imported():
     code = "import sys, dhkit.viewer.view; print([m for m in ('matplotlib', 'meshcat', 'tornado') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -34,9 +34,9 @@ def pinocchio_model(description: Description) -> PinocchioModel:
     """
     try:
         import pinocchio as pin
-    except ImportError:
+    except ImportError as error:
         raise ModelError(
-            "Pinocchio is not installed: pip install pin (Linux, macOS) or conda install pinocchio; "
+            f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS) or conda install pinocchio; "
             "everything that needs no reference model works without it"
         ) from None
     try:

@@ -97,7 +97,7 @@ def grid_step(size: float) -> float:
     Examples
     --------
     >>> grid_step(1.5), grid_step(0.2)
-    (0.2, 0.02)
+    (0.2, 0.05)
     """
     power = 10.0 ** np.floor(np.log10(size / 6))
     steps = [round(float(power * digit), 12) for digit in (1, 2, 5, 10)]

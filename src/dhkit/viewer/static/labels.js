@@ -32,7 +32,9 @@ export class Labels {
       label.element.style.visibility = point ? "" : "hidden";
       if (!point) continue;
       label.width ||= label.element.offsetWidth;
-      const box = { left: point.x + GAP, top: point.y - HEIGHT, right: point.x + GAP + label.width };
+      const fits = point.x + GAP + label.width < this.container.clientWidth;
+      const left = fits ? point.x + GAP : point.x - GAP - label.width;
+      const box = { left, top: point.y - HEIGHT, right: left + label.width };
       // Frames that only happen to coincide: write below the label that is there.
       while (taken.some((other) => overlaps(box, other))) box.top += HEIGHT;
       taken.push(box);

@@ -56,7 +56,7 @@ export function placements(transforms, THREE) {
     const m = transforms.subarray(PER_TRANSFORM * i, PER_TRANSFORM * (i + 1));
     matrix.set(...m, 0, 0, 0, 1);
     quaternion.setFromRotationMatrix(matrix).normalize().toArray(quaternions, 4 * i);
-    positions.set([m[3], m[11], m[7]], 3 * i);
+    positions.set([m[3], m[7], m[11]], 3 * i);
   }
   return { positions, quaternions };
 }
