@@ -39,8 +39,9 @@ def pinocchio_model(description: Description) -> PinocchioModel:
             f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS) or conda install pinocchio; "
             "everything that needs no reference model works without it"
         ) from None
+    text = urdf_text(description)
     try:
-        model = pin.buildModelFromXML(urdf_text(description))
+        model = pin.buildModelFromXML(text)
     except ValueError as error:
         raise ModelError(f"{description.name}: Pinocchio refuses the URDF: {error}") from None
     numbers = description.numbers

@@ -53,6 +53,8 @@ THIN = 0.25
 """Thickness of plates and stops, of the radius of the drum or the half width of the block."""
 NECK = 1.25
 """Where the gripper begins on an arm that ends in its last drum, of the drum's and hub's extent."""
+SEEN = 1e-3
+"""A neck shorter than this share of its radius is not drawn."""
 
 IDENTITY: Array = np.eye(4)
 ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -265,8 +267,9 @@ class _Drawing:
         """Draw what is between the last link and the gripper, in DH frame n."""
         radius, T_end_gripper, root = TUBE * self.joints[-1].radius, *self._gripper_place()
         offset = self.T_last_tool[:3, 3]
-        if offset.any():
-            yield _cylinder(_towards(offset), radius, 0.0, float(np.linalg.norm(offset)))
+        length = float(np.linalg.norm(offset))
+        if length > SEEN * radius:
+            yield _cylinder(_towards(offset), radius, 0.0, length)
         if root:
             yield _cylinder(T_end_gripper, radius, 0.0, root)
 
