@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, settings
 
 import acceptance
 from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
+from viewer.chromium import Chromium, require_chromium
 
 settings.register_profile(
     "dhkit",
@@ -39,3 +40,12 @@ def require(program: str, hint: str) -> str:
     if path is None:
         pytest.skip(f"no {program}: {hint}")
     return path
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A headless Chromium, or a skip."""
+    require_chromium()
+    browser = Chromium()
+    yield browser
+    browser.close()

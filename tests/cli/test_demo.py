@@ -32,6 +32,30 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
     assert len(page) < 2_500_000
 
 
+def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(tmp_path, chromium):
+    assert run("demo", "--quick", "--output", str(tmp_path)) == 0
+    page = chromium.page()
+    page.open(f"file://{tmp_path}/index.html")
+    page.press(" ")  # pause
+    with_arm = page.screenshot()
+    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = false; })")
+    without = page.screenshot()
+    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = true; })")
+    page.press(" ")
+    page.until("dhkit.motion && !document.hidden")
+    page.settle()
+    page.settle()
+    later = page.screenshot()
+    try:
+        # The arm and its shadow cover a good part of the page; an empty scene would differ by nothing.
+        assert np.any(np.abs(with_arm - without) > 20, axis=-1).sum() > 10_000
+        assert np.any(np.abs(with_arm - later) > 20, axis=-1).sum() > 200
+        assert [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))] == []
+        assert page.errors == []
+    finally:
+        page.close()
+
+
 def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)

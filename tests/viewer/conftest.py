@@ -1,9 +1,8 @@
-"""One headless browser for all tests of a run, and a small arm in colors that nothing else on the page has."""
+"""A small arm in colors that nothing else on the page has."""
 
 import pytest
 
 from dhkit.description.robot_file import from_toml
-from viewer.chromium import Chromium, require_chromium
 
 ARM = """
 format = 1
@@ -35,12 +34,3 @@ shape = { sphere = { radius = 0.06 }, color = "#00d000" }
 def signal_arm():
     """An arm with a magenta column and, around its tool, a green ball."""
     return from_toml(ARM, file="signal.toml")
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    """A headless Chromium, or a skip."""
-    require_chromium()
-    browser = Chromium()
-    yield browser
-    browser.close()

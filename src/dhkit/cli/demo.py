@@ -120,7 +120,9 @@ def _figure(arm: Arm, path: Path) -> str:
     configurations = arm.configurations
     shown = next((name for name in ("nominal", "ready", "zero") if name in configurations), None)
     buffer = io.BytesIO()
-    plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)).savefig(buffer, format="png", dpi=120)
+    plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)).savefig(
+        buffer, format="png", dpi=120
+    )
     write_atomically(path, buffer.getvalue())
     return str(path)
 

@@ -37,7 +37,7 @@ ZOOM = 0.86
 
 @singledispatch
 def plot(value: object) -> Figure:
-    """Return a figure of a value: an arm's description is drawn in its ``ready`` configuration, or at zero.
+    """Return a figure of a value: an arm, or its description, is drawn in its ``ready`` configuration, or at zero.
 
     Raises
     ------
@@ -50,6 +50,9 @@ def plot(value: object) -> Figure:
     >>> figure = plot(library_robot("puma560"))
     >>> figure.savefig("puma560.png")  # doctest: +SKIP
     """
+    description = getattr(value, "description", None)  # an Arm, which this folder does not know
+    if isinstance(description, Description):
+        return plot(description)
     known = sorted(kind.__name__ for kind in plot.registry if kind is not object)
     raise TypeError(f"no figure of {type(value).__name__}; expected one of {', '.join(known)}")
 
