@@ -38,9 +38,9 @@ def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(tmp_path, c
     page.open(f"file://{tmp_path}/index.html")
     page.press(" ")  # pause
     with_arm = page.screenshot()
-    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = false; })")
+    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = false; }); dhkit.stage.viewer.set_dirty()")
     without = page.screenshot()
-    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = true; })")
+    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = true; }); dhkit.stage.viewer.set_dirty()")
     page.press(" ")
     page.until("dhkit.motion && !document.hidden")
     page.settle()
