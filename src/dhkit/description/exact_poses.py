@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.robot import Convention, Joint, Placement, Vector
-from dhkit.expressions import ZERO, Expression, arc_tangent, cos, exact, exact_angle, sin, sqrt, substitute
+from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
 
 __all__ = [
     "ExactPose",
@@ -39,7 +39,7 @@ def identity() -> ExactPose:
 
 def _plane_rotation(first: int, second: int, angle: Expression) -> ExactPose:
     T = identity()
-    c, s = cos(angle), sin(angle)
+    c, s = decimals(cos(angle)), decimals(sin(angle))
     T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
     return T
 

@@ -150,9 +150,9 @@ def _between(
     if convention is Convention.STANDARD:
         own = translation(x=before.a) @ rotation_x(before.alpha)
         new = _common_normal(own @ row, values)
-        along_x = translation(x=new.a) @ rotation_x(new.alpha)
-        to_new = inverse(rotation_z(new.beta) @ translation(z=new.epsilon) @ along_x) @ own
-        before, after = replace(before, a=new.a, alpha=new.alpha), after
+        # What is right of the new row's a and alpha in Y: the shortest way from the frozen frame to the new one.
+        to_new = rotation_z(new.gamma) @ translation(z=new.delta) @ inverse(row)
+        before = replace(before, a=new.a, alpha=new.alpha)
     else:
         new = _common_normal(row @ translation(x=after.a) @ rotation_x(after.alpha), values)
         to_new = inverse(rotation_z(new.beta) @ translation(z=new.epsilon))

@@ -75,7 +75,8 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
     try:
         if len(text) > MAX_BYTES:
             raise DescriptionError(f"more than {MAX_BYTES / 1e6:g} MB; expected a robot file")
-        return _Reader(validated(_document(text)), mesh_folder).description()
+        with Budget():
+            return _Reader(validated(_document(text)), mesh_folder).description()
     except DescriptionError as error:
         raise DescriptionError(f"{file}: {error}") from None
 
@@ -108,7 +109,6 @@ class _Reader:
         self.mesh_folder = mesh_folder
         self.units = Units(form.units.length, form.units.angle)
         self.names = frozenset(form.parameters)
-        self.budget = Budget()
 
     def description(self) -> Description:
         form = self.form
@@ -135,7 +135,7 @@ class _Reader:
         """Read an entry: a bare number in this unit, or text in SI."""
         try:
             if isinstance(entry, str):
-                return parse(entry, self.names, self.budget)
+                return parse(entry, self.names)
             return exact(entry) * unit
         except ExpressionError as error:
             raise DescriptionError(f"{where}: {error}") from None

@@ -1,8 +1,9 @@
 """Arithmetic and trigonometric text, read without ever evaluating it, and the exact numbers it stands for."""
 
+from dhkit.expressions.budget import Budget
 from dhkit.expressions.exact import PI, ZERO, Atom, Expression, exact, exact_angle
-from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, sin, sqrt, substitute
-from dhkit.expressions.parser import CONSTANTS, Budget, parse
+from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, decimals, sin, sqrt, substitute
+from dhkit.expressions.parser import CONSTANTS, parse
 from dhkit.expressions.syntax import decimal_fraction, read
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "call",
     "cos",
     "decimal_fraction",
+    "decimals",
     "exact",
     "exact_angle",
     "parse",

@@ -8,14 +8,16 @@ such as ``sin(q1)`` or ``sqrt(2)``. Two texts that mean the same sum of products
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Context, Decimal
 from fractions import Fraction
+from functools import cached_property
 from numbers import Integral, Rational, Real
 from typing import TypeAlias
 
 from dhkit.errors import ExpressionError
+from dhkit.expressions.budget import spend
 from dhkit.expressions.syntax import decimal_fraction
 
 __all__ = ["PI", "ZERO", "Atom", "Expression", "Monomial", "Scalar", "exact", "exact_angle"]
@@ -46,6 +48,24 @@ class Atom:
     name: str
     arguments: tuple[Expression, ...] = ()
 
+    @cached_property
+    def text(self) -> str:
+        """What it is written as; atoms sort by it."""
+        if not self.arguments:
+            return self.name
+        inner = ", ".join(argument.text for argument in self.arguments)
+        return f"({inner})" if self.name == "group" else f"{self.name}({inner})"
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.arguments))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[type[Atom], tuple[str, tuple[Expression, ...]]]:
+        return Atom, (self.name, self.arguments)  # without the cached hash, which another process does not share
+
     @property
     def is_symbol(self) -> bool:
         """Whether this is a name with a value of its own, and not pi or a function."""
@@ -72,10 +92,7 @@ class Atom:
             raise ExpressionError(f"{self} is not a finite number") from None
 
     def __str__(self) -> str:
-        if not self.arguments:
-            return self.name
-        inner = ", ".join(argument.text for argument in self.arguments)
-        return f"({inner})" if self.name == "group" else f"{self.name}({inner})"
+        return self.text
 
 
 Monomial: TypeAlias = tuple[tuple[Atom, int], ...]
@@ -118,6 +135,15 @@ class Expression:
     def of_atom(cls, atom: Atom) -> Expression:
         """Return the expression that is one atom."""
         return cls(((((atom, 1),), Fraction(1)),))
+
+    @classmethod
+    def sum(cls, values: Iterable[Expression]) -> Expression:
+        """Return the sum of many values."""
+        total: dict[Monomial, Fraction] = {}
+        for value in values:
+            for monomial, coefficient in value.terms:
+                total[monomial] = total.get(monomial, Fraction(0)) + coefficient
+        return _collected(total)
 
     # Reading
 
@@ -183,10 +209,7 @@ class Expression:
     # Arithmetic
 
     def __add__(self, other: Scalar) -> Expression:
-        total = dict(self.terms)
-        for monomial, coefficient in _expression(other).terms:
-            total[monomial] = total.get(monomial, Fraction(0)) + coefficient
-        return _collected(total)
+        return Expression.sum((self, _expression(other)))
 
     def __neg__(self) -> Expression:
         return Expression(tuple((monomial, -coefficient) for monomial, coefficient in self.terms))
@@ -201,6 +224,7 @@ class Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
+        spend(len(self.terms) * len(right))
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -292,11 +316,12 @@ def _order(term: tuple[Monomial, Fraction]) -> tuple[int, str]:
     """Sort terms by falling degree, then by name."""
     monomial, _ = term
     return -sum(abs(exponent) for _, exponent in monomial), " ".join(
-        f"{atom}^{exponent}" for atom, exponent in monomial
+        f"{atom.text}^{exponent}" for atom, exponent in monomial
     )
 
 
 def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
+    spend(1 + len(total))
     terms = [term for term in total.items() if term[1]]
     if len(terms) > MAX_TERMS:
         raise ExpressionError(f"an expression of more than {MAX_TERMS} terms")
@@ -324,7 +349,7 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
         if resolved:
             factor = (factor or Expression.number(1)) * atom.arguments[0] ** resolved
         powers[atom] = left_over
-    return tuple(sorted(((a, e) for a, e in powers.items() if e), key=lambda power: str(power[0]))), factor
+    return tuple(sorted(((a, e) for a, e in powers.items() if e), key=lambda power: power[0].text)), factor
 
 
 def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:

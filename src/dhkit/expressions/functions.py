@@ -8,9 +8,9 @@ from fractions import Fraction
 from functools import cache
 
 from dhkit.errors import ExpressionError
-from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression
+from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exact
 
-__all__ = ["FUNCTIONS", "arc_tangent", "call", "cos", "sin", "sqrt", "substitute"]
+__all__ = ["FUNCTIONS", "arc_tangent", "call", "cos", "decimals", "sin", "sqrt", "substitute"]
 
 LARGEST_FACTORED = 10**6
 """Square roots of numbers below this are split into those of primes, so that sqrt(6) is sqrt(2)*sqrt(3)."""
@@ -153,6 +153,19 @@ def _replaced(atom: Atom, values: Mapping[str, Expression]) -> Expression:
     return call(atom.name, *arguments) if arguments else Expression.of_atom(atom)
 
 
+def decimals(expression: Expression) -> Expression:
+    """Return an expression with functions of numbers as decimals: 0.7648421872844885 for cos(0.7); roots stay."""
+    total = []
+    for monomial, coefficient in expression.terms:
+        product = Expression.number(coefficient)
+        for atom, exponent in monomial:
+            is_number = atom.arguments and atom.name != "sqrt" and not any(x.symbols for x in atom.arguments)
+            base = exact(float(atom.value())) if is_number else Expression.of_atom(atom)
+            product = product * base**exponent
+        total.append(product)
+    return Expression.sum(total)
+
+
 def _steps(angle: Expression) -> int | None:
     """Return how many 15 degree steps an angle is, or None."""
     half_turns = angle.half_turns
@@ -194,15 +207,20 @@ def _inverse(
 
 
 def _direction(angle: Expression) -> tuple[Expression, Expression] | None:
-    """Return cosine and sine of an angle that is +-atan2(y, x): x/r and +-y/r; None for other angles."""
-    if len(angle.terms) != 1:
+    """Return cosine and sine of an angle that is +-atan2(y, x), or that plus a number; None for other angles.
+
+    The point (x, y) at the distance r has the direction (x/r, y/r); the number is added by the addition theorem.
+    """
+    arcs = [term for term in angle.terms if len(term[0]) == 1 and term[0][0][0].name == "atan2"]
+    if len(arcs) != 1 or arcs[0][0][0][1] != 1 or abs(arcs[0][1]) != 1:
         return None
-    monomial, sign = angle.terms[0]
-    if len(monomial) != 1 or monomial[0][1] != 1 or abs(sign) != 1 or monomial[0][0].name != "atan2":
+    rest = Expression(tuple(term for term in angle.terms if term != arcs[0]))
+    if rest.symbols:
         return None
-    y, x = monomial[0][0].arguments
+    y, x = arcs[0][0][0][0].arguments
     r = sqrt(x * x + y * y)
-    return x / r, y * sign / r
+    c, s = x / r, y * arcs[0][1] / r
+    return (c, s) if rest.is_zero else (c * cos(rest) - s * sin(rest), s * cos(rest) + c * sin(rest))
 
 
 def _leads_negative(x: Expression) -> bool:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection
 from fractions import Fraction
-from math import comb
 
 from dhkit.errors import ExpressionError
-from dhkit.expressions.exact import MAX_EXPONENT, PI, ZERO, Expression
+from dhkit.expressions.budget import budgeted
+from dhkit.expressions.exact import PI, Expression
 from dhkit.expressions.functions import call, sqrt
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree, read
 
-__all__ = ["CONSTANTS", "Budget", "parse", "value_of"]
+__all__ = ["CONSTANTS", "parse", "value_of"]
 
 CONSTANTS = {
     "pi": PI,
@@ -23,33 +23,12 @@ CONSTANTS = {
 }
 """What a name means everywhere: lengths in metres, angles in radians."""
 
-DEFAULT_WORK = 50_000
-"""Term products that one text, or one file, may cost: a tenth of a second."""
 
-
-class Budget:
-    """Work that is still allowed; share one over a whole file to bound its time."""
-
-    def __init__(self, work: int = DEFAULT_WORK) -> None:
-        self.left = work
-
-    def spend(self, work: int) -> None:
-        """Take from what is left.
-
-        Raises
-        ------
-        ExpressionError
-            Nothing is left.
-        """
-        self.left -= work
-        if self.left < 0:
-            raise ExpressionError("multiplies out to too many terms")
-
-
-def parse(text: str, names: Collection[str] = (), budget: Budget | None = None) -> Expression:
+def parse(text: str, names: Collection[str] = ()) -> Expression:
     """Read an expression: decimals, the given names, :data:`CONSTANTS`, the known functions and ``+ - * / ** ^``.
 
-    Nothing is evaluated as code. Decimals are rationals, so that ``0.1 + 0.2`` is 0.3.
+    Nothing is evaluated as code. Decimals are rationals, so that ``0.1 + 0.2`` is 0.3. The work is bounded by the
+    :class:`Budget` in force, or a fresh one.
 
     Parameters
     ----------
@@ -57,8 +36,6 @@ def parse(text: str, names: Collection[str] = (), budget: Budget | None = None) 
         What a person typed.
     names
         The parameters or variables that may occur.
-    budget
-        Work allowed, shared between texts; a fresh one if not given.
 
     Raises
     ------
@@ -72,10 +49,11 @@ def parse(text: str, names: Collection[str] = (), budget: Budget | None = None) 
     >>> parse("l1 + 3*mm", names=["l1"]).symbols
     frozenset({'l1'})
     """
-    return value_of(read(text), names, budget or Budget()).as_written(text.strip())
+    with budgeted():
+        return value_of(read(text), names).as_written(text.strip())
 
 
-def value_of(tree: Tree, names: Collection[str], budget: Budget) -> Expression:
+def value_of(tree: Tree, names: Collection[str]) -> Expression:
     """Work out a syntax tree."""
     match tree:
         case Number(decimal):
@@ -83,21 +61,16 @@ def value_of(tree: Tree, names: Collection[str], budget: Budget) -> Expression:
         case Name(text):
             return _named(text, names)
         case Call(function, arguments):
-            return call(function, *(value_of(argument, names, budget) for argument in arguments))
+            return call(function, *(value_of(argument, names) for argument in arguments))
         case Power(base, exponent):
-            return _power(value_of(base, names, budget), value_of(exponent, names, budget), budget)
+            return _power(value_of(base, names), value_of(exponent, names))
         case Sum(terms):
-            total = ZERO
-            for added, term in terms:
-                value = value_of(term, names, budget)
-                budget.spend(len(total.terms))
-                total = total + value if added else total - value
-            return total
+            values = ((added, value_of(term, names)) for added, term in terms)
+            return Expression.sum(value if added else -value for added, value in values)
         case Product(factors):
             product = Expression.number(1)
             for multiplied, factor in factors:
-                value = value_of(factor, names, budget)
-                budget.spend(len(product.terms) * len(value.terms))
+                value = value_of(factor, names)
                 product = product * value if multiplied else product / value
             return product
 
@@ -112,12 +85,9 @@ def _named(text: str, names: Collection[str]) -> Expression:
     raise ExpressionError(f"unknown name {text!r}; {hint}")
 
 
-def _power(base: Expression, exponent: Expression, budget: Budget) -> Expression:
+def _power(base: Expression, exponent: Expression) -> Expression:
     """Raise to a whole or half-whole power."""
     number = exponent.rational
     if number is None or number.denominator > 2:
         raise ExpressionError(f"an exponent of {exponent.text}; expected a whole number or half of one")
-    size, terms = abs(number.numerator), len(base.terms)
-    expanded = comb(min(size, MAX_EXPONENT) + terms - 1, terms - 1) if terms > 1 else 1
-    budget.spend(4 * expanded * terms)
     return (base if number.denominator == 1 else sqrt(base)) ** number.numerator
