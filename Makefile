@@ -37,7 +37,7 @@ lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(VENV)-lowest/bin/python -m pip install --quiet uv
 	VIRTUAL_ENV=$(VENV)-lowest $(VENV)-lowest/bin/uv pip install --quiet --resolution lowest-direct --editable '.[test]'
-	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadgroup -q tests
+	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadgroup -q -W ignore::DeprecationWarning tests
 
 format: $(READY)  ## let ruff format the sources
 	$(BIN)/ruff format .
