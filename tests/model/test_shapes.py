@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dhkit.description import Base, Box, Capsule, Convention, Cylinder, Mesh, Placement, Shape, Sphere, Tool
 from dhkit.description.frames import world_to_frames
 from dhkit.description.library import library_robot, robots
 from dhkit.description.numbers import matrix
-from dhkit.description.robot import Base, Box, Capsule, Convention, Cylinder, Mesh, Placement, Shape, Sphere, Tool
 from dhkit.description.table import from_dh
 from dhkit.expressions import ZERO, exact, parse
 from dhkit.model.shapes import link_parts

@@ -9,14 +9,17 @@ from dhkit.description.locking import lock
 from dhkit.description.named import Named
 from dhkit.description.numbers import Array, Numbers
 from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
-from dhkit.description.robot import (
+from dhkit.description.robot import Description
+from dhkit.description.robot_file import from_toml, read_robot
+from dhkit.description.table import DHTable, from_dh
+from dhkit.description.toml_writer import to_toml, write_robot
+from dhkit.description.values import (
     Base,
     Body,
     Box,
     Capsule,
     Convention,
     Cylinder,
-    Description,
     Drive,
     Geometry,
     Inertia,
@@ -29,9 +32,6 @@ from dhkit.description.robot import (
     Tool,
     Units,
 )
-from dhkit.description.robot_file import from_toml, read_robot
-from dhkit.description.table import DHTable, from_dh
-from dhkit.description.toml_writer import to_toml, write_robot
 
 __all__ = [
     "Array",

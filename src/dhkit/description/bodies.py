@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.exact_poses import ExactPose, settled, vector
-from dhkit.description.robot import Body, Inertia, Vector
+from dhkit.description.values import Body, Inertia, Vector
 from dhkit.expressions import ZERO, Expression
 
 __all__ = ["joined", "moved_body", "rod"]

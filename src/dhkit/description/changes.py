@@ -13,18 +13,9 @@ from dhkit.description.bodies import joined, moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
 from dhkit.description.named import Named
 from dhkit.description.poses import check_pose, pose_parts
-from dhkit.description.robot import (
-    ORIGIN,
-    Base,
-    Body,
-    Convention,
-    Description,
-    Inertia,
-    Placement,
-    Tool,
-    Vector,
-)
+from dhkit.description.robot import Description
 from dhkit.description.table import Quantity, quantity
+from dhkit.description.values import ORIGIN, Base, Body, Convention, Inertia, Placement, Tool, Vector
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description.robot import Convention, Joint, Placement, Vector
+from dhkit.description.values import Convention, Joint, Placement, Vector
 from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
 
 __all__ = [

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description.numbers import Array
-from dhkit.description.robot import Convention, Description
+from dhkit.description.robot import Description
+from dhkit.description.values import Convention
 
 __all__ = ["joint_array", "link_transforms", "world_to_frames", "world_to_tool"]
 

@@ -33,8 +33,9 @@ from dhkit.description.exact_poses import (
 )
 from dhkit.description.named import Named
 from dhkit.description.parameters import resolved
-from dhkit.description.robot import Base, Body, Convention, Description, Joint, Shape, Tool
+from dhkit.description.robot import Description
 from dhkit.description.table import Quantity, quantity
+from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import PI, ZERO, Expression, arc_tangent, cos, exact_angle, sin, sqrt, substitute
 

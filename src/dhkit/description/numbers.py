@@ -14,7 +14,8 @@ from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from dhkit.description.robot import Body, Description, Joint, Placement, Vector
+    from dhkit.description.robot import Description
+    from dhkit.description.values import Body, Joint, Placement, Vector
 
 __all__ = ["Array", "Numbers", "matrix"]
 

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from dhkit.description.files import read_bounded
 from dhkit.description.named import Named
-from dhkit.description.robot import (
+from dhkit.description.robot import Description
+from dhkit.description.values import (
     Base,
     Body,
     Box,
     Capsule,
     Convention,
     Cylinder,
-    Description,
     Drive,
     Inertia,
     Joint,

@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from dhkit.description.named import Named
-from dhkit.description.robot import Convention, Description, Joint, JointType, Units
+from dhkit.description.robot import Description
+from dhkit.description.values import Convention, Joint, JointType, Units
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, exact, exact_angle, parse
 

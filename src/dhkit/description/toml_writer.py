@@ -10,19 +10,8 @@ import tomlkit
 from tomlkit.items import Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.files import write_atomically
-from dhkit.description.robot import (
-    STANDARD_GRAVITY,
-    Body,
-    Box,
-    Description,
-    Drive,
-    Joint,
-    Mesh,
-    Placement,
-    Shape,
-    Sphere,
-    Units,
-)
+from dhkit.description.robot import Description
+from dhkit.description.values import STANDARD_GRAVITY, Body, Box, Drive, Joint, Mesh, Placement, Shape, Sphere, Units
 from dhkit.expressions import Expression, exact
 
 __all__ = ["to_toml", "write_robot"]

@@ -14,7 +14,8 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
 
 if TYPE_CHECKING:
-    from dhkit.description.robot import Body, Description, Drive, Geometry, Joint, Shape
+    from dhkit.description.robot import Description
+    from dhkit.description.values import Body, Drive, Geometry, Joint, Shape
 
 __all__ = ["MAX_JOINTS", "check"]
 
@@ -181,7 +182,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
 
 def _check_geometry(geometry: Geometry, where: str, value: Value, description: Description) -> Iterator[str]:
     from dhkit.description.assets import inside
-    from dhkit.description.robot import Box, Mesh
+    from dhkit.description.values import Box, Mesh
 
     if isinstance(geometry, Mesh):
         sizes = {"scale": geometry.scale}

@@ -16,10 +16,10 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from dhkit.description import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
 from dhkit.description.assets import inside
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
-from dhkit.description.robot import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
 from dhkit.expressions import Expression, exact, substitute
 
 __all__ = ["Part", "link_parts"]

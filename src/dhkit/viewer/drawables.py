@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from dhkit.description import Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.description.numbers import Array
-from dhkit.description.robot import Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.errors import ModelError
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.description import Description
 from dhkit.description.frames import joint_array
 from dhkit.description.numbers import Array
-from dhkit.description.robot import Description
 
 __all__ = ["check_motion", "sampled"]
 

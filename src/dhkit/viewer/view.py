@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.description import Description
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
-from dhkit.description.robot import Description
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
 from dhkit.viewer.motion import check_motion, sampled

@@ -1,0 +1,236 @@
+"""What a robot is put together from: frozen values with exact numbers, in SI units and radians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+from dhkit.expressions import PI, ZERO, Expression, exact
+
+__all__ = [
+    "ORIGIN",
+    "STANDARD_GRAVITY",
+    "Base",
+    "Body",
+    "Box",
+    "Capsule",
+    "Convention",
+    "Cylinder",
+    "Drive",
+    "Geometry",
+    "Inertia",
+    "Joint",
+    "JointType",
+    "Mesh",
+    "Placement",
+    "Shape",
+    "Sphere",
+    "Tool",
+    "Units",
+    "Vector",
+]
+
+Vector: TypeAlias = tuple[Expression, Expression, Expression]
+"""Three coordinates."""
+
+ORIGIN: Vector = (ZERO, ZERO, ZERO)
+ONE = exact(1)
+STANDARD_GRAVITY: Vector = (ZERO, ZERO, exact(-9.81))
+
+
+class Convention(Enum):
+    """Which of the two Denavit-Hartenberg tables."""
+
+    STANDARD = "standard"
+    """Distal: A_i = Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i); joint i moves about or along z_(i-1)."""
+    MODIFIED = "modified"
+    """Craig's: A_i = Rx(alpha_(i-1)) Tx(a_(i-1)) Rz(theta_i) Tz(d_i); joint i moves about or along z_i."""
+
+
+class JointType(Enum):
+    """What the joint variable adds to."""
+
+    REVOLUTE = "revolute"
+    """The angle theta, rad."""
+    PRISMATIC = "prismatic"
+    """The offset d, m."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units that a robot file's bare numbers are in."""
+
+    length: str = "m"
+    angle: str = "rad"
+
+    LENGTHS = {"m": exact(1), "mm": exact(0.001), "cm": exact(0.01), "in": exact(0.0254)}
+    ANGLES = {"rad": exact(1), "deg": PI / 180}
+
+    @property
+    def metres(self) -> Expression:
+        """One unit of length, in metres."""
+        return self.LENGTHS[self.length]
+
+    @property
+    def radians(self) -> Expression:
+        """One unit of angle, in radians."""
+        return self.ANGLES[self.angle]
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Moments and products of inertia about the centre of mass, kg m^2; xy = -integral of x y dm."""
+
+    xx: Expression = ZERO
+    yy: Expression = ZERO
+    zz: Expression = ZERO
+    xy: Expression = ZERO
+    yz: Expression = ZERO
+    xz: Expression = ZERO
+
+    @property
+    def rows(self) -> tuple[Vector, Vector, Vector]:
+        """The symmetric 3x3 tensor."""
+        return (self.xx, self.xy, self.xz), (self.xy, self.yy, self.yz), (self.xz, self.yz, self.zz)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A link's mass, kg, centre of mass, m, and inertia about it, in the axes of the link's own DH frame."""
+
+    mass: Expression
+    com: Vector = ORIGIN
+    inertia: Inertia = Inertia()
+    unphysical: bool = False
+    """The inertia is known to be impossible and kept as published: a warning, no error."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Motor and gear of a joint, motor side: the joint sees gear^2 J, gear^2 B and abs(gear) Tc."""
+
+    gear: Expression = ONE
+    """Motor turns per joint turn (rad/m for a prismatic joint); its sign is the motor's sense."""
+    rotor_inertia: Expression = ZERO
+    """kg m^2."""
+    viscous: Expression = ZERO
+    """N m s/rad."""
+    coulomb: tuple[Expression, Expression] = (ZERO, ZERO)
+    """Torque against positive and against negative motion, N m; the second is not positive."""
+
+    @property
+    def armature(self) -> Expression:
+        """Rotor inertia as the joint sees it, kg m^2 (kg for a prismatic joint)."""
+        return self.gear**2 * self.rotor_inertia
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A pose as a robot file gives it: origin, m, and fixed-axis roll, pitch, yaw, rad (R = Rz Ry Rx)."""
+
+    xyz: Vector = ORIGIN
+    rpy: Vector = ORIGIN
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh file, its path relative to the robot file's folder, times ``scale`` to be in metres."""
+
+    path: str
+    scale: Expression = ONE
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box centred on the origin, edges in m."""
+
+    size: Vector
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder along z centred on the origin, m."""
+
+    radius: Expression
+    length: Expression
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A cylinder along z with half balls on its ends; ``length`` is the cylinder's, m."""
+
+    radius: Expression
+    length: Expression
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball around the origin, m."""
+
+    radius: Expression
+
+
+Geometry: TypeAlias = Mesh | Box | Cylinder | Capsule | Sphere
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a link looks like, in its own DH frame."""
+
+    geometry: Geometry
+    placement: Placement = Placement()
+    color: str | None = None
+    """``#rrggbb``."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A row of the table with the link that it moves.
+
+    ``theta`` of a revolute and ``d`` of a prismatic joint are what the joint variable is added to. In the modified
+    convention ``a`` and ``alpha`` are those of the link before (a_(i-1), alpha_(i-1)).
+    """
+
+    type: JointType
+    a: Expression
+    alpha: Expression
+    d: Expression
+    theta: Expression
+    name: str = ""
+    """Empty: the description calls it ``joint1``, ``joint2`` ... by its place."""
+    limits: tuple[Expression, Expression] | None = None
+    """Lowest and highest value of the joint variable, rad or m; None: unlimited."""
+    velocity: Expression | None = None
+    """Largest speed, rad/s or m/s."""
+    effort: Expression | None = None
+    """Largest torque or force, N m or N."""
+    body: Body | None = None
+    drive: Drive | None = None
+    shapes: tuple[Shape, ...] = ()
+    """Without one, the link is drawn from the table."""
+    assumed: tuple[str, ...] = ()
+    """Keys of this joint whose numbers are nobody's publication."""
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether the joint variable is an angle."""
+        return self.type is JointType.REVOLUTE
+
+
+@dataclass(frozen=True)
+class Base:
+    """Link 0 and where frame 0 stands in the world; its shapes and body are in frame 0."""
+
+    placement: Placement = Placement()
+    shapes: tuple[Shape, ...] = ()
+    body: Body | None = None
+    """Moves nothing; holds what was locked to the base."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Where the tool's frame stands in DH frame n; its shapes are in the tool's frame."""
+
+    placement: Placement = Placement()
+    shapes: tuple[Shape, ...] = ()
