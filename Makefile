@@ -19,7 +19,7 @@ demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560
 	$(BIN)/dhkit demo
 
 test: $(READY)  ## the tests, laws at a small sample size
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -q
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -q $(ARGS)
 
 check: $(READY)  ## ruff, mypy --strict, import order
 	$(BIN)/ruff check .
