@@ -48,6 +48,11 @@ class Law:
             f" at {where}" if where is not None else ""
         )
 
+    def takes(self, quantity: str, seconds: float, required: float, where: object = None) -> None:
+        """Hold a time to what is required in `make accept` alone: elsewhere a tracer or a busy machine decides."""
+        if ACCEPTING:
+            self.holds(quantity, seconds, required, where)
+
     def rows(self) -> list[dict[str, object]]:
         return [
             {

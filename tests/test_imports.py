@@ -64,7 +64,7 @@ def test_importing_dhkit_takes_no_time(law):
         bare = time.perf_counter()
         run("import dhkit")
         seconds.append((time.perf_counter() - bare) - (bare - start))
-    law.holds("seconds that import dhkit takes", sorted(seconds)[len(seconds) // 2], 0.3)
+    law.takes("seconds that import dhkit takes", sorted(seconds)[len(seconds) // 2], 0.3)
 
 
 def test_everything_but_the_reference_works_without_pinocchio():

@@ -69,7 +69,7 @@ def refuse(path, complaint, law, folder=None):
     start = time.process_time()
     with pytest.raises(DescriptionError, match=complaint) as error:
         read_robot(path)
-    law.holds("seconds to refuse a robot file", time.process_time() - start, 1.0, path)
+    law.takes("seconds to refuse a robot file", time.process_time() - start, 1.0, path)
     message = str(error.value)
     assert message.startswith(f"{path}: ")
     assert "\n" not in message
