@@ -31,6 +31,10 @@ MAX_BITS = 8_192
 PI_DIGITS = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 STEPS_IN_PI = 12
 """Twists and offsets that are multiples of 15 degrees have exact cosines."""
+MAX_ATOM = 4_000
+"""Characters of a function with its arguments."""
+LARGEST = 10**308
+"""Nearly the largest double."""
 SHORT = 16
 """Fractions of numbers up to this are printed as such (l1/12), others as decimals where they end (0.4318*l1)."""
 
@@ -133,7 +137,17 @@ class Expression:
 
     @classmethod
     def of_atom(cls, atom: Atom) -> Expression:
-        """Return the expression that is one atom."""
+        """Return the expression that is one atom.
+
+        Raises
+        ------
+        ExpressionError
+            Its text would be longer than anybody reads: functions of functions double it with each level.
+        """
+        if atom.arguments:
+            spend(len(atom.text) // 16)
+            if len(atom.text) > MAX_ATOM:
+                raise ExpressionError(f"a function of more than {MAX_ATOM} characters")
         return cls(((((atom, 1),), Fraction(1)),))
 
     @classmethod
@@ -250,7 +264,7 @@ class Expression:
         if abs(exponent) > MAX_EXPONENT:
             raise ExpressionError(f"an exponent beyond {MAX_EXPONENT}")
         if exponent < 0:
-            return 1 / self**-exponent
+            return (1 / self) ** -exponent
         result = Expression.number(1)
         for bit in f"{exponent:b}":
             result = result * result * (self if bit == "1" else 1)
@@ -275,7 +289,9 @@ def exact(value: object) -> Expression:
         raise ExpressionError(f"{value!r} is no number")
     if isinstance(value, Integral):
         whole = int(value)
-        return Expression.number(decimal_fraction(str(whole)) if abs(whole) >= 10**300 else whole)
+        if abs(whole) > LARGEST:
+            raise ExpressionError("an integer beyond the range of a double")
+        return Expression.number(whole)
     if isinstance(value, Rational):
         return Expression.number(Fraction(int(value.numerator), int(value.denominator)))
     number = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
@@ -334,6 +350,7 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
     """Multiply two monomials; what a square root's or a group's power resolves to is a factor of its own."""
     if not left or not right:
         return left or right, None
+    spend((len(left) + len(right)) // 4)
     powers = dict(left)
     for atom, exponent in right:
         powers[atom] = powers.get(atom, 0) + exponent
@@ -366,8 +383,9 @@ def _reciprocal(divisor: Expression) -> Expression:
         raise ExpressionError("division by zero")
     monomial, leading = divisor.terms[0]
     if len(divisor.terms) > 1:
-        group = Atom("group", (divisor * (1 / leading),))
-        return Expression(((((group, -1),), 1 / leading),))
+        group = Expression.of_atom(Atom("group", (divisor * (1 / leading),)))
+        ((((atom, _),), _),) = group.terms
+        return Expression(((((atom, -1),), 1 / leading),))
     inverse = Expression.number(1 / leading)
     for atom, exponent in monomial:
         inverse = inverse * _atom_power(atom, -exponent)

@@ -70,6 +70,10 @@ def value_of(tree: Tree, names: Collection[str]) -> Expression:
         case Product(factors):
             product = Expression.number(1)
             for multiplied, factor in factors:
+                if not multiplied and isinstance(factor, Power):
+                    # 1/(a + b)^2 is (1/(a + b))^2: a sum below the bar is not multiplied out.
+                    product = product * _power(value_of(factor.base, names), -value_of(factor.exponent, names))
+                    continue
                 value = value_of(factor, names)
                 product = product * value if multiplied else product / value
             return product
