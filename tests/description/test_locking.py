@@ -7,10 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dhkit.description import (
+    from_dh,
+    from_toml,
     library_robot,
     lock,
     pose,
     robots,
+    to_toml,
+    with_parameters,
     with_payload,
     with_tool,
     with_uniform_links,
@@ -103,8 +107,6 @@ def near_parallel(arm, ours) -> bool:
 
 def test_axes_that_are_nearly_parallel_cost_what_a_table_must_cost():
     """A tilt of 1e-6 puts the common normal 4e5 m away: 17 digits of that leave 1e-10 m."""
-    from dhkit.description import from_dh
-
     arm = from_dh([(0, 0.1, 0.4, 0), (0, 0.2, 0.3, 1e-6), (0, 0.1, 0.2, 0.3)])
     ours = lock(arm, {1: "0.7"})
     q = states(ours, 50)
@@ -200,8 +202,6 @@ def test_a_payload_may_be_a_parameter_and_needs_a_body_to_join():
     loaded = with_payload(planar, "m1/2", (0.1, 0, 0))
     assert loaded.joints[1].body.mass.symbols == {"m1", "m2"}
     assert "/(m1" in loaded.joints[1].body.com[0].text
-    from dhkit.description import from_dh
-
     bare = from_dh([(0, 0, 1, 0)])
     with pytest.raises(DescriptionError, match="has no body to join"):
         with_payload(bare, 1.0)
@@ -220,3 +220,44 @@ def test_a_payload_hangs_on_the_tool():
     lone = np.array([0.1, -0.3, 0.2])
     expected = (0.09 * np.array([0, 0, 0.032]) + lone) / 1.09
     assert np.abs(np.array([float(x) for x in body.com]) - expected).max() < 1e-15
+
+
+@st.composite
+def symbolic_arms(draw):
+    """Draw a table with parameters in any place, and uniform links."""
+    rows = draw(
+        st.lists(
+            st.tuples(
+                st.sampled_from(["0", "th", "0.3"]),
+                st.sampled_from(["0", "d1", "0.2"]),
+                st.sampled_from(["0", "l1", "l2", "0.3"]),
+                st.sampled_from(["0", "pi/2", "al", "0.4"]),
+            ),
+            min_size=2,
+            max_size=6,
+        )
+    )
+    kinds = "".join(draw(st.sampled_from("RRP")) for _ in rows)
+    parameters = {"th": 0.3, "d1": 0.2, "l1": 0.5, "l2": "l1 - 0.1", "al": 0.6}
+    arm = from_dh(rows, kinds=kinds, convention=draw(st.sampled_from(["standard", "modified"])), parameters=parameters)
+    return with_uniform_links(arm)
+
+
+@given(symbolic_arms(), st.data())
+def test_a_locked_arm_of_symbols_can_be_written_and_its_parameters_changed(law, arm, data):
+    """What parameters a locked arm still has may be changed, before or after: the same arm. The others are refused."""
+    law.samples(1000)
+    places = data.draw(st.sets(st.integers(0, arm.n - 1), min_size=1, max_size=arm.n - 1))
+    held = {place: data.draw(st.sampled_from(["0", "pi/2", "0.3", "th"])) for place in places}
+    ours = lock(arm, held)
+    assert from_toml(to_toml(ours)) == ours
+    q = states(ours, 3)
+    for name, value in {"th": -0.4, "d1": -0.1, "l1": 0.05, "al": -0.6, "m1": 3.0}.items():
+        try:
+            changed = with_parameters(ours, **{name: value})
+        except DescriptionError as error:
+            assert "has no parameter" in str(error)
+            continue
+        other = lock(with_parameters(arm, **{name: value}), held)
+        law.holds("tool", np.abs(world_to_tool(changed, q) - world_to_tool(other, q)).max(), AGREES, (held, name))
+        law.holds("masses", np.abs(changed.numbers.mass - other.numbers.mass).max(), AGREES, (held, name))

@@ -47,7 +47,8 @@ def show(arm: Arm, json: bool) -> None:
         say("parameters (SI): " + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.values.items()) + "\n")
     rows = [_joint_row(i, joint, description) for i, joint in enumerate(description.joints)]
     print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "assumed"), rows)
-    say(f"\ntotal mass {np.nansum(numbers.mass):.4g} kg, gravity {_vector(numbers.gravity)} m/s²")
+    base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
+    say(f"\ntotal mass {np.nansum(numbers.mass):.4g} kg{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
     for what, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
         if not np.array_equal(T, np.eye(4)):
             xyz, angles = pose_parts(T, degrees=True)

@@ -6,7 +6,9 @@ from pathlib import Path, PurePosixPath
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["asset", "inside"]
+__all__ = ["MESH_FORMATS", "asset", "inside", "is_readable_mesh"]
+
+MESH_FORMATS = (".stl", ".obj", ".dae")
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CHECKOUT = PACKAGE.parents[1]
@@ -28,6 +30,21 @@ def asset(name: str) -> Path:
     raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")
 
 
+def is_readable_mesh(file: Path) -> bool:
+    """Return whether a file is there and looks like the mesh that its name says, from its first bytes and its size."""
+    try:
+        size = file.stat().st_size
+        with file.open("rb") as stream:
+            head = stream.read(1024)
+    except OSError:
+        return False
+    if file.suffix.lower() != ".stl":
+        return bool(head.strip())
+    facets = int.from_bytes(head[80:84], "little")
+    binary = len(head) >= 84 and facets > 0 and size == 84 + 50 * facets
+    return binary or (head.lstrip().startswith(b"solid") and b"facet" in head)
+
+
 def inside(folder: Path | None, path: str, where: str) -> Path | None:
     """Return the file that a relative path names, None where its folder is unknown.
 
@@ -37,7 +54,7 @@ def inside(folder: Path | None, path: str, where: str) -> Path | None:
         The path is absolute, a URL, or leaves the folder.
     """
     parts = PurePosixPath(path.replace("\\", "/"))
-    if not path or "\0" in path or ":" in path or parts.is_absolute() or ".." in parts.parts:
+    if not path or not path.isprintable() or ":" in path or parts.is_absolute() or ".." in parts.parts:
         raise DescriptionError(f"{where}.mesh is {path[:80]!r}; expected a relative path inside the robot's folder")
     if folder is None:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,21 +23,28 @@ def moved_body(body: Body, T: ExactPose) -> Body:
     return Body(body.mass, vector(com), _inertia(tensor), body.unphysical)
 
 
-def joined(first: Body, second: Body) -> Body:
-    """Return two bodies of one frame as one: Steiner's theorem about the common centre of mass.
+def joined(bodies: Sequence[Body]) -> Body:
+    """Return bodies of one frame as one: Steiner's theorem about the common centre of mass.
 
-    A body of mass 0 with inertia (Corke's PUMA link 1) joins with its inertia and no lever.
+    All at once, which keeps symbolic masses short: with c the centre of mass,
+    I = sum(I_i + m_i S(c_i)) - m S(c), S(r) = r^2 1 - r r^T, and m S(c) = S(sum(m_i c_i)) / m. A body of mass 0 with
+    inertia (Corke's PUMA link 1) joins with its inertia and no lever.
     """
-    mass = first.mass + second.mass
-    tensor = np.array(first.inertia.rows, dtype=object) + np.array(second.inertia.rows, dtype=object)
-    if mass.is_zero or first.mass.is_zero or second.mass.is_zero:
-        com = second.com if first.mass.is_zero else first.com
-        return Body(mass, com, _inertia(tensor), first.unphysical or second.unphysical)
-    c1, c2 = np.array(first.com, dtype=object), np.array(second.com, dtype=object)
-    com = vector(np.array([(first.mass * x + second.mass * y) / mass for x, y in zip(c1, c2, strict=True)]))
-    reduced = first.mass * second.mass / mass
-    tensor = tensor + _steiner(c1 - c2, reduced)
-    return Body(mass, com, _inertia(tensor), first.unphysical or second.unphysical)
+    if len(bodies) == 1:
+        return bodies[0]
+    unphysical = any(body.unphysical for body in bodies)
+    tensor = sum((np.array(body.inertia.rows, dtype=object) for body in bodies), np.full((3, 3), ZERO, dtype=object))
+    heavy = [body for body in bodies if not body.mass.is_zero]
+    if len(heavy) < 2:
+        one = (heavy or bodies)[0]
+        return Body(one.mass, one.com, _inertia(tensor), unphysical)
+    mass = Expression.sum(body.mass for body in heavy)
+    moment = sum(
+        (np.array([body.mass * x for x in body.com], dtype=object) for body in heavy), np.full(3, ZERO, dtype=object)
+    )
+    levers = sum((_steiner(np.array(body.com, dtype=object), body.mass) for body in heavy), tensor)
+    com = vector([entry / mass for entry in moment])
+    return Body(mass, com, _inertia(levers - _steiner(moment, 1 / mass)), unphysical)
 
 
 def rod(mass: Expression, start: Vector, end: Vector) -> Body:

@@ -12,12 +12,18 @@ from numpy.typing import ArrayLike
 from dhkit.description.bodies import joined, moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
 from dhkit.description.named import Named
+from dhkit.description.parameters import resolved
 from dhkit.description.poses import check_pose, pose_parts
 from dhkit.description.robot import Description
 from dhkit.description.table import Quantity, quantity
+from dhkit.description.traversal import names_in
+from dhkit.description.validation import check_body
 from dhkit.description.values import ORIGIN, Base, Body, Convention, Inertia, Placement, Tool, Vector
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
+
+SYMMETRIC = 1e-12
+"""How unequal the products of an inertia may be, of its largest entry: what R I R^T leaves."""
 
 __all__ = ["with_base", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
 
@@ -77,12 +83,14 @@ def with_payload(
             f"joint {description.n} ({last.name}) has no body to join a payload to; see with_uniform_links"
         )
     names = description.parameters
+    if len(com) != 3:
+        raise DescriptionError(f"payload: com has {len(com)} numbers; expected 3")
     x, y, z = (quantity(f"payload: com[{i}]", entry, names) for i, entry in enumerate(com))
     load = Body(quantity("payload: mass", mass, names), (x, y, z), _tensor(inertia))
     T_last_tool = pose_of(description.tool.placement)
-    body = joined(last.body, moved_body(load, T_last_tool))
+    body = joined([last.body, moved_body(load, T_last_tool)])
     # What is joined is checked as a whole by the description; the load must be a body by itself.
-    replace(description, joints=(*description.joints[:-1], replace(last, body=load)))
+    check_body(load, "payload", resolved(names))
     return replace(description, joints=(*description.joints[:-1], replace(last, body=body)))
 
 
@@ -106,8 +114,8 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     if masses is not None and len(masses) != n:
         raise DescriptionError(f"{len(masses)} masses; expected {n}, one a link")
     symbols = [f"m{i}" for i in range(1, n + 1)]
-    used = {name for joint in description.joints for name in _geometry_symbols(joint)}
-    if taken := used & set(symbols):
+    bare = replace(description, joints=tuple(replace(joint, body=None) for joint in description.joints))
+    if taken := names_in(bare) & set(symbols):
         raise DescriptionError(f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass")
     values = [exact(1)] * n if masses is None else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
     ends = _link_ends(description)
@@ -138,10 +146,6 @@ def _origin(T: ExactPose) -> Vector:
     return x, y, z
 
 
-def _geometry_symbols(joint: object) -> set[str]:
-    return {name for key in ("a", "alpha", "d", "theta") for name in getattr(joint, key).symbols}
-
-
 def _placement(T: ArrayLike, name: str) -> Placement:
     matrix = np.asarray(T, dtype=float)
     if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
@@ -163,7 +167,7 @@ def _tensor(inertia: ArrayLike | None) -> Inertia:
     if inertia is None:
         return Inertia()
     I = np.asarray(inertia, dtype=float)  # noqa: E741 - the field's letter
-    if I.shape != (3, 3) or not np.array_equal(I, I.T):
+    if I.shape != (3, 3) or np.abs(I - I.T).max() > SYMMETRIC * np.abs(I).max():
         raise DescriptionError(f"payload: inertia has shape {I.shape}; expected a symmetric (3, 3) matrix")
     if not np.all(np.isfinite(I)):
         raise DescriptionError("payload: inertia is not finite")

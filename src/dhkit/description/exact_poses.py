@@ -30,6 +30,8 @@ ExactPose: TypeAlias = NDArray[Any]
 """Shape (4, 4), entries Expression."""
 
 ONE = Expression.number(1)
+DIGITS = 30
+"""Of a coefficient that products of decimals have made longer: far below the rounding of a double."""
 
 
 def identity() -> ExactPose:
@@ -102,7 +104,7 @@ def settled(value: Expression, *, angle: bool = False) -> Expression:
     ``sin(0.5)`` is a symbol to the exact arithmetic; written into a table it is 0.479425538604203.
     """
     if value.symbols or value.rational is not None or value.half_turns is not None:
-        return value
+        return value.with_digits(DIGITS)
     number = exact(float(value))
     return exact_angle(number) if angle else number
 

@@ -10,6 +10,7 @@ the common normal of the two axes, found from Y's entries (Denavit & Hartenberg 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -32,15 +33,22 @@ from dhkit.description.exact_poses import (
     translation,
 )
 from dhkit.description.named import Named
-from dhkit.description.parameters import resolved
+from dhkit.description.parameters import needs, resolved
 from dhkit.description.robot import Description
 from dhkit.description.table import Quantity, quantity
+from dhkit.description.traversal import expressions_in, names_in, with_values
 from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
-from dhkit.errors import DescriptionError
-from dhkit.expressions import PI, ZERO, Expression, arc_tangent, cos, exact_angle, sin, sqrt, substitute
+from dhkit.errors import DescriptionError, ExpressionError
+from dhkit.expressions import PI, ZERO, Budget, Expression, arc_tangent, cos, exact_angle, sin, sqrt, substitute
 
 __all__ = ["lock"]
 
+log = logging.getLogger(__name__)
+
+WORK = 300_000
+"""Of exact arithmetic, about a second: beyond it an arm of symbols is locked as numbers."""
+LONGEST = 2_000
+"""Characters of an expression that a locked arm may have."""
 PARALLEL = 1e-10
 """Sine of the angle between two axes below which they count as parallel: a row of the table cannot say it better."""
 
@@ -50,7 +58,10 @@ class _Chain(NamedTuple):
 
     base: Base
     joints: tuple[Joint, ...]
+    """Their bodies are not theirs any more: see ``bodies``."""
     tool: Tool
+    bodies: tuple[tuple[Body | None, ...], ...]
+    """What each link carries, the base first, in its frame; joined at the end, all at once."""
 
 
 class _Row(NamedTuple):
@@ -70,6 +81,10 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     Every remaining joint keeps its zero, limits and drive; configurations lose the frozen entries. The drives of
     frozen joints go: their rotors stand still. A link without a body makes the joined link one without.
 
+    Lengths and masses that are parameters stay parameters. Those that decide angles of the frozen rows become the
+    numbers that they are, everywhere in the arm, since the new row's form depends on them; so do all, where the new
+    expressions would be longer than a robot file carries.
+
     Parameters
     ----------
     joints
@@ -83,13 +98,64 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     held = _places(description, joints)
     if len(held) == description.n:
         raise DescriptionError(f"all {description.n} joints locked; expected one left to move")
-    chain = _Chain(description.base, description.joints, description.tool)
+    description, held = _decided(description, held)
+    try:
+        with Budget(WORK):
+            locked = _locked(description, held)
+        if max((len(entry.text) for entry in expressions_in(locked)), default=0) <= LONGEST:
+            return locked
+    except ExpressionError:
+        pass
+    names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(held.values()))
+    log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
+    return _locked(*_settled(description, held, names))
+
+
+def _decided(description: Description, held: dict[int, Expression]) -> tuple[Description, dict[int, Expression]]:
+    """Put numbers for the parameters that the frozen rows' and their neighbours' angles depend on."""
+    names = names_in((description.base.placement.rpy, description.tool.placement.rpy))
+    for place, q in held.items():
+        around = description.joints[max(place - 1, 0) : place + 2]
+        names |= names_in(tuple(joint.alpha for joint in around)) | description.joints[place].theta.symbols
+        names |= q.symbols if description.joints[place].is_revolute else frozenset()
+    return _settled(description, held, names)
+
+
+def _settled(
+    description: Description, held: dict[int, Expression], names: frozenset[str]
+) -> tuple[Description, dict[int, Expression]]:
+    """Put numbers for some parameters, and for those that these depend on, everywhere."""
+    values = resolved(description.parameters)
+    # A parameter made of a settled one follows it no more, so it is settled as well.
+    grown = names | {name for name in values if needs(name, description.parameters) & names}
+    known = {name: values[name] for name in grown}
+    rest = Named({name: value for name, value in description.parameters.items() if name not in known})
+    fixed = with_values(replace(description, parameters=Named(values)), known)
+    return replace(fixed, parameters=rest), {place: substitute(q, known) for place, q in held.items()}
+
+
+def _locked(description: Description, held: dict[int, Expression]) -> Description:
+    """Freeze joints one by one, from the tip on."""
+    bodies = tuple((joint.body,) for joint in description.joints)
+    base: tuple[Body | None, ...] = (description.base.body,) if description.base.body is not None else ()
+    chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
     values = resolved(description.parameters)
     for place in sorted(held, reverse=True):
         chain = _without(chain, description.convention, place, held[place], values)
     kept = [i for i in range(description.n) if i not in held]
     configurations = Named({name: tuple(q[i] for i in kept) for name, q in description.configurations.items()})
-    return replace(description, configurations=configurations, **chain._asdict())
+    on_base = [body for body in chain.bodies[0] if body is not None]
+    joints = tuple(
+        replace(joint, body=None if None in parts else joined([part for part in parts if part is not None]))
+        for joint, parts in zip(chain.joints, chain.bodies[1:], strict=True)
+    )
+    return replace(
+        description,
+        base=replace(chain.base, body=joined(on_base) if on_base else None),
+        joints=joints,
+        tool=chain.tool,
+        configurations=configurations,
+    )
 
 
 def _places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
@@ -127,11 +193,13 @@ def _onto_base(chain: _Chain, row: ExactPose) -> _Chain:
     """Make frame 1 the new frame 0."""
     base, first = chain.base, chain.joints[0]
     back = inverse(row)
-    held = None if base.body is None else moved_body(base.body, back)
     placement = placement_of(pose_of(base.placement) @ row)
-    body = joined(held, first.body) if held and first.body else held or first.body
-    return chain._replace(
-        base=Base(placement, _moved_shapes(base.shapes, back) + first.shapes, body), joints=chain.joints[1:]
+    held = _moved_bodies(chain.bodies[0], back) + chain.bodies[1]
+    return _Chain(
+        Base(placement, _moved_shapes(base.shapes, back) + first.shapes),
+        chain.joints[1:],
+        chain.tool,
+        (held, *chain.bodies[2:]),
     )
 
 
@@ -139,8 +207,13 @@ def _onto_tool(chain: _Chain, row: ExactPose) -> _Chain:
     """Make the last link part of the one before, and its row part of the tool's placement."""
     *others, before, last = chain.joints
     placement = placement_of(row @ pose_of(chain.tool.placement))
-    return chain._replace(
-        joints=(*others, _carrying(before, last, identity(), row)), tool=Tool(placement, chain.tool.shapes)
+    carrying = _carrying(before, last, identity(), row)
+    *bodies, held, own = chain.bodies
+    return _Chain(
+        chain.base,
+        (*others, carrying),
+        Tool(placement, chain.tool.shapes),
+        (*bodies, held + _moved_bodies(own, row)),
     )
 
 
@@ -160,17 +233,24 @@ def _between(
         after = replace(after, a=new.a, alpha=new.alpha)
     before = _turned(_carrying(before, frozen, to_new, to_new @ row), new.beta, new.epsilon)
     after = _turned(after, new.gamma, new.delta)
-    return chain._replace(joints=(*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]))
+    held = _moved_bodies(chain.bodies[place], to_new) + _moved_bodies(chain.bodies[place + 1], to_new @ row)
+    return _Chain(
+        chain.base,
+        (*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]),
+        chain.tool,
+        (*chain.bodies[:place], held, *chain.bodies[place + 2 :]),
+    )
 
 
 def _carrying(before: Joint, frozen: Joint, T_new_before: ExactPose, T_new_frozen: ExactPose) -> Joint:
-    """Join the frozen link to the one before, both put into the new frame."""
-    body: Body | None = None
-    if before.body is not None and frozen.body is not None:
-        body = joined(moved_body(before.body, T_new_before), moved_body(frozen.body, T_new_frozen))
+    """Give the link before the frozen link's shapes, both put into the new frame."""
     shapes = _moved_shapes(before.shapes, T_new_before) + _moved_shapes(frozen.shapes, T_new_frozen)
-    assumed = tuple(dict.fromkeys(before.assumed + frozen.assumed * ("body" in frozen.assumed)))
-    return replace(before, body=body, shapes=shapes, assumed=assumed)
+    assumed = tuple(dict.fromkeys(before.assumed + ("body",) * ("body" in frozen.assumed)))
+    return replace(before, shapes=shapes, assumed=assumed)
+
+
+def _moved_bodies(bodies: tuple[Body | None, ...], T: ExactPose) -> tuple[Body | None, ...]:
+    return tuple(None if body is None else moved_body(body, T) for body in bodies)
 
 
 def _moved_shapes(shapes: tuple[Shape, ...], T: ExactPose) -> tuple[Shape, ...]:

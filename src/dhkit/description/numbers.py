@@ -64,6 +64,8 @@ class Numbers:
     """Shape (n,), joint side, N m s/rad or N s/m."""
     coulomb: Array
     """Shape (n, 2), joint side, against positive and against negative motion, N m or N; the second is <= 0."""
+    base_body: tuple[float, Array, Array]
+    """Mass, kg (0 without a body), centre of mass (3,), m, and inertia (3, 3), kg m^2, of link 0, in frame 0."""
     gravity: Array
     """Shape (3,), m/s^2, world."""
     T_world_base: Array
@@ -119,6 +121,7 @@ class Numbers:
             armature=array(drive.armature if drive else 0.0 for drive in drives),
             viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
             coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
+            base_body=_base_body(description.base.body, array),
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
             T_last_tool=matrix(description.tool.placement, values),
@@ -143,6 +146,12 @@ def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
 
 def _tensor(body: Body | None, array: Callable[[Vector], Array]) -> Array:
     return np.full((3, 3), np.nan) if body is None else np.array([array(row) for row in body.inertia.rows])
+
+
+def _base_body(body: Body | None, array: Callable[[Iterable[Expression]], Array]) -> tuple[float, Array, Array]:
+    if body is None:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    return float(array([body.mass])[0]), array(body.com), np.array([array(row) for row in body.inertia.rows])
 
 
 def _stroke(joints: Sequence[Joint], lower: Array, upper: Array) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import CONSTANTS, FUNCTIONS, Expression, substitute
 
-__all__ = ["check_parameter_name", "resolved"]
+__all__ = ["check_parameter_name", "needs", "resolved"]
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
 
@@ -33,6 +33,12 @@ def resolved(parameters: Mapping[str, Expression]) -> dict[str, Expression]:
     for name in parameters:
         _resolve(name, parameters, values, ())
     return values
+
+
+def needs(name: str, parameters: Mapping[str, Expression]) -> frozenset[str]:
+    """Return the parameters that one is made of, directly or through others; parameters have no cycles."""
+    direct = parameters[name].symbols
+    return direct.union(*(needs(other, parameters) for other in direct))
 
 
 def _resolve(

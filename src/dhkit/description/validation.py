@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dhkit.description.robot import Description
     from dhkit.description.values import Body, Drive, Geometry, Joint, Shape
 
-__all__ = ["MAX_JOINTS", "check"]
+__all__ = ["MAX_JOINTS", "check", "check_body"]
 
 MAX_JOINTS = 32
 MAX_PARAMETERS = 200
@@ -28,6 +28,8 @@ MAX_MESH_BYTES = 50_000_000
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
 RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of the URDF's links and fixed joints: a joint of the same name would confuse Pinocchio."""
+CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""What no XML may hold, and what a terminal would act on."""
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 ABSOLUTE_SLACK = 1e-12
 """kg m^2: the smallest eigenvalue of a published inertia may be this far below zero."""
@@ -61,6 +63,9 @@ def check(description: Description) -> tuple[str, ...]:
     for joint in description.joints:
         warnings += _check_joint(joint, f"joint {description.joints.index(joint) + 1} ({joint.name})", value)
     _check_names(description)
+    for key in ("source", "notes"):
+        if found := CONTROL.search(getattr(description, key)):
+            raise DescriptionError(f"{key}: holds the control character {found.group()!r}; expected plain text")
     for part, placement, shapes in (
         ("base", description.base.placement, description.base.shapes),
         ("tool", description.tool.placement, description.tool.shapes),
@@ -168,6 +173,18 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
         yield f"{where}: a body of {mass:g} kg has no inertia"
 
 
+def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None:
+    """Refuse a body that is none, by itself.
+
+    Raises
+    ------
+    DescriptionError
+        A negative mass, an impossible inertia, or a value that is not finite.
+    """
+    for _ in _check_body(body, where, lambda place, expression: _finite(place, expression, values)):
+        pass
+
+
 def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: Description) -> Iterator[str]:
     if len(shapes) > MAX_SHAPES:
         raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
@@ -181,7 +198,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
 
 
 def _check_geometry(geometry: Geometry, where: str, value: Value, description: Description) -> Iterator[str]:
-    from dhkit.description.assets import inside
+    from dhkit.description.assets import MESH_FORMATS, inside, is_readable_mesh
     from dhkit.description.values import Box, Mesh
 
     if isinstance(geometry, Mesh):
@@ -189,8 +206,11 @@ def _check_geometry(geometry: Geometry, where: str, value: Value, description: D
         file = inside(description.mesh_folder, geometry.path, where)
         if file is not None and file.is_file() and file.stat().st_size > MAX_MESH_BYTES:
             raise DescriptionError(f"{where}.mesh: {geometry.path!r} has more than {MAX_MESH_BYTES / 1e6:g} MB")
-        if file is not None and not file.is_file():
-            yield f"{where}.mesh: no file {geometry.path!r}; the link is drawn from the table"
+        if not geometry.path.lower().endswith(MESH_FORMATS):
+            raise DescriptionError(f"{where}.mesh is {geometry.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
+        if file is not None and not is_readable_mesh(file):
+            what = "is no mesh that can be read" if file.is_file() else "is not there"
+            yield f"{where}.mesh: {geometry.path!r} {what}; the link is drawn from the table"
     elif isinstance(geometry, Box):
         sizes = {f"box[{i}]": edge for i, edge in enumerate(geometry.size)}
     else:

@@ -220,6 +220,17 @@ class Expression:
         """Return the same value, to be shown as this text."""
         return replace(self, written=text)
 
+    def with_digits(self, digits: int) -> Expression:
+        """Return the value with coefficients that are longer than so many digits rounded to them."""
+        limit, context = 10**digits, Context(prec=digits)
+
+        def rounded(c: Fraction) -> Fraction:
+            if abs(c.numerator) < limit and c.denominator < limit:
+                return c
+            return Fraction(context.divide(Decimal(c.numerator), Decimal(c.denominator)))
+
+        return _collected({monomial: rounded(coefficient) for monomial, coefficient in self.terms})
+
     # Arithmetic
 
     def __add__(self, other: Scalar) -> Expression:

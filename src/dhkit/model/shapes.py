@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dhkit.description import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
-from dhkit.description.assets import inside
+from dhkit.description.assets import inside, is_readable_mesh
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, substitute
@@ -80,7 +80,7 @@ class Part:
 def link_parts(description: Description) -> tuple[Part, ...]:
     """Return the solids of an arm's links, from the base to the tool.
 
-    A link with shapes in its description has those. Without, or with a mesh whose file is missing, it is drawn from
+    A link with shapes in its description has those. Without, or with a mesh whose file is missing or unreadable, it is drawn from
     the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has no tool and
     ends in a common normal, as planar arms do) and opens along its x.
 
@@ -115,7 +115,7 @@ def _given(description: Description, shapes: Sequence[Shape], link: int, T_link_
         geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
             file = inside(description.mesh_folder, geometry.path, "shape")
-            if file is None or not file.is_file():
+            if file is None or not is_readable_mesh(file):
                 return []
         T_link_part = T_link_frame @ matrix(shape.placement, values)
         parts.append(Part(link, _known(geometry, values), T_link_part, shape.color or color, file))

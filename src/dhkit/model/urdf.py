@@ -11,6 +11,7 @@ A URDF has no place for gravity and for the rotors' reflected inertia: a comment
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
@@ -71,6 +72,8 @@ def urdf_text(description: Description, mesh_path: Callable[[str], str] | None =
     ElementTree.SubElement(robot, "link", name="world")
     _fixed(robot, "world", "dh0", _origin_of(description.numbers.T_world_base))
     base = ElementTree.SubElement(robot, "link", name="dh0")
+    if description.base.body is not None:
+        _add_base_inertial(base, description)
     for part in parts.get(0, []):
         _add_part(base, part, np.eye(4), name_mesh)
     for i in range(1, description.n + 1):
@@ -97,6 +100,8 @@ def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     written = [path]
+    if not path.parent.is_dir():
+        raise ModelError(f"{path.parent}: no such folder")
     try:
         for part in link_parts(description):
             if isinstance(part.geometry, Mesh) and part.file is not None:
@@ -122,7 +127,8 @@ def _what_a_urdf_cannot_say(description: Description) -> str:
     ]
     if description.source:
         lines.append(f"Source: {description.source}")
-    return " " + " ".join(lines).replace("--", "- -").rstrip("-") + " "
+    # Two hyphens would end an XML comment, whatever stands around them.
+    return " " + re.sub("-(?=-)", "- ", " ".join(lines)) + " "
 
 
 def _behind(description: Description, i: int) -> Origin:
@@ -195,8 +201,18 @@ def _add_inertial(link: ElementTree.Element, description: Description, i: int) -
     T_link_frame = _behind_matrix(description, i)
     com = T_link_frame[:3, :3] @ numbers.com[k] + behind.xyz
     _add_origin(element, Origin(com, behind.rpy))
-    ElementTree.SubElement(element, "mass", value=_text(numbers.mass[k]))
-    tensor = numbers.inertia[k]
+    _add_mass(element, numbers.mass[k], numbers.inertia[k])
+
+
+def _add_base_inertial(link: ElementTree.Element, description: Description) -> None:
+    mass, com, tensor = description.numbers.base_body
+    element = ElementTree.SubElement(link, "inertial")
+    _add_origin(element, Origin(com))
+    _add_mass(element, mass, tensor)
+
+
+def _add_mass(element: ElementTree.Element, mass: float, tensor: Array) -> None:
+    ElementTree.SubElement(element, "mass", value=_text(mass))
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     ElementTree.SubElement(element, "inertia", {name: _text(tensor[place]) for name, place in names.items()})
 
