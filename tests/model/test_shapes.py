@@ -211,7 +211,7 @@ def test_a_link_whose_mesh_is_missing_is_drawn_from_the_table(tmp_path: Path):
     meshed = replace(arm, joints=(replace(arm.joints[0], shapes=shapes), arm.joints[1]), mesh_folder=tmp_path)
     for one, other in zip(link_parts(meshed), link_parts(arm), strict=True):
         assert one.geometry == other.geometry and one.color == other.color
-    (tmp_path / "arm.stl").touch()
+    (tmp_path / "arm.stl").write_text("solid arm\nfacet normal 0 0 1\n")
     files = [part.file for part in link_parts(meshed) if isinstance(part.geometry, Mesh)]
     assert files == [tmp_path / "arm.stl"]
 

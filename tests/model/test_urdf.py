@@ -100,7 +100,7 @@ def test_meshes_are_written_beside_the_urdf(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path):
-    with pytest.raises(ModelError, match="No such file"):
+    with pytest.raises(ModelError, match="no such folder"):
         write_urdf(library_robot("planar2r"), tmp_path / "none" / "arm.urdf")
 
 

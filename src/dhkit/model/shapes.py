@@ -80,9 +80,9 @@ class Part:
 def link_parts(description: Description) -> tuple[Part, ...]:
     """Return the solids of an arm's links, from the base to the tool.
 
-    A link with shapes in its description has those. Without, or with a mesh whose file is missing or unreadable, it is drawn from
-    the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has no tool and
-    ends in a common normal, as planar arms do) and opens along its x.
+    A link with shapes in its description has those. Without, or with a mesh whose file is missing or unreadable, it
+    is drawn from the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has
+    no tool and ends in a common normal, as planar arms do) and opens along its x.
 
     Examples
     --------
