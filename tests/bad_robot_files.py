@@ -114,6 +114,24 @@ BAD = {
     "configuration too short": (GOOD + "[configurations]\nready = []", "configurations.ready: 0 numbers; expected 1"),
     "configuration of text": (GOOD + '[configurations]\nready = ["q"]', r"configurations.ready\[0\]: unknown name 'q'"),
     "assumed what": (GOOD + 'assumed = ["everything"]', r"assumed\[0\]: found 'everything'"),
+    "control characters": (
+        changed("format = 1", 'format = 1\nnotes = "a\\u001b]0;b"'),
+        "notes: holds the control character",
+    ),
+    "control characters in the source": (changed("format = 1", 'format = 1\nsource = "a\\u0001b"'), "source: holds"),
+    "a mesh of another format": (GOOD + 'shape = { mesh = "two.toml" }', "expected one of .stl, .obj, .dae"),
+    "a mistyped key": (changed("alpha", "aplha"), "unknown key 'aplha'; did you mean 'alpha'"),
+    "joints": (changed("[[joint]]", "[[joints]]"), "unknown key 'joints'; did you mean 'joint'"),
+    "a long hexadecimal": (changed("a = 0.5", "a = 0x" + "f" * 4000), "beyond the range of a double"),
+    "too many parameters": (GOOD + "[parameters]\n" + "\n".join(f"p{i} = 1" for i in range(300)), "found 300 entries"),
+    "a long word": (GOOD + "# " + "a" * 900_000 + "\nb = 1", "unknown key 'b'"),
+    "functions of functions": (
+        HEAD
+        + "[parameters]\np0 = 1\n"
+        + "\n".join(f'p{i} = "sin(p{i - 1})+cos(p{i - 1})"' for i in range(1, 30))
+        + JOINT,
+        "a function of more than",
+    ),
     "gravity of two": (changed("format = 1", "format = 1\ngravity = [0, 0]"), "gravity: found 2 entries"),
 }
 

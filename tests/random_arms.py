@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 from dhkit.description import Body, Description, Drive, Inertia, from_dh, pose, with_base, with_tool
 from dhkit.expressions import exact
 
-length = st.one_of(st.just(0.0), st.floats(-1.0, 1.0), st.integers(-(10**6), 10**6).map(lambda um: um * 1e-6))
+length = st.one_of(
+    st.just(0.0),
+    st.floats(-1.0, 1.0).map(lambda x: round(x, 12)),
+    st.integers(-(10**6), 10**6).map(lambda um: um * 1e-6),
+)
 """m"""
 right_angle = st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi])
 near_right_angle = st.builds(lambda side, off: side * np.pi / 2 + off, st.sampled_from([-1, 1]), st.floats(-1e-9, 1e-9))

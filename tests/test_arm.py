@@ -48,6 +48,8 @@ def test_nothing_in_an_arm_can_be_changed():
         arm.description.name = "other"
     with pytest.raises(AttributeError):
         arm.name = "other"
+    with pytest.raises(AttributeError, match="cannot be changed"):
+        arm.other = 1
     model = arm.model
     model.gravity.linear = np.zeros(3)
     assert np.array_equal(arm.model.gravity.linear, [0, 0, -9.81])

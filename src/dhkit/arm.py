@@ -37,10 +37,10 @@ class Arm:
     array([ 0.0203, -0.15  ,  1.5354])
     """
 
-    __slots__ = ("__dict__", "_description")
+    _description: Description
 
     def __init__(self, description: Description) -> None:
-        self._description = description
+        object.__setattr__(self, "_description", description)
 
     # Where arms come from
 
@@ -65,7 +65,7 @@ class Arm:
         rows: Sequence[Sequence[Quantity]],
         *,
         order: Sequence[str] = ("theta", "d", "a", "alpha"),
-        kinds: str | None = None,
+        kinds: str | Sequence[str] | None = None,
         convention: str = "standard",
         angle: str = "rad",
         length: str = "m",
@@ -220,6 +220,9 @@ class Arm:
         return View(self._description, **options)
 
     # Value semantics
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"an Arm cannot be changed: {name!r}; with_... and lock make new ones")
 
     def __eq__(self, other: object) -> bool:
         return self._description == other._description if isinstance(other, Arm) else NotImplemented

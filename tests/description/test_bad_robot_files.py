@@ -10,6 +10,7 @@ import pytest
 from bad_robot_files import BAD, BAD_BYTES, BODY, GOOD
 from dhkit.description import from_toml, read_robot
 from dhkit.errors import DescriptionError
+from dhkit.model import link_parts
 
 
 def test_the_file_that_the_others_are_made_from_is_good():
@@ -30,6 +31,20 @@ def test_bytes_that_are_no_text_are_refused_in_one_line(name, tmp_path, law):
     path = tmp_path / "bad.toml"
     path.write_bytes(content)
     refuse(path, complaint, law)
+
+
+def test_a_byte_order_mark_is_no_harm(tmp_path):
+    (tmp_path / "good.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
+    assert read_robot(tmp_path / "good.toml").n == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"garbage", b"\0" * 84, b"solid but no more"])
+def test_a_mesh_that_is_none_is_a_warning_and_the_link_is_drawn_from_the_table(content, tmp_path):
+    (tmp_path / "bad.stl").write_bytes(content)
+    (tmp_path / "good.toml").write_text(GOOD + 'shape = { mesh = "bad.stl" }')
+    arm = read_robot(tmp_path / "good.toml")
+    assert "is no mesh that can be read" in arm.warnings[0]
+    assert all(part.file is None for part in link_parts(arm))
 
 
 def test_a_file_of_200_mb_is_not_read(tmp_path, law):

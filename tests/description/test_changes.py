@@ -95,5 +95,8 @@ def test_uniform_links_are_refused_where_their_names_mean_something_else():
     arm = from_dh([(0, 0, "m1", 0)], parameters={"m1": 1})
     with pytest.raises(DescriptionError, match="uses m1 for something else"):
         with_uniform_links(arm)
+    arm = from_dh([(0, 0, "L", 0)], parameters={"m1": 0.25, "L": "2*m1"})
+    with pytest.raises(DescriptionError, match="uses m1 for something else"):
+        with_uniform_links(arm)
     with pytest.raises(DescriptionError, match="3 masses; expected 2"):
         with_uniform_links(library_robot("planar2r"), [1, 2, 3])

@@ -53,10 +53,11 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
     arm = library_robot("stanford")
     q = states(arm, 5)
     expected = function(arm, q)
-    q[2, 3] = np.nan
-    result = function(arm, q)
-    assert np.isnan(result[2]).all() if function is not frames else np.isnan(result[2, 1:]).all()
-    assert np.array_equal(np.delete(result, 2, axis=0), np.delete(expected, 2, axis=0))
+    for missing in (np.nan, np.inf):
+        q[2, 3] = missing
+        result = function(arm, q)
+        assert np.isnan(result[2]).all() if function is not frames else np.isnan(result[2, 1:]).all()
+        assert np.array_equal(np.delete(result, 2, axis=0), np.delete(expected, 2, axis=0))
     assert np.isnan(function(arm, np.full(6, np.nan))).any()
 
 
@@ -67,6 +68,10 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
         (lambda arm: forward_kinematics(arm, 1.0), ValueError, r"q has shape \(\)"),
         (lambda arm: forward_kinematics(arm, "ready"), TypeError, "expected numbers"),
         (lambda arm: forward_kinematics(arm, [[1, 2], [3]]), TypeError, "expected numbers"),
+        (lambda arm: forward_kinematics(arm, ["1"] * 6), TypeError, "expected numbers"),
+        (lambda arm: forward_kinematics(arm, np.zeros(6) + 1j), TypeError, "expected numbers"),
+        (lambda arm: forward_kinematics(arm, [None] * 6), TypeError, "expected numbers"),
+        (lambda arm: forward_kinematics(arm, np.zeros(6), out=[1]), ValueError, "out is list"),
         (lambda arm: jacobian(arm, np.zeros(6), frame="base"), ValueError, "expected 'world' or 'tool'"),
         (lambda arm: jacobian_dot(arm, np.zeros(6), np.zeros(5)), ValueError, "qd has shape"),
         (lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((3, 3))), ValueError, r"expected \(4, 4\)"),

@@ -1,12 +1,13 @@
 """What the URDF says beyond frames and masses, and where it goes."""
 
 import math
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from dhkit.description import Convention, asset, from_dh, from_toml, library_robot, robots, to_toml
+from dhkit.description import Convention, asset, from_dh, library_robot, lock, robots
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model import pinocchio_model, urdf_text, write_urdf
 from dhkit.model.assets import library_urdf
@@ -80,11 +81,33 @@ def test_the_model_has_what_a_urdf_cannot_say():
     assert [model.names[i + 1] for i in range(6)] == [joint.name for joint in arm.joints]
 
 
-def test_text_in_names_and_sources_stays_text():
-    arm = from_toml(to_toml(library_robot("planar2r")).replace("two uniform rods", "<!-- & ]]> -- rods -"))
+@pytest.mark.parametrize(
+    "source",
+    ["<!-- & ]]> -- rods -", 'x --->\n<link name="evil"/>', "----><joint/>", "ends in -", "---", "--> <link/> <!--"],
+)
+def test_text_in_sources_stays_text(source):
+    arm = replace(library_robot("planar2r"), source=source)
     root = parsed(arm)
     assert root.get("name") == "planar2r"
-    assert "&amp;" not in urdf_text(arm).split("-->")[0]
+    assert {link.get("name") for link in root.findall("link")} == {
+        "world",
+        "dh0",
+        "link1",
+        "dh1",
+        "link2",
+        "dh2",
+        "tool",
+    }
+    assert len(root.findall("joint")) == 6
+    assert pinocchio_model(arm).nq == 2
+
+
+def test_a_locked_links_mass_stays_on_the_base():
+    arm = library_robot("ur5")
+    root = parsed(lock(arm, {0: 0.3}))
+    masses = [float(mass.get("value")) for mass in root.iter("mass")]
+    assert sum(masses) == pytest.approx(arm.numbers.mass.sum(), rel=1e-15)
+    assert root.find("link[@name='dh0']/inertial") is not None
 
 
 def test_meshes_are_written_beside_the_urdf(tmp_path):

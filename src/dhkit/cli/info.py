@@ -88,6 +88,8 @@ def _joint_values(arm: Arm, q: Sequence[str], degrees: bool) -> Array:
     if len(words) == 1 and not words[0][:1].isdigit() and words[0][:1] not in "+-.(":
         names = ", ".join(arm.configurations)
         raise DescriptionError(f"{arm.name} has no configuration {words[0]!r}; it has {names or 'none'}")
+    if typo := next((word for word in words if word.startswith("--")), None):
+        raise DescriptionError(f"no such option: {typo}")
     if len(words) != arm.n:
         raise DescriptionError(f"{len(words)} joint values; expected {arm.n} for {arm.name}")
     try:

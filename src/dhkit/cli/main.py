@@ -10,6 +10,7 @@ from typing import Annotated, NoReturn, cast
 
 import typer
 
+from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli import demo as demo_command
 from dhkit.cli import info as info_command
@@ -59,6 +60,20 @@ def _fail(message: str, status: int = 2) -> NoReturn:
     sys.exit(status)
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        say(f"dhkit {__version__}")
+        raise typer.Exit
+
+
+Version = Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")]
+
+
+@app.callback()
+def common(version: Version = False) -> None:
+    """Robot arms from their Denavit-Hartenberg table."""
+
+
 @app.command()
 def robots(json: Json = False) -> None:
     """List the robots of the library."""
@@ -80,6 +95,8 @@ def build(
     """Write a robot's URDF, with its meshes beside it."""
     arm = Arm.load(robot)
     path = output or Path(f"{arm.name}.urdf")
+    if path.suffix == ".toml":
+        raise DescriptionError(f"{path}: a URDF would overwrite a robot file; expected another name")
     if not path.parent.is_dir():
         raise DescriptionError(f"{path.parent}: no such folder")
     files = arm.write_urdf(path)

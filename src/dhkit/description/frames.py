@@ -23,7 +23,10 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
         Not numbers.
     """
     try:
-        array = np.asarray(q, dtype=float)
+        array = np.asarray(q)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError
+        array = array.astype(float, copy=False)
     except (TypeError, ValueError):
         raise TypeError(f"{name}: found {type(q).__name__} of other things; expected numbers, shape (..., n)") from None
     if array.ndim == 0 or array.shape[-1] != description.n:
@@ -42,10 +45,12 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     Returns
     -------
     Array
-        Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1. NaN rows where q is NaN.
+        Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1. NaN rows where q is not finite.
     """
     numbers = description.numbers
     q = joint_array(description, q)
+    missing = ~np.all(np.isfinite(q), axis=-1)
+    q = np.where(missing[..., None], np.nan, q)
     angle, offset = np.where(numbers.prismatic, 0.0, q), np.where(numbers.prismatic, q, 0.0)
     cos_q, sin_q = np.cos(angle), np.sin(angle)
     # The table's own angle enters by the sum's formula, so that an offset of 90 degrees is exact.
@@ -67,7 +72,7 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
         A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta * cos_alpha, cos_theta * cos_alpha, -sin_alpha
         A[..., 1, 3] = -sin_alpha * d
         A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
-    A[np.isnan(q).any(axis=-1)] = np.nan
+    A[missing] = np.nan
     return A
 
 

@@ -37,7 +37,7 @@ def library_robot(name: str) -> Description:
         No robot of that name; names the nearest.
     """
     if name not in robots():
-        close = difflib.get_close_matches(name, robots(), n=1, cutoff=0.5)
+        close = difflib.get_close_matches(name.lower(), robots(), n=1, cutoff=0.5)
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(robots())}"
         raise DescriptionError(f"no robot {name[:80]!r} in the library; {hint}")
     text = (resources.files("dhkit.description") / "library" / f"{name}.toml").read_text("utf-8")

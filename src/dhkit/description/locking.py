@@ -108,7 +108,10 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
         pass
     names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(held.values()))
     log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
-    return _locked(*_settled(description, held, names))
+    try:
+        return _locked(*_settled(description, held, names))
+    except ExpressionError as error:
+        raise DescriptionError(f"{description.name} cannot be locked: {error}") from None
 
 
 def _decided(description: Description, held: dict[int, Expression]) -> tuple[Description, dict[int, Expression]]:
@@ -159,6 +162,8 @@ def _locked(description: Description, held: dict[int, Expression]) -> Descriptio
 
 
 def _places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
+    if not isinstance(joints, Mapping):
+        raise DescriptionError(f"lock: found {type(joints).__name__}; expected joints with where, such as {{3: 0.0}}")
     names = [joint.name for joint in description.joints]
     places: dict[int, Expression] = {}
     for key, value in joints.items():

@@ -252,7 +252,9 @@ def validated(document: Mapping[str, Any]) -> RobotForm:
     try:
         return RobotForm.model_validate(document)
     except ValidationError as error:
-        raise DescriptionError(_one_line(error.errors()[0], document)) from None
+        # A mistyped key is also a missing one: what is there says more than what is not.
+        found = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        raise DescriptionError(_one_line(found[0], document)) from None
 
 
 def _one_line(error: ErrorDetails, document: Mapping[str, Any]) -> str:
@@ -268,7 +270,7 @@ def _one_line(error: ErrorDetails, document: Mapping[str, Any]) -> str:
         case "too_long" | "too_short":
             count = error["ctx"]
             bound = f"at most {count['max_length']}" if "max_length" in count else f"at least {count['min_length']}"
-            return f"{_place(path, document)}found {count['actual_length']} entries; expected {bound}"
+            return f"{_place(path, document)}found {len(found)} entries; expected {bound}"
         case "literal_error":
             expected = str(error["ctx"]["expected"])
         case "number" | "inertia" | "shape":

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from dhkit.description.named import Named
+from dhkit.description.parameters import check_parameter_name
 from dhkit.description.robot import Description
 from dhkit.description.values import Convention, Joint, JointType, Units
 from dhkit.errors import DescriptionError, ExpressionError
@@ -43,7 +44,7 @@ def from_dh(
     rows: Sequence[Sequence[Quantity]],
     *,
     order: Sequence[str] = COLUMNS,
-    kinds: str | None = None,
+    kinds: str | Sequence[str] | None = None,
     convention: str = "standard",
     angle: str = "rad",
     length: str = "m",
@@ -89,11 +90,13 @@ def from_dh(
     ):
         if found not in known:
             raise DescriptionError(f"{what} is {found!r}; expected one of {', '.join(known)}")
-    types = (kinds or "R" * len(rows)).upper()
+    types = "".join(kinds or "R" * len(rows)).upper()
     if len(types) != len(rows) or set(types) - {"R", "P"}:
         raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
     units = Units(length, angle)
     named = dict(parameters or {})
+    for key in named:
+        check_parameter_name(key)
     return Description(
         name=name,
         convention=Convention(convention),
@@ -113,7 +116,7 @@ def _joint(
     units: Units,
     names: Mapping[str, object],
 ) -> Joint:
-    if isinstance(row, str) or len(row) != len(COLUMNS):
+    if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != len(COLUMNS):
         raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
     entries: dict[str, Expression] = {
         key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
@@ -129,7 +132,7 @@ def _joint(
 def length(value: Expression, units: Units) -> str:
     """Return a length as text in these units: a number, or the expression that it is."""
     bare = (value / units.metres).rational
-    return value.text if bare is None else _short(bare)
+    return str(value) if bare is None else _short(bare)
 
 
 def angle(value: Expression) -> str:
@@ -167,7 +170,9 @@ class DHTable:
     @classmethod
     def of(cls, description: Description) -> DHTable:
         """Read a description's table, in the units of its file."""
-        units = description.units
+        # An expression is in metres, and then so is the whole table.
+        symbolic = any(joint.a.symbols or joint.d.symbols for joint in description.joints)
+        units = Units() if symbolic else description.units
         shift = "₋₁" if description.convention is Convention.MODIFIED else ""
         headings = ("joint", "θ", f"d [{units.length}]", f"a{shift} [{units.length}]", f"α{shift}")
         rows, latex_rows = [], []

@@ -87,9 +87,9 @@ class Atom:
             return PI_DIGITS
         if self.is_symbol:
             raise ExpressionError(f"{self.name} has no value")
-        arguments = [float(argument) for argument in self.arguments]
         if self.name == "group":
-            return Fraction(arguments[0])
+            return self.arguments[0].value()
+        arguments = [float(argument) for argument in self.arguments]
         try:
             return Fraction(abs(*arguments) if self.name == "abs" else getattr(math, self.name)(*arguments))
         except (ValueError, OverflowError):
@@ -187,7 +187,14 @@ class Expression:
         """The names that this depends on."""
         return frozenset(_symbols(self))
 
-    def __float__(self) -> float:
+    def value(self) -> Fraction:
+        """Return the number that this stands for; only pi and functions are rounded.
+
+        Raises
+        ------
+        ExpressionError
+            A name without value, a function outside its domain, or a division by zero.
+        """
         total = Fraction(0)
         for monomial, coefficient in self.terms:
             value = coefficient
@@ -197,8 +204,11 @@ class Expression:
                     raise ExpressionError(f"{self.text} divides by zero")
                 value *= base**exponent
             total += value
+        return total
+
+    def __float__(self) -> float:
         try:
-            return float(total)
+            return float(self.value())
         except OverflowError:
             raise ExpressionError(f"{self.text} is no finite double") from None
 

@@ -43,11 +43,13 @@ def in_blocks(
         ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
     if threads < 1:
-        raise ValueError(f"threads is {threads}; expected 1 or more")
+        raise ValueError(f"threads is {threads!r}; expected 1 or more")
     batch = np.broadcast_shapes(*(state.shape[:-1] for state in states))
     shape = (*batch, *tail)
     if out is None:
         out = np.empty(shape)
+    elif not isinstance(out, np.ndarray):
+        raise ValueError(f"out is {type(out).__name__}; expected an array of shape {shape}, float64")
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
         raise ValueError(
             f"out has shape {out.shape} and type {out.dtype}; expected {shape}, float64, contiguous and writeable"

@@ -114,6 +114,7 @@ def _check_frame(frame: str) -> None:
 def _axes(description: Description, q: Array) -> tuple[Array, Array, Array]:
     """Return joint axes and points on them, shapes (m, n, 3), and the tool's pose (m, 4, 4), all in the world."""
     T = world_to_frames(description, q)
+    T[~np.isfinite(q).all(axis=-1)] = np.nan  # frame 0 too: no entry of such a state means anything
     T_world_tool: Array = T[..., -1, :, :] @ description.numbers.T_last_tool
     carrying = T[..., :-1, :, :] if description.convention is Convention.STANDARD else T[..., 1:, :, :]
     return carrying[..., :3, 2], carrying[..., :3, 3], T_world_tool
