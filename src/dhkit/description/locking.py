@@ -39,7 +39,7 @@ from dhkit.description.table import Quantity, quantity
 from dhkit.description.traversal import expressions_in, names_in, with_values
 from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
 from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import PI, ZERO, Budget, Expression, arc_tangent, cos, exact_angle, sin, sqrt, substitute
+from dhkit.expressions import PI, ZERO, Budget, Expression, arc_tangent, cos, exact_angle, parse, sin, sqrt, substitute
 
 __all__ = ["lock"]
 
@@ -47,8 +47,8 @@ log = logging.getLogger(__name__)
 
 WORK = 300_000
 """Of exact arithmetic, about a second: beyond it an arm of symbols is locked as numbers."""
-LONGEST = 2_000
-"""Characters of an expression that a locked arm may have."""
+READABLE = 80_000
+"""Of a robot file's budget: what a locked arm of symbols may take to be read back."""
 PARALLEL = 1e-10
 """Sine of the angle between two axes below which they count as parallel: a row of the table cannot say it better."""
 
@@ -102,16 +102,28 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     try:
         with Budget(WORK):
             locked = _locked(description, held)
-        if max((len(entry.text) for entry in expressions_in(locked)), default=0) <= LONGEST:
-            return locked
+        with Budget(READABLE):
+            _read_again(locked)
+        return locked
     except ExpressionError:
         pass
+    except DescriptionError as error:
+        # The check of the new description ran out of the same budget; a fault of its own shows again below.
+        log.debug("%s: %s", description.name, error)
     names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(held.values()))
     log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
     try:
         return _locked(*_settled(description, held, names))
     except ExpressionError as error:
         raise DescriptionError(f"{description.name} cannot be locked: {error}") from None
+
+
+def _read_again(locked: Description) -> None:
+    """Do what reading the arm's file would, to see whether it fits into a file's budget."""
+    for expression in expressions_in(locked):
+        if expression.symbols:
+            parse(expression.text, locked.parameters)
+    replace(locked)
 
 
 def _decided(description: Description, held: dict[int, Expression]) -> tuple[Description, dict[int, Expression]]:
@@ -127,10 +139,14 @@ def _decided(description: Description, held: dict[int, Expression]) -> tuple[Des
 def _settled(
     description: Description, held: dict[int, Expression], names: frozenset[str]
 ) -> tuple[Description, dict[int, Expression]]:
-    """Put numbers for some parameters, and for those that these depend on, everywhere."""
+    """Put numbers for some parameters, and for those that depend on each other with them, everywhere."""
     values = resolved(description.parameters)
-    # A parameter made of a settled one follows it no more, so it is settled as well.
-    grown = names | {name for name in values if needs(name, description.parameters) & names}
+    # Neither what a settled parameter is made of nor what is made of it may change on its own any more.
+    grown, before = names, frozenset[str]()
+    while grown != before:
+        before = grown
+        grown |= {name for name in values if needs(name, description.parameters) & grown}
+        grown |= {other for name in grown for other in needs(name, description.parameters)}
     known = {name: values[name] for name in grown}
     rest = Named({name: value for name, value in description.parameters.items() if name not in known})
     fixed = with_values(replace(description, parameters=Named(values)), known)
