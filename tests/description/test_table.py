@@ -60,7 +60,7 @@ def test_a_table_of_symbols_prints_symbols():
     )
     text = str(DHTable.of(arm))
     assert "q1 + 60°" in text
-    assert "l1 + 0.003" in text
+    assert "l1 + 3*mm" in text
     assert "0.3 rad" in text
     assert "modified" in text
     assert "a₋₁" in text

@@ -167,8 +167,10 @@ def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
             await shown(socket, first)
             latest = await read(socket)
             await shown(socket, latest)
-            await asyncio.sleep(0.1)
-            assert all(page.session.settled for page in server.pages)
+            deadline = time.monotonic() + PATIENCE
+            while not all(page.session.settled for page in server.pages):
+                assert time.monotonic() < deadline, "a page is owed a frame that it never gets"
+                await asyncio.sleep(0.01)
             return decode_header(latest).flags
 
     assert run(slow()) == 1
