@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.description.poses import pose_parts
 from dhkit.description.values import Convention, Joint, Placement, Vector
 from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
 
@@ -78,7 +79,11 @@ def pose_of(placement: Placement, values: Mapping[str, Expression] | None = None
 
 
 def placement_of(T: ExactPose) -> Placement:
-    """Return origin and fixed-axis angles of a transform, by arc tangents alone (an arc sine would lose 1e-9)."""
+    """Return origin and fixed-axis angles of a transform, by arc tangents alone (an arc sine would lose 1e-9).
+
+    Exact where the angles are parts of a turn or hold parameters. Elsewhere they are taken in floats, one after the
+    other: near gimbal lock each by itself would be off by far more than all of them together.
+    """
     R = T[:3, :3]
     level = R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]
     if level.is_zero:
@@ -86,10 +91,13 @@ def placement_of(T: ExactPose) -> Placement:
         roll, yaw = arc_tangent(-R[1, 2], R[1, 1]), ZERO
     else:
         roll, yaw = arc_tangent(R[2, 1], R[2, 2]), arc_tangent(R[1, 0], R[0, 0])
-    pitch = arc_tangent(-R[2, 0], sqrt(level))
-    return Placement(
-        vector(T[:3, 3]), (settled(roll, angle=True), settled(pitch, angle=True), settled(yaw, angle=True))
-    )
+    angles = roll, arc_tangent(-R[2, 0], sqrt(level)), yaw
+    has_symbols = any(entry.symbols for entry in R.flat)
+    if not has_symbols and any(angle.half_turns is None for angle in angles):
+        _, euler = pose_parts(np.array([[float(entry) for entry in row] for row in T]), order="ZYX")
+        yaw, pitch, roll = (exact_angle(exact(float(angle))) for angle in euler)
+        angles = roll, pitch, yaw
+    return Placement(vector(T[:3, 3]), angles)
 
 
 def vector(entries: Sequence[Expression] | NDArray[Any]) -> Vector:

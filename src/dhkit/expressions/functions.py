@@ -12,6 +12,8 @@ from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exa
 
 __all__ = ["FUNCTIONS", "arc_tangent", "call", "cos", "decimals", "sin", "sqrt", "substitute"]
 
+NOTHING = 1e-40
+"""A function's value below this is taken for 0: no length times it is ever seen, and its digits would be many."""
 LARGEST_FACTORED = 10**6
 """Square roots of numbers below this are split into those of primes, so that sqrt(6) is sqrt(2)*sqrt(3)."""
 
@@ -153,6 +155,11 @@ def _replaced(atom: Atom, values: Mapping[str, Expression]) -> Expression:
     return call(atom.name, *arguments) if arguments else Expression.of_atom(atom)
 
 
+def _decimal(atom: Atom) -> Expression:
+    value = float(atom.value())
+    return exact(value) if abs(value) > NOTHING else ZERO
+
+
 def decimals(expression: Expression) -> Expression:
     """Return an expression with functions of numbers as decimals: 0.7648421872844885 for cos(0.7); roots stay."""
     total = []
@@ -160,7 +167,7 @@ def decimals(expression: Expression) -> Expression:
         product = Expression.number(coefficient)
         for atom, exponent in monomial:
             is_number = atom.arguments and atom.name != "sqrt" and not any(x.symbols for x in atom.arguments)
-            base = exact(float(atom.value())) if is_number else Expression.of_atom(atom)
+            base = _decimal(atom) if is_number else Expression.of_atom(atom)
             product = product * base**exponent
         total.append(product)
     return Expression.sum(total)
