@@ -144,9 +144,7 @@ class _Reader:
         return self.number(where, entry, self.units.metres)
 
     def angle(self, where: str, entry: Entry) -> Expression:
-        value = self.number(where, entry, self.units.radians)
-        snapped = exact_angle(value)
-        return snapped.as_written(value.written) if value.written is not None else snapped
+        return exact_angle(self.number(where, entry, self.units.radians))
 
     def vector(self, where: str, entries: Sequence[Entry], unit: Expression = ONE) -> Vector:
         x, y, z = (self.number(f"{where}[{i}]", entry, unit) for i, entry in enumerate(entries))

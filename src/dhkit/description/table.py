@@ -123,8 +123,7 @@ def _joint(
         for key, value in zip(order, row, strict=True)
     }
     for key in ("theta", "alpha"):
-        snapped, written = exact_angle(entries[key]), entries[key].written
-        entries[key] = snapped if written is None else snapped.as_written(written)
+        entries[key] = exact_angle(entries[key])
     a, alpha, d, theta = (entries[key] for key in ("a", "alpha", "d", "theta"))
     return Joint(JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, a, alpha, d, theta)
 

@@ -15,7 +15,7 @@ from dhkit.expressions import Expression, substitute
 
 if TYPE_CHECKING:
     from dhkit.description.robot import Description
-    from dhkit.description.values import Body, Drive, Geometry, Joint, Shape
+    from dhkit.description.values import Body, Drive, Geometry, Joint, Placement, Shape
 
 __all__ = ["MAX_JOINTS", "check", "check_body"]
 
@@ -60,8 +60,8 @@ def check(description: Description) -> tuple[str, ...]:
     for i, component in enumerate(description.gravity):
         value(f"gravity[{i}]", component)
     warnings: list[str] = []
-    for joint in description.joints:
-        warnings += _check_joint(joint, f"joint {description.joints.index(joint) + 1} ({joint.name})", value)
+    for number, joint in enumerate(description.joints, start=1):
+        warnings += _check_joint(joint, f"joint {number} ({joint.name})", value)
     _check_names(description)
     for key in ("source", "notes"):
         if found := CONTROL.search(getattr(description, key)):
@@ -70,9 +70,7 @@ def check(description: Description) -> tuple[str, ...]:
         ("base", description.base.placement, description.base.shapes),
         ("tool", description.tool.placement, description.tool.shapes),
     ):
-        for key, entries in (("xyz", placement.xyz), ("rpy", placement.rpy)):
-            for i, entry in enumerate(entries):
-                value(f"{part}: {key}[{i}]", entry)
+        _check_placement(placement, f"{part}: ", value)
         warnings += _check_shapes(shapes, part, value, description)
     for joint in description.joints:
         warnings += _check_shapes(joint.shapes, f"link of {joint.name}", value, description)
@@ -173,6 +171,12 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
         yield f"{where}: a body of {mass:g} kg has no inertia"
 
 
+def _check_placement(placement: Placement, prefix: str, value: Value) -> None:
+    for key, entries in (("xyz", placement.xyz), ("rpy", placement.rpy)):
+        for i, entry in enumerate(entries):
+            value(f"{prefix}{key}[{i}]", entry)
+
+
 def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None:
     """Refuse a body that is none, by itself.
 
@@ -189,9 +193,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
     if len(shapes) > MAX_SHAPES:
         raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
     for shape in shapes:
-        for key, entries in (("xyz", shape.placement.xyz), ("rpy", shape.placement.rpy)):
-            for i, entry in enumerate(entries):
-                value(f"{where}: shape.{key}[{i}]", entry)
+        _check_placement(shape.placement, f"{where}: shape.", value)
         if shape.color is not None and not COLOR.fullmatch(shape.color):
             raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
         yield from _check_geometry(shape.geometry, f"{where}: shape", value, description)

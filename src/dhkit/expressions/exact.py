@@ -333,7 +333,7 @@ def exact_angle(value: Expression) -> Expression:
         return value
     step = round(number * STEPS_IN_PI / PI_DIGITS)
     candidate = PI * Fraction(step, STEPS_IN_PI)
-    return candidate if step and float(candidate) == float(number) else value
+    return replace(candidate, written=value.written) if step and float(candidate) == float(number) else value
 
 
 def _expression(value: Scalar) -> Expression:

@@ -22,7 +22,6 @@ def library_urdf(name: str) -> str:
 def write_assets(root: Path) -> None:
     """Write urdf/ and meshes/ below a folder."""
     (root / "urdf").mkdir(exist_ok=True)
-    (root / "meshes" / "puma560").mkdir(parents=True, exist_ok=True)
     written = list(write_puma560_meshes(root / "meshes" / "puma560"))
     for name in robots():
         path = root / "urdf" / f"{name}.urdf"

@@ -17,8 +17,10 @@ from typing import Literal
 
 import numpy as np
 import trimesh
-from manifold3d import Manifold, Mesh64  # its stub is not in a package
+from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
+
+from dhkit.description import write_atomically
 
 Array = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
@@ -91,9 +93,7 @@ def write_puma560_meshes(folder: Path) -> list[Path]:
     paths = []
     for name, mesh in puma560_meshes().items():
         path = folder / f"{name}.stl"
-        unfinished = path.with_suffix(".stl.part")
-        unfinished.write_bytes(_binary_stl(name, mesh))
-        unfinished.replace(path)
+        write_atomically(path, _binary_stl(name, mesh))
         paths.append(path)
     return paths
 
