@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dhkit.description.named import Named
 from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units, Vector
@@ -73,3 +73,15 @@ class Description:
     def reach(self) -> float:
         """An upper bound of the distance from frame 0 to frame n: the sum of abs(a) + abs(d) + stroke, m."""
         return self.numbers.reach
+
+    # Whatever is made once for a robot is found by its hash, on every call: it is worked out once.
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(tuple(getattr(self, item.name) for item in fields(self) if item.compare))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the hash out: that of text differs from process to process."""
+        return {name: value for name, value in vars(self).items() if name != "_hash"}

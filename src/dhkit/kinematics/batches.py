@@ -1,33 +1,31 @@
-"""Batches worked off in blocks that fit the cache, on one thread or several, into an array of the caller's."""
+"""From arrays with any batch axes to a kernel's rows, and back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.kernels import Kernel
 
-__all__ = ["in_blocks"]
-
-BLOCK = 2_048
-"""States of one block: their frames take about 2 MB."""
+__all__ = ["check_threads", "fill", "result_array"]
 
 
-def in_blocks(
-    function: Callable[..., Array],
-    states: tuple[Array, ...],
+def fill(
+    kernel: Kernel,
+    parameters: Array,
+    states: Sequence[Array],
     tail: tuple[int, ...],
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Apply a function of states (N, n) with results (N, *tail) to states (..., n).
+    """Return a kernel's results, shape (..., *tail), for states of shape (..., n).
 
     Parameters
     ----------
-    function
-        Takes blocks of the states, each (m, n), and returns (m, *tail).
+    kernel, parameters
+        What to compute.
     states
         Arrays of shape (..., n); their batch axes are broadcast.
     tail
@@ -35,37 +33,58 @@ def in_blocks(
     out
         Where to write: float64, C-contiguous, of the result's shape; a new array if not given.
     threads
-        How many blocks are worked on at once; a batch of one block takes one.
+        How many threads share a large batch.
 
     Raises
     ------
     ValueError
         ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
+    check_threads(threads)
+    batch = states[0].shape[:-1] if len(states) == 1 else np.broadcast_shapes(*(state.shape[:-1] for state in states))
+    out = result_array((*batch, *tail), out)
+    if not out.size:
+        return out
+    rows = [_rows(state, batch) for state in states]
+    if any(np.may_share_memory(out, row) for row in rows):
+        rows = [row.copy() for row in rows]
+    kernel(parameters, rows, [out.reshape(len(rows[0]), -1)], threads)
+    return out
+
+
+def check_threads(threads: int) -> None:
+    """Refuse less than one thread.
+
+    Raises
+    ------
+    ValueError
+        ``threads`` is below 1.
+    """
     if threads < 1:
         raise ValueError(f"threads is {threads!r}; expected 1 or more")
-    batch = np.broadcast_shapes(*(state.shape[:-1] for state in states))
-    shape = (*batch, *tail)
+
+
+def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
+    """Return ``out``, or a new array where it is None.
+
+    Raises
+    ------
+    ValueError
+        ``out`` is not a writeable, contiguous float64 array of the shape.
+    """
     if out is None:
-        out = np.empty(shape)
-    elif not isinstance(out, np.ndarray):
+        return np.empty(shape)
+    if not isinstance(out, np.ndarray):
         raise ValueError(f"out is {type(out).__name__}; expected an array of shape {shape}, float64")
-    elif out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
+    if out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
         raise ValueError(
             f"out has shape {out.shape} and type {out.dtype}; expected {shape}, float64, contiguous and writeable"
         )
-    flat = [np.broadcast_to(state, (*batch, state.shape[-1])).reshape(-1, state.shape[-1]) for state in states]
-    result = out.reshape(-1, *tail)
-
-    def work(start: int) -> None:
-        block = slice(start, start + BLOCK)
-        result[block] = function(*(state[block] for state in flat))
-
-    starts = range(0, len(result), BLOCK)
-    if threads == 1 or len(starts) < 2:
-        for start in starts:
-            work(start)
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(work, starts))
     return out
+
+
+def _rows(state: Array, batch: tuple[int, ...]) -> Array:
+    if state.shape[:-1] != batch:
+        state = np.broadcast_to(state, (*batch, state.shape[-1]))
+    rows = state.reshape(-1, state.shape[-1])
+    return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array, world_to_frames, world_to_tool
-from dhkit.kinematics.batches import in_blocks
+from dhkit.description import Array, Description, joint_array
+from dhkit.kernels import kernel
+from dhkit.kinematics.batches import fill
+from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
-__all__ = ["forward_kinematics", "frames"]
+__all__ = ["forward_kinematics", "frames", "pattern_of"]
 
 
 def forward_kinematics(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
@@ -18,7 +22,7 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
     description
         The robot.
     q
-        Joint values, shape (..., n), rad and m.
+        Joint values, shape (..., n), rad and m; angles up to 1e6 rad.
     out
         Where to write, shape (..., 4, 4), float64, contiguous.
     threads
@@ -27,19 +31,41 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
     Returns
     -------
     Array
-        Shape (..., 4, 4); a row of NaN where q has one.
+        Shape (..., 4, 4); NaN where q has an entry that is not finite or too large.
 
     Raises
     ------
     ValueError, TypeError
         q has not shape (..., n) or is not numeric; ``out`` does not fit.
     """
-    states = (joint_array(description, q),)
-    return in_blocks(lambda block: world_to_tool(description, block), states, (4, 4), out, threads)
+    pattern, parameters = pattern_of(description)
+    run = kernel("forward_kinematics", pattern, lambda: _tool_graph(description))
+    return fill(run, parameters, [joint_array(description, q)], (4, 4), out, threads)
 
 
 def frames(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`."""
-    states = (joint_array(description, q),)
-    tail = (description.n + 1, 4, 4)
-    return in_blocks(lambda block: world_to_frames(description, block), states, tail, out, threads)
+    pattern, parameters = pattern_of(description)
+    run = kernel("frames", pattern, lambda: _frames_graph(description))
+    return fill(run, parameters, [joint_array(description, q)], (description.n + 1, 4, 4), out, threads)
+
+
+@lru_cache(maxsize=512)
+def pattern_of(description: Description) -> tuple[str, Array]:
+    """Return :func:`dhkit.symbolic.table_pattern`, worked out once for a description."""
+    return table_pattern(description)
+
+
+def _tool_graph(description: Description) -> Graph:
+    table, parameters = SymbolicTable.parametric(description)
+    q = joint_symbols("q", description.n)
+    return Graph.of("forward_kinematics", {"parameters": parameters, "q": q}, {"T": table.world_to_tool(q)})
+
+
+def _frames_graph(description: Description) -> Graph:
+    import casadi
+
+    table, parameters = SymbolicTable.parametric(description)
+    q = joint_symbols("q", description.n)
+    stacked = casadi.vertcat(*table.world_to_frames(q))
+    return Graph.of("frames", {"parameters": parameters, "q": q}, {"T": stacked})

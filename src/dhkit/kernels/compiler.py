@@ -1,0 +1,43 @@
+"""The elementary functions compiled by Numba, for kernels to call, and the settings that all of them share."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numba
+
+from dhkit.kernels import elementary
+
+__all__ = ["absolute", "atan2", "compiled", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
+
+SETTINGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}, "nogil": True}
+"""Products may be fused into sums and the sign of zero may go; NaN must survive, so no other liberty."""
+
+
+def compiled(signature: str, *, cache: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Compile a kernel for one signature; with a cache, load it from the folder that its module lies in."""
+    return numba.njit(signature, cache=cache, boundscheck=False, **SETTINGS)  # type: ignore[no-any-return]
+
+
+@numba.njit(**SETTINGS)  # type: ignore[untyped-decorator]
+def select(condition: Any, true: Any, false: Any) -> Any:
+    """Return one of two values: of two numbers at hand LLVM makes a choice without a branch."""
+    return true if condition else false
+
+
+def _twin(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function of ``elementary`` with what is compiled here in place of what it calls."""
+    names = vars(elementary) | {name: globals()[name] for name in elementary.__all__ if name in globals()}
+    assert isinstance(function, types.FunctionType)
+    return numba.njit(types.FunctionType(function.__code__, names), **SETTINGS)  # type: ignore[no-any-return]
+
+
+absolute = _twin(elementary.absolute)
+sqrt = _twin(elementary.sqrt)
+logical_not = _twin(elementary.logical_not)
+minimum = _twin(elementary.minimum)
+maximum = _twin(elementary.maximum)
+sincos = _twin(elementary.sincos)
+atan2 = _twin(elementary.atan2)

@@ -1,0 +1,175 @@
+"""Frames, tool and Jacobian of an arm as CasADi SX expressions of its joint values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Array, Convention, Description
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["Entry", "ReferenceAxes", "SymbolicTable", "jacobian", "jacobian_dot", "joint_symbols", "table_pattern"]
+
+Entry: TypeAlias = "float | casadi.SX"
+"""A number, or an expression that stands for one."""
+ReferenceAxes: TypeAlias = Literal["world", "tool"]
+"""Whose axes the tool's velocity is resolved in."""
+
+FOLDED = (0.0, 1.0, -1.0)
+"""Numbers that shorten an expression: cosines of right angles, lengths that are not there."""
+
+
+@dataclass(frozen=True)
+class SymbolicTable:
+    """The numbers that an arm's frames depend on, each a float or a symbol.
+
+    ``SymbolicTable.of`` takes the arm's own numbers. ``SymbolicTable.parametric`` keeps those that are 0, 1 or -1 and
+    puts symbols for the rest, so that one derivation, and one compiled kernel, serve every arm of the same pattern.
+    """
+
+    convention: Convention
+    prismatic: tuple[bool, ...]
+    rows: tuple[tuple[Entry, ...], ...]
+    """a, d, cos alpha, sin alpha, cos theta, sin theta of each row."""
+    base: tuple[Entry, ...]
+    """Frame 0 in the world: three rows of the 4x4 matrix, 12 entries."""
+    tool: tuple[Entry, ...]
+    """The tool in frame n, likewise."""
+
+    @classmethod
+    def of(cls, description: Description) -> SymbolicTable:
+        """Return the table of an arm, rounded once from its exact numbers."""
+        return cls._filled(description, table_numbers(description).tolist())
+
+    @classmethod
+    def parametric(cls, description: Description) -> tuple[SymbolicTable, casadi.SX]:
+        """Return a table of symbols, and the symbols; their values are ``table_pattern(description)[1]``."""
+        import casadi
+
+        numbers = table_numbers(description)
+        symbols = casadi.SX.sym("parameter", int(np.sum(~np.isin(numbers, FOLDED))))
+        waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
+        return cls._filled(description, [x if x in FOLDED else next(waiting) for x in numbers.tolist()]), symbols
+
+    @classmethod
+    def _filled(cls, description: Description, entries: Sequence[Entry]) -> SymbolicTable:
+        n = description.n
+        return cls(
+            description.convention,
+            tuple(bool(x) for x in description.numbers.prismatic),
+            tuple(tuple(entries[6 * i : 6 * i + 6]) for i in range(n)),
+            tuple(entries[6 * n : 6 * n + 12]),
+            tuple(entries[6 * n + 12 :]),
+        )
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.rows)
+
+    def link_transform(self, i: int, q: casadi.SX) -> casadi.SX:
+        """Return A_(i+1), 4x4, of row i (from 0) at the joint's value q."""
+        import casadi
+
+        a, d, cos_alpha, sin_alpha, cos_theta, sin_theta = self.rows[i]
+        cos_q, sin_q = (1.0, 0.0) if self.prismatic[i] else (casadi.cos(q), casadi.sin(q))
+        # The table's own angle enters by the sum's formula: an offset of 90 degrees is exact and costs nothing.
+        c = cos_q * cos_theta - sin_q * sin_theta
+        s = sin_q * cos_theta + cos_q * sin_theta
+        if self.prismatic[i]:
+            d = d + q
+        if self.convention is Convention.STANDARD:
+            return _matrix(
+                [c, -s * cos_alpha, s * sin_alpha, a * c],
+                [s, c * cos_alpha, -c * sin_alpha, a * s],
+                [0, sin_alpha, cos_alpha, d],
+            )
+        return _matrix(
+            [c, -s, 0, a],
+            [s * cos_alpha, c * cos_alpha, -sin_alpha, -sin_alpha * d],
+            [s * sin_alpha, c * sin_alpha, cos_alpha, cos_alpha * d],
+        )
+
+    def world_to_frames(self, q: casadi.SX) -> list[casadi.SX]:
+        """Return DH frames 0 ... n in the world, each 4x4, for q (n x 1), rad and m."""
+        frames = [_matrix(self.base[0:4], self.base[4:8], self.base[8:12])]
+        for i in range(self.n):
+            frames.append(frames[-1] @ self.link_transform(i, q[i]))
+        return frames
+
+    def world_to_tool(self, q: casadi.SX) -> casadi.SX:
+        """Return the tool in the world, 4x4."""
+        return self.world_to_frames(q)[-1] @ self.last_to_tool
+
+    @property
+    def last_to_tool(self) -> casadi.SX:
+        """The tool in frame n, 4x4."""
+        return _matrix(self.tool[0:4], self.tool[4:8], self.tool[8:12])
+
+
+def joint_symbols(name: str, n: int) -> casadi.SX:
+    """Return n symbols, n x 1."""
+    import casadi
+
+    return casadi.SX.sym(name, n)
+
+
+def table_numbers(description: Description) -> Array:
+    """Return the floats of a table in one row: six of each joint, then twelve of the base and of the tool."""
+    numbers = description.numbers
+    columns = (numbers.a, numbers.d, numbers.cos_alpha, numbers.sin_alpha, numbers.cos_theta, numbers.sin_theta)
+    joints = np.stack(columns, axis=1).ravel()
+    return np.concatenate([joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()]) + 0.0
+
+
+def table_pattern(description: Description) -> tuple[str, Array]:
+    """Return what a parametric table's expressions depend on, as text, and the values of its symbols.
+
+    Arms of equal pattern (convention, kinds of joints, which numbers are 0, 1 or -1) have equal expressions.
+    """
+    numbers = table_numbers(description)
+    codes = np.select([numbers == x for x in FOLDED], list("0+-"), "p")
+    kinds = "".join("P" if moves else "R" for moves in description.numbers.prismatic)
+    return f"{description.convention.value} {kinds} {''.join(codes)}", numbers[codes == "p"]
+
+
+def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
+    """Return the tool's geometric Jacobian, 6 x n.
+
+    Column i is (z x (p_tool - p); z) for a revolute joint about the axis z through p, and (z; 0) for a prismatic one
+    (Siciliano et al., Robotics, 2009, eq. 3.30).
+    """
+    import casadi
+
+    frames = table.world_to_frames(q)
+    tool = frames[-1] @ table.last_to_tool
+    carrying = frames[:-1] if table.convention is Convention.STANDARD else frames[1:]
+    columns = []
+    for T, slides in zip(carrying, table.prismatic, strict=True):
+        axis = T[:3, 2]
+        linear = axis if slides else casadi.cross(axis, tool[:3, 3] - T[:3, 3])
+        columns.append(casadi.vertcat(linear, casadi.SX(3, 1) if slides else axis))
+    J = casadi.horzcat(*columns)
+    if frame == "world":
+        return J
+    R_tool_world = tool[:3, :3].T
+    return casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
+
+
+def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
+    """Return the Jacobian's time derivative along qd, 6 x n; in ``"tool"`` axes that of its components."""
+    import casadi
+
+    J = jacobian(table, q, frame)
+    return casadi.reshape(casadi.jtimes(casadi.vec(J), q, qd), 6, table.n)
+
+
+def _matrix(*rows: Sequence[Any]) -> casadi.SX:
+    import casadi
+
+    return casadi.vertcat(*(casadi.horzcat(*row) for row in (*rows, (0, 0, 0, 1))))

@@ -1,0 +1,251 @@
+"""Straight-line programs: what is left of an expression when only the order of its operations matters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["Graph", "Node", "Variable"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A named input or output of a program: an array of numbers, row by row."""
+
+    name: str
+    shape: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """How many numbers."""
+        return math.prod(self.shape)
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation.
+
+    ``constant`` has a value, ``input`` the places (variable, entry); all others work on the results of earlier nodes:
+    add, subtract, multiply, divide, negate, absolute, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal, equal,
+    unequal, logical_and, logical_or, logical_not, and select (condition, where true, where false).
+    """
+
+    operation: str
+    arguments: tuple[int, ...] = ()
+    value: float = 0.0
+
+
+FOLDING: Mapping[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "negate": lambda a: -a,
+    "absolute": abs,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "atan2": math.atan2,
+    "minimum": min,
+    "maximum": max,
+}
+"""What is worked out when all arguments are constants."""
+
+COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
+
+
+@cache
+def _operations() -> dict[int, str]:
+    """Return our names of CasADi's operations, by its numbers; those with a rule of their own begin with a colon."""
+    import casadi
+
+    names = {
+        "ASSIGN": ":same",
+        "ADD": "add",
+        "SUB": "subtract",
+        "MUL": "multiply",
+        "DIV": "divide",
+        "NEG": "negate",
+        "SQ": ":square",
+        "TWICE": ":twice",
+        "INV": ":inverse",
+        "FABS": "absolute",
+        "SQRT": "sqrt",
+        "SIN": "sin",
+        "COS": "cos",
+        "ATAN2": "atan2",
+        "FMIN": "minimum",
+        "FMAX": "maximum",
+        "LT": "less",
+        "LE": "less_equal",
+        "EQ": "equal",
+        "NE": "unequal",
+        "AND": "logical_and",
+        "OR": "logical_or",
+        "NOT": "logical_not",
+        "IF_ELSE_ZERO": ":gate",
+    }
+    return {getattr(casadi, f"OP_{key}"): name for key, name in names.items()}
+
+
+@dataclass(frozen=True)
+class Graph:
+    """A straight-line program: nodes in an order in which each follows its arguments.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x")
+    >>> graph = Graph.of("square_twice", {"x": x}, {"y": (x * x) * (x * x)}, shapes={"x": (1,), "y": (1,)})
+    >>> [node.operation for node in graph.nodes]
+    ['input', 'multiply', 'multiply']
+    """
+
+    name: str
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    nodes: tuple[Node, ...]
+    results: tuple[tuple[int, ...], ...]
+    """Of each output the nodes of its entries, row by row."""
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        inputs: Mapping[str, casadi.SX],
+        outputs: Mapping[str, casadi.SX],
+        shapes: Mapping[str, tuple[int, ...]] | None = None,
+    ) -> Graph:
+        """Return the program of CasADi expressions; equal operations become one, constants are worked out.
+
+        Parameters
+        ----------
+        name
+            An identifier.
+        inputs, outputs
+            Symbols and expressions by name; matrices are taken row by row.
+        shapes
+            Shapes to state in place of CasADi's (rows, columns).
+
+        Raises
+        ------
+        ValueError
+            An operation that a straight-line program does not have.
+        """
+        import casadi
+
+        shapes = shapes or {}
+        function = casadi.Function(
+            name,
+            [casadi.vec(x.T) for x in map(casadi.SX, inputs.values())],
+            [casadi.densify(casadi.vec(y.T)) for y in map(casadi.SX, outputs.values())],
+        )
+        builder = _Builder()
+        entries = builder.read(function)
+        results = tuple(tuple(entries[k]) for k in range(len(outputs)))
+        nodes, results = _pruned(builder.nodes, results)
+        return cls(
+            name,
+            tuple(Variable(key, shapes.get(key, tuple(x.shape))) for key, x in inputs.items()),
+            tuple(Variable(key, shapes.get(key, tuple(y.shape))) for key, y in outputs.items()),
+            nodes,
+            results,
+        )
+
+
+class _Builder:
+    """Numbers equal values equally while a CasADi function is read."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._places: dict[Node, int] = {}
+
+    def read(self, function: casadi.Function) -> list[list[int]]:
+        """Return the nodes of each output's entries."""
+        import casadi
+
+        operations = _operations()
+        work: dict[int, int] = {}
+        outputs = [[-1] * function.numel_out(k) for k in range(function.n_out())]
+        for k in range(function.n_instructions()):
+            code, into = function.instruction_id(k), function.instruction_output(k)
+            sources = function.instruction_input(k)
+            if code == casadi.OP_CONST:
+                work[into[0]] = self.constant(function.instruction_constant(k))
+            elif code == casadi.OP_INPUT:
+                work[into[0]] = self.add(Node("input", (sources[0], sources[1])))
+            elif code == casadi.OP_OUTPUT:
+                outputs[into[0]][into[1]] = work[sources[0]]
+            elif code in operations:
+                work[into[0]] = self.apply(operations[code], [work[source] for source in sources])
+            else:
+                raise ValueError(f"{function.name()}: operation {code} of CasADi is not one of a straight-line program")
+        return outputs
+
+    def apply(self, operation: str, arguments: Sequence[int]) -> int:
+        first = arguments[0]
+        if operation == ":same":
+            return first
+        if operation == ":square":
+            return self.apply("multiply", (first, first))
+        if operation == ":twice":
+            return self.apply("add", (first, first))
+        if operation == ":inverse":
+            return self.apply("divide", (self.constant(1.0), first))
+        if operation == ":gate":
+            return self.apply("select", (*arguments, self.constant(0.0)))
+        operands = [self.nodes[k] for k in arguments]
+        if operation in FOLDING and all(node.operation == "constant" for node in operands):
+            return self.constant(FOLDING[operation](*(node.value for node in operands)))
+        if operation == "add" and (chosen := self._selected(arguments)) is not None:
+            return chosen
+        if operation in COMMUTATIVE:
+            arguments = sorted(arguments)
+        return self.add(Node(operation, tuple(arguments)))
+
+    def _selected(self, arguments: Sequence[int]) -> int | None:
+        """Return the choice that CasADi writes as (a if c else 0) + (b if not c else 0)."""
+        one, other = (self.nodes[k] for k in arguments)
+        if one.operation != "select" or other.operation != "select":
+            return None
+        zero = self.constant(0.0)
+        if one.arguments[2] != zero or other.arguments[2] != zero:
+            return None
+        if self.nodes[other.arguments[0]] == Node("logical_not", (one.arguments[0],)):
+            return self.add(Node("select", (one.arguments[0], one.arguments[1], other.arguments[1])))
+        if self.nodes[one.arguments[0]] == Node("logical_not", (other.arguments[0],)):
+            return self.add(Node("select", (other.arguments[0], other.arguments[1], one.arguments[1])))
+        return None
+
+    def constant(self, value: float) -> int:
+        return self.add(Node("constant", (), float(value) + 0.0))
+
+    def add(self, node: Node) -> int:
+        if node not in self._places:
+            self._places[node] = len(self.nodes)
+            self.nodes.append(node)
+        return self._places[node]
+
+
+def _pruned(
+    nodes: Sequence[Node], results: tuple[tuple[int, ...], ...]
+) -> tuple[tuple[Node, ...], tuple[tuple[int, ...], ...]]:
+    """Drop what no result needs, and renumber."""
+    needed = {k for entries in results for k in entries}
+    for k in range(len(nodes) - 1, -1, -1):
+        if k in needed and nodes[k].operation != "input":
+            needed.update(nodes[k].arguments)
+    place = {k: i for i, k in enumerate(sorted(needed))}
+
+    def moved(node: Node) -> Node:
+        if node.operation == "input":
+            return node
+        return Node(node.operation, tuple(place[k] for k in node.arguments), node.value)
+
+    return tuple(moved(nodes[k]) for k in sorted(needed)), tuple(tuple(place[k] for k in entries) for entries in results)
