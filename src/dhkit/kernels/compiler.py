@@ -10,7 +10,7 @@ import numba
 
 from dhkit.kernels import elementary
 
-__all__ = ["absolute", "atan2", "compiled", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
+__all__ = ["absolute", "atan2", "compiled", "floor", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
 
 SETTINGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}, "nogil": True}
 """Products may be fused into sums and the sign of zero may go; NaN must survive, so no other liberty."""
@@ -35,6 +35,7 @@ def _twin(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 absolute = _twin(elementary.absolute)
+floor = _twin(elementary.floor)
 sqrt = _twin(elementary.sqrt)
 logical_not = _twin(elementary.logical_not)
 minimum = _twin(elementary.minimum)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["EXACT_RANGE", "absolute", "atan2", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
+__all__ = ["EXACT_RANGE", "absolute", "atan2", "floor", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
 
 EXACT_RANGE = 1e6
 """rad: sine and cosine are right up to here and NaN beyond, where a double says little about an angle."""
@@ -33,6 +33,11 @@ def select(condition: Any, true: Any, false: Any) -> Any:
 def absolute(x: Any) -> Any:
     """Return the absolute value."""
     return np.abs(x)
+
+
+def floor(x: Any) -> Any:
+    """Return the greatest integer that is not above x."""
+    return np.floor(x)
 
 
 def sqrt(x: Any) -> Any:

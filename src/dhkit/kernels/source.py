@@ -13,7 +13,7 @@ __all__ = ["BLOCK", "array_source", "loop_source"]
 BLOCK = 64
 """Items of one block: 8 vectors of 8 doubles; all rows of a block, inverse kinematics included, fit the first cache."""
 
-FUNCTIONS = "absolute, atan2, logical_not, maximum, minimum, select, sincos, sqrt"
+FUNCTIONS = "absolute, atan2, floor, logical_not, maximum, minimum, select, sincos, sqrt"
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,7 @@ def loop_source(graph: Graph, types: Sequence[str], *, cache: bool = True) -> st
     lines = [
         f'"""{graph.name}: written by dhkit.kernels."""',
         "import numpy as np",
+        "from numpy import inf, nan",
         f"from dhkit.kernels.compiler import compiled, {FUNCTIONS}",
         "",
         f'@compiled("void({", ".join(arrays)})", cache={cache})',
@@ -102,6 +103,7 @@ def array_source(graph: Graph, types: Sequence[str]) -> str:
 
     arguments = ["parameters", *(f"x{k}" for k in range(len(layout.items))), *(f"y{k}" for k in range(len(types)))]
     lines = [
+        "from numpy import inf, nan",
         f"from dhkit.kernels.elementary import {FUNCTIONS}",
         f"def kernel({', '.join(arguments)}):",
         f"    missing = {_missing(layout, load)}",

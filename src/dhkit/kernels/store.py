@@ -58,12 +58,13 @@ def load(name: str, key: str, text: Callable[[bool], str]) -> types.ModuleType:
     if folder is None:
         return _in_memory(name, text)
     path = folder / f"{name}_{key}.py"
-    ready = path.exists() and any((folder / "__pycache__").glob(f"{path.stem}.kernel-*.nbc"))
+    known = path.exists()
+    if not (known and any((folder / "__pycache__").glob(f"{path.stem}.kernel-*.nbc"))):
+        log.info("compiling %s for the first time; later processes load it from %s", name, folder)
+    new = "" if known else text(True)
     try:
-        if not ready:
-            log.info("compiling %s for the first time; later processes load it from %s", name, folder)
-        if not path.exists():
-            write_atomically(path, text(True))
+        if not known:
+            write_atomically(path, new)
         return _from_file(path)
     except Exception as error:
         # A damaged or vanished cache must never stop a computation.

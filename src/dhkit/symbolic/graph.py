@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ class Node:
     """One operation.
 
     ``constant`` has a value, ``input`` the places (variable, entry); all others work on the results of earlier nodes:
-    add, subtract, multiply, divide, negate, absolute, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal, equal,
+    add, subtract, multiply, divide, negate, absolute, floor, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal, equal,
     unequal, logical_and, logical_or, logical_not, and select (condition, where true, where false).
     """
 
@@ -54,6 +54,7 @@ FOLDING: Mapping[str, Callable[..., float]] = {
     "atan2": math.atan2,
     "minimum": min,
     "maximum": max,
+    "floor": math.floor,
 }
 """What is worked out when all arguments are constants."""
 
@@ -82,6 +83,7 @@ def _operations() -> dict[int, str]:
         "ATAN2": "atan2",
         "FMIN": "minimum",
         "FMAX": "maximum",
+        "FLOOR": "floor",
         "LT": "less",
         "LE": "less_equal",
         "EQ": "equal",
@@ -164,7 +166,7 @@ class _Builder:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self._places: dict[Node, int] = {}
+        self._places: dict[Hashable, int] = {}
 
     def read(self, function: casadi.Function) -> list[list[int]]:
         """Return the nodes of each output's entries."""
@@ -227,10 +229,11 @@ class _Builder:
         return self.add(Node("constant", (), float(value) + 0.0))
 
     def add(self, node: Node) -> int:
-        if node not in self._places:
-            self._places[node] = len(self.nodes)
+        key = (node.operation, node.arguments, repr(node.value))  # by their text all NaN are one
+        if key not in self._places:
+            self._places[key] = len(self.nodes)
             self.nodes.append(node)
-        return self._places[node]
+        return self._places[key]
 
 
 def _pruned(

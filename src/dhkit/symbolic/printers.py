@@ -28,6 +28,7 @@ PYTHON = {
 
 C = PYTHON | {
     "absolute": "fabs({})",
+    "floor": "floor({})",
     "sqrt": "sqrt({})",
     "sin": "sin({})",
     "cos": "cos({})",
@@ -41,10 +42,15 @@ C = PYTHON | {
 }
 
 
+C_NUMBERS = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+
+
 def python_lines(
     graph: Graph, load: Callable[[int, int], str], store: Callable[[int, int, str], str]
 ) -> Iterator[str]:
     """Yield assignments ``v0 = ...``; sine and cosine of one angle are one call of ``sincos``.
+
+    The text knows ``nan`` and ``inf``, and a function for every operation that has no sign.
 
     Parameters
     ----------
@@ -142,7 +148,7 @@ def _python_value(graph: Graph, k: int) -> str:
 
 def _c_expression(graph: Graph, node: Node) -> str:
     if node.operation == "constant":
-        return repr(node.value)
+        return C_NUMBERS.get(repr(node.value), repr(node.value))
     if node.operation == "input":
         return f"{graph.inputs[node.arguments[0]].name}[{node.arguments[1]}]"
     return C[node.operation].format(*(f"v{k}" for k in node.arguments))

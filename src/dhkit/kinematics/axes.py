@@ -1,0 +1,109 @@
+"""How the axes of an arm lie to each other: what decides whether its inverse kinematics have a closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Description, world_to_frames
+from dhkit.description.values import Convention
+
+__all__ = ["TOLERANCE", "Axes", "inverse_pose"]
+
+TOLERANCE = 1e-12
+"""Sine of the angle by which axes may miss being parallel or perpendicular; share of the reach by which they may miss
+each other where they intersect. A closed form then still closes to about this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """The joint axes at zero joint values, offsets included, in the world; joints count from 1, as in words."""
+
+    directions: Array
+    """Shape (n, 3), unit vectors: the positive sense of each joint."""
+    points: Array
+    """Shape (n, 3), m: a point of each axis."""
+    prismatic: NDArray[np.bool_]
+    T_world_tool: Array
+    """Shape (4, 4)."""
+    scale: float
+    """The reach, m: what lengths are compared with."""
+    tolerance: float = TOLERANCE
+
+    @classmethod
+    def of(cls, description: Description, tolerance: float = TOLERANCE) -> Axes:
+        """Return the axes of an arm."""
+        frames = world_to_frames(description, np.zeros(description.n))
+        carrying = frames[:-1] if description.convention is Convention.STANDARD else frames[1:]
+        return cls(
+            directions=carrying[:, :3, 2],
+            points=carrying[:, :3, 3],
+            prismatic=description.numbers.prismatic,
+            T_world_tool=frames[-1] @ description.numbers.T_last_tool,
+            scale=_scale(description),
+            tolerance=tolerance,
+        )
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.prismatic)
+
+    @property
+    def kinds(self) -> str:
+        """One letter a joint, R or P."""
+        return "".join("P" if moves else "R" for moves in self.prismatic)
+
+    def direction(self, i: int) -> Array:
+        """Return the direction of axis i (from 1)."""
+        return self.directions[i - 1]
+
+    def point(self, i: int) -> Array:
+        """Return a point of axis i (from 1), m."""
+        return self.points[i - 1]
+
+    def parallel(self, i: int, j: int) -> bool:
+        """Return whether axes i and j have the same or opposite direction."""
+        return bool(np.linalg.norm(np.cross(self.direction(i), self.direction(j))) <= self.tolerance)
+
+    def perpendicular(self, i: int, j: int) -> bool:
+        """Return whether the directions of axes i and j are at right angles."""
+        return bool(abs(self.direction(i) @ self.direction(j)) <= self.tolerance)
+
+    def sense(self, i: int, j: int) -> float:
+        """Return +1 where parallel axes i and j have the same direction, else -1."""
+        return 1.0 if self.direction(i) @ self.direction(j) > 0 else -1.0
+
+    def distance(self, i: int, point: Array) -> float:
+        """Return how far a point is from axis i, m."""
+        return float(np.linalg.norm(np.cross(self.direction(i), point - self.point(i))))
+
+    def on(self, i: int, point: Array) -> bool:
+        """Return whether axis i passes through a point."""
+        return self.distance(i, point) <= self.tolerance * self.scale
+
+    def meeting_point(self, i: int, j: int) -> Array | None:
+        """Return where axes i and j intersect, or None where they are parallel or miss each other."""
+        a, b = self.direction(i), self.direction(j)
+        normal = np.cross(a, b)
+        size = normal @ normal
+        if size <= self.tolerance**2:
+            return None
+        along = np.cross(self.point(j) - self.point(i), b) @ normal / size
+        point: Array = self.point(i) + along * a
+        return point if self.on(j, point) else None
+
+
+def inverse_pose(T: Array) -> Array:
+    """Return the inverse of a rigid transform, shape (4, 4): by its transposed rotation, which rounds nothing."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
+def _scale(description: Description) -> float:
+    reach = description.reach
+    return reach if np.isfinite(reach) and reach > 0 else 1.0

@@ -1,0 +1,112 @@
+"""Joint 1 as a turntable under an arm that moves in a plane: where the plane goes, and what it looks like inside.
+
+Coordinates: u along axis 1, v along the parallel axes behind it (at right angles to axis 1), x = u x v. They are taken at
+zero joint values, with the origin on axis 1 at the height of axis 2, and turn with joint 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form.formulas import ROUNDING, SINGULAR, SX, Pair, times, unit, where
+
+__all__ = ["ArmPlane", "Shoulder", "Vector", "as_pair", "shoulders", "turned_back"]
+
+Vector: TypeAlias = tuple[SX, SX, SX]
+"""Coordinates along x, u and v."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPlane:
+    """The frame (x, u, v) of an arm whose axis 2 is at right angles to axis 1."""
+
+    R: Array
+    """Shape (3, 3): rows x, u, v in the world."""
+    origin: Array
+    """Shape (3,), m, in the world."""
+    up: float
+    """+1 where u points up (or is level), -1 where down."""
+
+    @classmethod
+    def of(cls, axes: Axes) -> ArmPlane:
+        """Return the frame of axes 1 and 2."""
+        u, v = axes.direction(1), axes.direction(2)
+        height = u @ (axes.point(2) - axes.point(1))
+        return cls(
+            np.stack([np.cross(u, v), u, v]) + 0.0, axes.point(1) + height * u, 1.0 if u[2] >= 0 else -1.0
+        )
+
+    def coordinates(self, point: Array) -> Array:
+        """Return a point's coordinates (x, u, v), m."""
+        place: Array = self.R @ (point - self.origin)
+        return place
+
+    @property
+    def T(self) -> Array:
+        """Shape (4, 4): the world in this frame."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.R, -self.R @ self.origin
+        return T
+
+
+@dataclass(frozen=True)
+class Shoulder:
+    """One of the two places of joint 1 that bring the arm's plane through a point."""
+
+    q1: Pair
+    x: SX
+    """The point's distance from axis 1 along the plane, m, with its sign."""
+    miss: SX
+    singular: SX
+    clamped: SX
+
+
+def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder, Shoulder]:
+    """Turn joint 1 so that a point has the coordinate ``offset`` across the plane; the point in front, then behind.
+
+    Parameters
+    ----------
+    point
+        Where it is, with joint 1 at zero, m.
+    offset
+        How far across the plane it must be, m.
+    scale, reach
+        What rounding and nearness to the singularity are measured by, m.
+    """
+    x, _, v = point
+    r = ca.sqrt(x * x + v * v)
+    short = ca.fabs(offset) - r
+    beyond = short > ROUNDING * scale
+    square = (r - ca.fabs(offset)) * (r + ca.fabs(offset))
+    front = ca.sqrt(where(square > 0, square, 0.0))
+
+    def side(along: SX) -> Shoulder:
+        # The plane's point (along, offset) seen in the fixed frame is (x, v): their angle is that of joint 1.
+        return Shoulder(
+            q1=times(unit(along, offset, scale), unit(x, v, scale), -1.0),
+            x=along,
+            miss=where(beyond, short, 0.0),
+            singular=front < SINGULAR * reach,
+            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+        )
+
+    return side(front), side(-front)
+
+
+def turned_back(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
+    """Return a vector as the arm sees it: joint 1 undone, then a turn rho about v."""
+    c, s = q1
+    x, u, v = c * vector[0] - s * vector[2], vector[1], c * vector[2] + s * vector[0]
+    return rho[0] * x + rho[1] * u, rho[0] * u - rho[1] * x, v
+
+
+def as_pair(x: float, y: float) -> tuple[float, float]:
+    """Return the direction of a vector that is not zero as (cosine, sine)."""
+    size = float(np.hypot(x, y))
+    return x / size + 0.0, y / size + 0.0

@@ -1,0 +1,65 @@
+"""Which closed form an arm has, and why, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from dhkit.description import Description
+from dhkit.kinematics.axes import TOLERANCE, Axes
+from dhkit.kinematics.closed_form import spherical_wrist
+from dhkit.kinematics.closed_form.family import Family, Fit
+
+__all__ = ["FAMILIES", "Classification", "classify"]
+
+FAMILIES = (
+    Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
+    Family("slide_wrist", spherical_wrist.slide_fit, spherical_wrist.slide_formulas),
+)
+"""In the order in which they are tried."""
+NEARLY = 1e-3
+"""How near an arm must be to a family for a typing error to be suspected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Classification:
+    """What the geometry of an arm's axes allows."""
+
+    words: str
+    """Such as ``6R, spherical wrist, axes 2 and 3 parallel: closed form, 8 branches``."""
+    family: Family | None
+    fit: Fit | None
+
+
+@lru_cache(maxsize=512)
+def classify(description: Description) -> Classification:
+    """Read the axes of an arm and return its closed form, if it has one.
+
+    Axes count as parallel or perpendicular to 1e-12 rad, as intersecting to 1e-12 of the reach.
+    """
+    axes = Axes.of(description)
+    kinds = _kinds(axes.kinds)
+    found = _first(axes)
+    if found is not None:
+        family, fit = found
+        count = len(fit.branches)
+        branches = f"{count} branch{'es' if count > 1 else ''}"
+        met = "" if len(fit.met) == 6 else f"; meets {', '.join(fit.met)}"
+        return Classification(f"{kinds}, {fit.words}: closed form, {branches}{met}", family, fit)
+    words = f"{kinds}: no closed form known"
+    near = _first(Axes.of(description, NEARLY))
+    if near is not None:
+        words += f" (nearly one of {kinds} with {near[1].words}, but not to {TOLERANCE:g}: are its angles rounded?)"
+    return Classification(words, None, None)
+
+
+def _first(axes: Axes) -> tuple[Family, Fit] | None:
+    for family in FAMILIES:
+        fit = family.fit(axes)
+        if fit is not None:
+            return family, fit
+    return None
+
+
+def _kinds(letters: str) -> str:
+    return f"{len(letters)}R" if set(letters) == {"R"} else letters

@@ -1,0 +1,92 @@
+"""What a family of closed forms is, and the pose that its formulas start from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form.formulas import SX, Branch
+
+__all__ = ["ALL", "Family", "Fit", "PoseSymbols", "Seen"]
+
+ALL = ("x", "y", "z", "rx", "ry", "rz")
+"""The coordinates of a pose: position, and rotation about the axes."""
+Vector: TypeAlias = tuple[SX, SX, SX]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An arm seen as a member of a family."""
+
+    words: str
+    """What the axes are like."""
+    parameters: Mapping[str, Array | float | tuple[float, ...]]
+    """The numbers that the family's formulas work with, by name."""
+    branches: tuple[str, ...]
+    met: tuple[str, ...]
+    """Coordinates of a pose that are met."""
+
+    def vector(self) -> Array:
+        """Return all parameters in one row."""
+        return np.concatenate([np.ravel(value) for value in self.parameters.values()]).astype(float)
+
+    def symbols(self) -> tuple[dict[str, SX], ca.SX]:
+        """Return symbols of the parameters' shapes (pairs as tuples, matrices as matrices), and all in one column."""
+        row = ca.SX.sym("p", sum(np.size(value) for value in self.parameters.values()))
+        named: dict[str, SX] = {}
+        start = 0
+        for name, value in self.parameters.items():
+            part = row[start : start + np.size(value)]
+            shape = np.shape(value)
+            if len(shape) == 2:
+                named[name] = ca.reshape(part, shape[1], shape[0]).T
+            else:
+                named[name] = tuple(ca.vertsplit(part)) if shape else part
+            start += np.size(value)
+        return named, row
+
+
+@dataclass(frozen=True)
+class Family:
+    """Arms whose inverse kinematics share one closed form."""
+
+    name: str
+    """An identifier."""
+    fit: Callable[[Axes], Fit | None]
+    """Recognises an arm by its axes, at zero joint values."""
+    formulas: Callable[[Mapping[str, SX], PoseSymbols], list[Branch]]
+    """Return the branches, in the order of ``Fit.branches``."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A pose in another frame: its three axes and its origin."""
+
+    rotation: tuple[Vector, Vector, Vector]
+    position: Vector
+
+
+@dataclass(frozen=True)
+class PoseSymbols:
+    """The pose asked for, of the tool in the world."""
+
+    T: ca.SX
+    """3 x 4."""
+    scale: SX
+    """What rounding of positions is measured by, m."""
+
+    def seen(self, left: ca.SX, right: ca.SX) -> Seen:
+        """Return left T right, all 3 x 4 with a last row 0 0 0 1."""
+        T = _product(_product(left, self.T), right)
+        columns = [tuple(ca.vertsplit(T[:, k])) for k in range(4)]
+        return Seen((columns[0], columns[1], columns[2]), columns[3])
+
+
+def _product(A: ca.SX, B: ca.SX) -> ca.SX:
+    return ca.horzcat(A[:, :3] @ B[:, :3], A[:, :3] @ B[:, 3] + A[:, 3])

@@ -1,0 +1,155 @@
+"""The pieces that closed forms are made of, as CasADi SX expressions without branches.
+
+An angle is carried as its (cosine, sine) pair: no sine or cosine is ever taken, and only the results need an arc tangent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+__all__ = [
+    "ROUNDING",
+    "SINGULAR",
+    "Branch",
+    "Pair",
+    "TwoLink",
+    "angle",
+    "half_turn",
+    "no",
+    "positive",
+    "sign",
+    "times",
+    "two_link",
+    "unit",
+    "where",
+    "wrapped",
+]
+
+SX: TypeAlias = Any
+"""A CasADi SX scalar, or a number that stands for one."""
+Pair: TypeAlias = tuple[SX, SX]
+"""Cosine and sine of an angle."""
+
+ROUNDING = 2e-14
+"""Share of the lengths at hand by which a pose may lie beyond the boundary and still counts as on it."""
+SINGULAR = 1e-6
+"""A branch is flagged where the sine, or the distance over the reach, that vanishes at a singularity is below this."""
+NOTHING = 1e-13
+"""Below this share a direction is noise, and any direction serves: the pose closes to about this."""
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One solution: joint values, and the conditions under which it holds."""
+
+    q: tuple[SX, ...]
+    """rad and m."""
+    miss: SX
+    """How far the pose is out of this branch's reach, m; the branch holds where it is 0."""
+    shoulder: SX = 0.0
+    elbow: SX = 0.0
+    wrist: SX = 0.0
+    clamped: SX = 0.0
+
+
+def where(condition: SX, true: SX, false: SX) -> SX:
+    """Return one of two values."""
+    return ca.if_else(condition, true, false)
+
+
+def positive(x: SX) -> SX:
+    """Return x where it is above 0, else 0."""
+    return where(x > 0, x, 0.0)
+
+
+def sign(x: SX) -> SX:
+    """Return -1 where x is below 0, else 1."""
+    return where(x < 0, -1.0, 1.0)
+
+
+def no(condition: SX) -> SX:
+    """Return the opposite of a condition."""
+    return ca.logic_not(condition)
+
+
+def unit(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
+    """Return the direction of (x, y) as a pair; where both are noise at ``scale``, the pair given."""
+    size = ca.sqrt(x * x + y * y)
+    sure = size > NOTHING * scale
+    inverse = 1.0 / where(sure, size, 1.0)
+    return where(sure, x * inverse, otherwise[0]), where(sure, y * inverse, otherwise[1])
+
+
+def times(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
+    """Return the pair of the sum of two angles, or of their difference for sense -1."""
+    sine = sense * b[1]
+    return a[0] * b[0] - a[1] * sine, a[1] * b[0] + a[0] * sine
+
+
+def angle(pair: Pair) -> SX:
+    """Return the angle of a pair in (-pi, pi]."""
+    return ca.atan2(pair[1], pair[0])
+
+
+def half_turn(x: SX) -> SX:
+    """Return an angle in (-pi, pi] turned by pi, in (-pi, pi]."""
+    return where(x > 0, x - ca.pi, x + ca.pi)
+
+
+def wrapped(x: SX) -> SX:
+    """Return an angle in [-3 pi, 3 pi] in (-pi, pi]."""
+    x = where(x > ca.pi, x - 2 * ca.pi, x)
+    return where(x <= -ca.pi, x + 2 * ca.pi, x)
+
+
+@dataclass(frozen=True)
+class TwoLink:
+    """How two links of lengths L1 and L2 in a plane reach a point; both elbows."""
+
+    first: tuple[Pair, Pair]
+    """Direction of the first link, for the elbow on the left of the line to the point, and on the right."""
+    between: tuple[Pair, Pair]
+    """Angle from the first link to the second."""
+    miss: SX
+    """How far the point is out of reach, m; up to rounding 0."""
+    straight: SX
+    """Whether the arm is stretched or folded."""
+    clamped: SX
+    """Whether the point lies beyond the boundary by rounding."""
+
+
+def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
+    """Solve L1 e^(i a) + L2 e^(i (a + b)) = x + i y for a and b.
+
+    Parameters
+    ----------
+    x, y
+        The point, m.
+    L1, L2
+        Lengths, m, positive.
+    scale
+        The size of the numbers that x and y were computed from, m: what rounding is measured by.
+    """
+    R = ca.sqrt(x * x + y * y)
+    reach, gap = L1 + L2, ca.fabs(L1 - L2)
+    excess = ca.fmax(R - reach, gap - R)
+    beyond = excess > ROUNDING * scale
+    # 1 + cos b and 1 - cos b as products: nothing cancels near the stretched and the folded arm.
+    folded = (R - gap) * (R + gap) / (2 * L1 * L2)
+    stretched = (reach - R) * (reach + R) / (2 * L1 * L2)
+    near_folded = folded < 1.0
+    square = folded * stretched
+    c, s = unit(where(near_folded, folded - 1.0, 1.0 - stretched), ca.sqrt(positive(square)))
+    # Both elbows mirror each other at the line to the point: a = arg(point) -+ arg(L1 + L2 e^(i b)).
+    forward = unit(x, y, scale)
+    inside = unit(where(near_folded, L1 - L2 + L2 * folded, L1 + L2 * c), L2 * s, L1)
+    return TwoLink(
+        first=(times(forward, inside), times(forward, inside, -1.0)),
+        between=((c, -s), (c, s)),
+        miss=where(beyond, excess, 0.0),
+        straight=s < SINGULAR,
+        clamped=ca.logic_and(square < 0, no(beyond)),
+    )

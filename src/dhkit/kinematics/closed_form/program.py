@@ -1,0 +1,112 @@
+"""A family's formulas as one program: from a pose to all branches, with what is to be said about each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.closed_form.family import Family, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.formulas import Branch, where
+from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKStatus
+from dhkit.symbolic import Graph
+
+__all__ = ["OUTPUT_TYPES", "limit_parameters", "program"]
+
+ORTHONORMAL = 1e-6
+"""By how much a rotation's columns may miss being orthonormal, as for every pose that dhkit takes."""
+OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")
+"""Of joint values, distance, valid, flags and status."""
+TURN = 2 * np.pi
+
+
+def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> Array:
+    """Return two numbers a joint: where its limits begin and how wide they are, m, or rad over a turn.
+
+    A joint without limits begins anywhere and is as wide as can be.
+    """
+    begin = np.where(np.isfinite(lower), lower - LIMIT_SLACK, -1e300)
+    width = np.where(np.isfinite(upper), upper + LIMIT_SLACK - begin, 2e300)
+    unlimited = ~(np.isfinite(lower) & np.isfinite(upper))
+    turning = ~np.asarray(prismatic)
+    begin = np.where(turning & unlimited, 0.0, begin)
+    width = np.where(turning & unlimited, TURN, width)
+    return np.where(turning, np.stack([begin, width]) / TURN, np.stack([begin, width])).T.ravel()
+
+
+def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
+    """Return the program of a family: T (4 x 4) to q, distance, valid, flags and status.
+
+    Its parameters are ``fit.vector()`` and then :func:`limit_parameters`.
+    """
+    named, symbols = fit.symbols()
+    n = len(prismatic)
+    limits = ca.SX.sym("limits", 2 * n)
+    T = ca.SX.sym("T", 4, 4)
+    is_pose = _is_pose(T)
+    scale = named["reach"] + ca.norm_1(T[:3, 3])
+    branches = family.formulas(named, PoseSymbols(T[:3, :], scale))
+    if len(branches) != len(fit.branches):
+        raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
+
+    valid = [ca.logic_and(is_pose, branch.miss == 0) for branch in branches]
+    q = [[where(ok, x, np.nan) for x in branch.q] for ok, branch in zip(valid, branches, strict=True)]
+    flags = [where(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
+    some = reduce(ca.logic_or, valid)
+    special = reduce(ca.logic_or, (ca.logic_and(ok, _singular(b)) for ok, b in zip(valid, branches, strict=True)))
+    miss = reduce(ca.fmin, (branch.miss for branch in branches))
+    reached = where(special, float(IKStatus.singular), float(IKStatus.ok))
+    found = where(some, reached, float(IKStatus.out_of_reach))
+    status = where(is_pose, found, float(IKStatus.not_a_pose))
+    return Graph.of(
+        f"ik_{family.name}",
+        {"parameters": ca.vertcat(symbols, limits), "T": T},
+        {
+            "q": ca.vertcat(*(ca.horzcat(*row) for row in q)),
+            "distance": where(is_pose, where(some, 0.0, miss), np.nan),
+            "valid": ca.vertcat(*(where(ok, 1.0, 0.0) for ok in valid)),
+            "flags": ca.vertcat(*flags),
+            "status": status,
+        },
+    )
+
+
+def _is_pose(T: ca.SX) -> Any:
+    R = T[:3, :3]
+    defect = R.T @ R - ca.SX.eye(3)
+    entries = [defect[i, j] for i in range(3) for j in range(i + 1)]
+    entries += [T[3, 0], T[3, 1], T[3, 2], T[3, 3] - 1.0]
+    rigid = reduce(ca.logic_and, (ca.fabs(entry) <= ORTHONORMAL for entry in entries))
+    proper = ca.dot(ca.cross(R[:, 0], R[:, 1]), R[:, 2]) > 0
+    finite = ca.norm_1(T[:3, 3]) < 1e300
+    return ca.logic_and(ca.logic_and(rigid, proper), finite)
+
+
+def _singular(branch: Branch) -> Any:
+    return reduce(ca.logic_or, (branch.shoulder, branch.elbow, branch.wrist))
+
+
+def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
+    inside = reduce(
+        ca.logic_and,
+        (_inside(x, limits[2 * i], limits[2 * i + 1], prismatic[i]) for i, x in enumerate(branch.q)),
+    )
+    conditions = {
+        IKFlag.shoulder: branch.shoulder,
+        IKFlag.elbow: branch.elbow,
+        IKFlag.wrist: branch.wrist,
+        IKFlag.clamped: branch.clamped,
+        IKFlag.out_of_limits: ca.logic_not(inside),
+    }
+    return sum(where(condition, float(flag), 0.0) for flag, condition in conditions.items())
+
+
+def _inside(x: Any, begin: Any, width: Any, slides: bool) -> Any:
+    if slides:
+        return ca.logic_and(x >= begin, x - begin <= width)
+    turns = x / TURN - begin
+    return turns - ca.floor(turns) <= width

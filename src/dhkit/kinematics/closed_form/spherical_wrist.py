@@ -1,0 +1,248 @@
+"""Six joints with a spherical wrist (axes 4, 5 and 6 meet in one point) on an arm that moves in a plane.
+
+The regional structure puts the wrist's centre in place: two parallel revolute axes (PUMA, KUKA, ABB, Fanuc, Adept) or a
+revolute and a prismatic one (Stanford). The wrist then turns the tool (Pieper, The Kinematics of Manipulators under
+Computer Control, 1968; branches as in Lee & Ziegler, IEEE Trans. AES 20, 1984, but read off the geometry).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.axes import Axes, inverse_pose
+from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Shoulder, Vector, as_pair, shoulders, turned_back
+from dhkit.kinematics.closed_form.family import ALL, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.formulas import (
+    ROUNDING,
+    SINGULAR,
+    SX,
+    Branch,
+    Pair,
+    angle,
+    half_turn,
+    positive,
+    sign,
+    times,
+    two_link,
+    unit,
+    where,
+    wrapped,
+)
+
+__all__ = ["elbow_fit", "elbow_formulas", "slide_fit", "slide_formulas"]
+
+
+@dataclass(frozen=True)
+class Region:
+    """One way of the first three joints to put the wrist's centre in place."""
+
+    q: tuple[SX, SX, SX]
+    rho: Pair
+    """How far link 3 has turned about v since zero joint values."""
+    shoulder: Shoulder
+    miss: SX
+    elbow: SX
+    clamped: SX
+
+
+def elbow_fit(axes: Axes) -> Fit | None:
+    """Recognise an arm with parallel axes 2 and 3."""
+    if axes.kinds != "RRRRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3)):
+        return None
+    centre = _wrist_centre(axes)
+    if centre is None:
+        return None
+    plane = ArmPlane.of(axes)
+    second, third, wrist = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), centre))
+    upper, fore = third[:2] - second[:2], wrist[:2] - third[:2]
+    if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
+        return None
+    upper_pair, fore_pair = as_pair(*upper), as_pair(*fore)
+    geometry = {
+        "a1": second[0],
+        "offset": _snapped(wrist[2], axes),
+        "L2": np.linalg.norm(upper),
+        "L3": np.linalg.norm(fore),
+        "upper": upper_pair,
+        "bend": times(fore_pair, upper_pair, -1.0),
+        "sense3": axes.sense(2, 3),
+    }
+    return Fit(
+        words="spherical wrist, axes 2 and 3 parallel",
+        parameters=_parameters(axes, plane, centre) | geometry,
+        branches=_labels(bool(geometry["offset"]), ("up", "down")),
+        met=ALL,
+    )
+
+
+def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return the eight branches: shoulder, then elbow, then wrist."""
+    T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
+    branches = []
+    for shoulder in _ordered_shoulders(p, T.position, pose.scale):
+        x, u = shoulder.x - p["a1"], T.position[1]
+        arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
+        # The left elbow of the line to the wrist is the upper one where the wrist is in front of axis 2.
+        front = sign(p["up"] * x)
+        for raised in (front, -front):
+            first = tuple(where(raised > 0, a, b) for a, b in zip(*arm.first, strict=True))
+            between = tuple(where(raised > 0, a, b) for a, b in zip(*arm.between, strict=True))
+            q2 = times((first[0], first[1]), p["upper"], -1.0)
+            bent = times((between[0], between[1]), p["bend"], -1.0)
+            region = Region(
+                q=(angle(shoulder.q1), angle(q2), angle((bent[0], p["sense3"] * bent[1]))),
+                rho=times(q2, bent),
+                shoulder=shoulder,
+                miss=_hypot(shoulder.miss, arm.miss),
+                elbow=arm.straight,
+                clamped=ca.logic_or(shoulder.clamped, arm.clamped),
+            )
+            branches += _with_wrist(p, T.rotation, region)
+    return branches
+
+
+def slide_fit(axes: Axes) -> Fit | None:
+    """Recognise an arm whose third joint slides at right angles to axis 2."""
+    if axes.kinds != "RRPRRR" or not (axes.perpendicular(1, 2) and axes.perpendicular(2, 3)):
+        return None
+    centre = _wrist_centre(axes)
+    if centre is None:
+        return None
+    plane = ArmPlane.of(axes)
+    second, wrist = plane.coordinates(axes.point(2)), plane.coordinates(centre)
+    along = plane.R @ axes.direction(3)
+    lever = wrist[:2] - second[:2]
+    geometry = {
+        "a1": second[0],
+        "offset": _snapped(wrist[2], axes),
+        "boom": as_pair(along[0], along[1]),
+        "start": lever @ along[:2],
+        "lift": along[0] * lever[1] - along[1] * lever[0],
+    }
+    return Fit(
+        words="spherical wrist, joint 3 slides at right angles to axis 2",
+        parameters=_parameters(axes, plane, centre) | geometry,
+        branches=_labels(bool(geometry["offset"]), ("out", "in")),
+        met=ALL,
+    )
+
+
+def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return the eight branches: shoulder, then boom, then wrist."""
+    T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
+    branches = []
+    for shoulder in _ordered_shoulders(p, T.position, pose.scale):
+        x, u = shoulder.x - p["a1"], T.position[1]
+        R, lift = ca.sqrt(x * x + u * u), ca.fabs(p["lift"])
+        short = lift - R
+        beyond = short > ROUNDING * pose.scale
+        square = (R - lift) * (R + lift)
+        length = ca.sqrt(positive(square))
+        for along in (length, -length):
+            # The wrist is at e^(i q2) boom (along + i lift) from axis 2.
+            q2 = times(unit(x, u, pose.scale), times(p["boom"], unit(along, p["lift"], pose.scale)), -1.0)
+            region = Region(
+                q=(angle(shoulder.q1), angle(q2), along - p["start"]),
+                rho=q2,
+                shoulder=shoulder,
+                miss=_hypot(shoulder.miss, where(beyond, short, 0.0)),
+                elbow=length < SINGULAR * p["reach"],
+                clamped=ca.logic_or(shoulder.clamped, ca.logic_and(square < 0, ca.logic_not(beyond))),
+            )
+            branches += _with_wrist(p, T.rotation, region)
+    return branches
+
+
+def _wrist_centre(axes: Axes) -> Array | None:
+    """Return where the last three axes meet, if the middle one is at right angles to its neighbours."""
+    if not (axes.perpendicular(4, 5) and axes.perpendicular(5, 6)):
+        return None
+    centre = axes.meeting_point(4, 5)
+    return centre if centre is not None and axes.on(6, centre) else None
+
+
+def _parameters(axes: Axes, plane: ArmPlane, centre: Array) -> dict[str, Array | float]:
+    """Return what both regional structures need: where plane and wrist are, and the wrist's axes at zero."""
+    z4, z5, z6 = (axes.direction(i) for i in (4, 5, 6))
+    T_world_wrist = np.eye(4)
+    T_world_wrist[:3, :3] = np.stack([z6, z5, np.cross(z6, z5)], axis=1)
+    T_world_wrist[:3, 3] = centre
+    wrist = as_pair(float(z4 @ z6), float(z5 @ np.cross(z4, z6)))
+    return {
+        "T_plane_world": plane.T[:3],
+        "T_tool_wrist": (inverse_pose(axes.T_world_tool) @ T_world_wrist)[:3],
+        "F": np.stack([np.cross(z5, z4), z5, z4]) @ plane.R.T + 0.0,
+        "wrist": wrist,
+        "straight": np.angle(complex(*wrist) ** 2),
+        "up": plane.up,
+        "reach": axes.scale,
+    }
+
+
+def _snapped(offset: float, axes: Axes) -> float:
+    """Return 0 for an offset that is rounding: such an arm has no left and right."""
+    return 0.0 if abs(offset) <= axes.tolerance * axes.scale else float(offset)
+
+
+def _labels(lateral: bool, elbows: Sequence[str]) -> tuple[str, ...]:
+    shoulder_names = ("left", "right") if lateral else ("front", "back")
+    return tuple(f"{s} {e} {w}" for s in shoulder_names for e in elbows for w in ("no-flip", "flip"))
+
+
+def _ordered_shoulders(p: Mapping[str, SX], position: Vector, scale: SX) -> tuple[Shoulder, Shoulder]:
+    """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
+
+    An arm without lateral offset has no left and right: there the shoulder in front comes first.
+    """
+    front, back = shoulders(position, p["offset"], scale, p["reach"])
+    swap = p["up"] * p["offset"] > 0
+
+    def chosen(a: Shoulder, b: Shoulder) -> Shoulder:
+        return Shoulder(
+            (where(swap, a.q1[0], b.q1[0]), where(swap, a.q1[1], b.q1[1])),
+            where(swap, a.x, b.x),
+            a.miss,
+            a.singular,
+            a.clamped,
+        )
+
+    return chosen(back, front), chosen(front, back)
+
+
+def _with_wrist(p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region) -> list[Branch]:
+    """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip."""
+    F = p["F"]
+
+    def seen(vector: Vector) -> ca.SX:
+        return F @ ca.vertcat(*turned_back(vector, region.shoulder.q1, region.rho))
+
+    # Where axis 6, axis 5's first direction and their product have gone, in the axes of the wrist at zero.
+    a, n, m = (seen(vector) for vector in rotation)
+    swing = ca.sqrt(a[0] * a[0] + a[1] * a[1])
+    q4 = unit(a[0], a[1])
+    # From here on everything is taken from the rotation that q4 leaves over: it closes whatever q4 is.
+    bend = unit(q4[0] * a[0] + q4[1] * a[1], a[2])
+    alpha = (bend[1], bend[0])
+    q5 = times(alpha, p["wrist"], -1.0)
+    q6 = unit(q4[0] * n[1] - q4[1] * n[0], q4[1] * m[0] - q4[0] * m[1])
+    roll, pitch, spin = angle(q4), angle(q5), angle(q6)
+    flags = {
+        "miss": region.miss,
+        "shoulder": region.shoulder.singular,
+        "elbow": region.elbow,
+        "wrist": swing < SINGULAR,
+        "clamped": region.clamped,
+    }
+    return [
+        Branch((*region.q, roll, pitch, spin), **flags),
+        Branch((*region.q, half_turn(roll), wrapped(-pitch - p["straight"]), half_turn(spin)), **flags),
+    ]
+
+
+def _hypot(a: SX, b: SX) -> SX:
+    return ca.sqrt(a * a + b * b)

@@ -1,0 +1,108 @@
+"""Inverse kinematics in closed form: all branches of a batch of poses."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.errors import ModelError
+from dhkit.kernels import kernel
+from dhkit.kinematics.batches import check_threads, result_array
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.program import OUTPUT_TYPES, limit_parameters, program
+from dhkit.kinematics.solutions import IKSolutions
+
+__all__ = ["inverse_kinematics"]
+
+
+def inverse_kinematics(
+    description: Description, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
+) -> IKSolutions:
+    """Return all solutions of T_world_tool(q) = T in closed form.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    T
+        Poses of the tool in the world, shape (..., 4, 4).
+    seed
+        Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, the first of them takes its angle
+        from here, or 0.
+    out
+        Where to write the joint values, shape (..., B, n), float64, contiguous.
+    threads
+        How many threads share a large batch.
+
+    Returns
+    -------
+    IKSolutions
+        B branches in a fixed order. A pose that is out of reach, or that is none, has a status that says so.
+
+    Raises
+    ------
+    ModelError
+        No closed form is known for this arm: says what its axes are like and what to use.
+    ValueError, TypeError
+        T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
+    """
+    check_threads(threads)
+    poses = pose_rows(T)
+    found = classify(description)
+    if found.family is None or found.fit is None:
+        raise ModelError(f"{description.name} is {found.words}; ik_numeric solves any arm")
+    family, fit = found.family, found.fit
+    numbers = description.numbers
+    prismatic = tuple(bool(x) for x in numbers.prismatic)
+    batch, count, B, n = poses.shape[:-2], poses.size // 16, len(fit.branches), description.n
+    q = result_array((*batch, B, n), out)
+    distance = np.empty(batch)
+    valid, flags, status = (np.empty((*batch, *tail), dtype=np.uint8) for tail in ((B,), (B,), ()))
+    if count:
+        run = kernel(f"ik_{family.name}", f"{n}", lambda: program(family, fit, prismatic), OUTPUT_TYPES)
+        rows = [array.reshape(count, -1) for array in (q, distance, valid, flags, status)]
+        run(_parameters(description), [poses.reshape(count, 16)], rows, threads)
+    solutions = IKSolutions(
+        q=q,
+        valid=valid.view(bool),
+        flags=flags,
+        status_code=status,
+        distance=distance,
+        branches=fit.branches,
+        met=fit.met,
+        lower=numbers.lower,
+        upper=numbers.upper,
+        prismatic=numbers.prismatic,
+    )
+    return solutions
+
+
+def pose_rows(T: ArrayLike) -> Array:
+    """Return T as a C-contiguous float64 array (..., 4, 4).
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    TypeError
+        Not numbers.
+    """
+    try:
+        poses = np.ascontiguousarray(T, dtype=float)
+    except (TypeError, ValueError):
+        raise TypeError(f"T: found {type(T).__name__} of other things; expected numbers, shape (..., 4, 4)") from None
+    if poses.shape[-2:] != (4, 4):
+        raise ValueError(f"T has shape {poses.shape}; expected (..., 4, 4)")
+    return poses
+
+
+@lru_cache(maxsize=512)
+def _parameters(description: Description) -> Array:
+    fit = classify(description).fit
+    assert fit is not None
+    numbers = description.numbers
+    limits = limit_parameters(numbers.lower, numbers.upper, tuple(numbers.prismatic))
+    return np.concatenate([fit.vector(), limits])

@@ -1,0 +1,229 @@
+"""What inverse kinematics return: every branch of every pose, and why some are missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array
+from dhkit.errors import UnreachableError
+
+__all__ = ["LIMIT_SLACK", "IKFlag", "IKSolutions", "IKStatus"]
+
+LIMIT_SLACK = 1e-9
+"""rad or m: how far outside its limits a joint still counts as inside, for rounding."""
+TURN = 2 * np.pi
+
+
+class IKStatus(IntEnum):
+    """What became of a pose, from best to worst; compares equal to its name in ``IKSolutions.status``."""
+
+    ok = 0
+    singular = 1
+    """Reached, but a branch is at a singularity: see its flags."""
+    out_of_reach = 2
+    not_a_pose = 3
+    """The matrix has NaN, or its rotation is not orthonormal to 1e-6."""
+
+
+class IKFlag(IntFlag):
+    """What is special about a branch; several may hold."""
+
+    shoulder = 1
+    """The wrist centre is where joint 1 cannot move it out of the arm's plane."""
+    elbow = 2
+    """The arm is stretched or folded."""
+    wrist = 4
+    """Two axes of the wrist coincide."""
+    clamped = 8
+    """The pose was beyond reach by no more than rounding, and counts as on the boundary."""
+    out_of_limits = 16
+    """Some joint is outside its limits, whatever whole turns are added."""
+
+
+@dataclass(frozen=True, eq=False)
+class IKSolutions:
+    """All solutions of a batch of poses; B branches in a fixed order, the same for every pose.
+
+    Rows of branches that do not reach the pose are NaN. Angles are in (-pi, pi].
+    """
+
+    q: Array
+    """Joint values, shape (..., B, n), rad and m."""
+    valid: NDArray[np.bool_]
+    """Whether the branch reaches the pose, shape (..., B); limits do not count."""
+    flags: NDArray[np.uint8]
+    """Sums of :class:`IKFlag`, shape (..., B)."""
+    status_code: NDArray[np.uint8]
+    """:class:`IKStatus` of each pose, shape (...)."""
+    distance: Array
+    """How far the pose is out of reach, m, shape (...): 0 where it is reached, NaN where it is no pose."""
+    branches: tuple[str, ...]
+    """The branches' names, in words that :meth:`branch` understands."""
+    met: tuple[str, ...]
+    """Which coordinates of a pose the arm meets: all six, or fewer for arms of fewer freedoms."""
+    lower: Array
+    """The joints' limits, shape (n,), rad and m; infinite where there are none."""
+    upper: Array
+    prismatic: NDArray[np.bool_]
+    """Which joints slide, shape (n,)."""
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """The names of the poses' status, shape (...): ok, singular, out_of_reach or not_a_pose."""
+        names: NDArray[np.str_] = np.array([status.name for status in IKStatus])[self.status_code]
+        return names
+
+    @property
+    def within(self) -> NDArray[np.bool_]:
+        """Whether the branch reaches the pose and is inside the limits, shape (..., B)."""
+        return self.valid & (self.flags & IKFlag.out_of_limits == 0)
+
+    def branch(self, name: str) -> Array:
+        """Return the joint values of one branch, shape (..., n), NaN where it does not reach.
+
+        Parameters
+        ----------
+        name
+            Words of the branch's name in any order, such as ``"left up flip"``, enough to tell it from the others.
+
+        Raises
+        ------
+        ValueError
+            No branch, or more than one, has all these words.
+        """
+        words = name.lower().replace("no flip", "no-flip").replace("noflip", "no-flip").replace(",", " ").split()
+        chosen = [k for k, branch in enumerate(self.branches) if set(words) <= set(branch.split())]
+        if len(chosen) != 1:
+            found = "no branch" if not chosen else f"{len(chosen)} branches"
+            raise ValueError(f"{name!r} fits {found}; expected one of {', '.join(map(repr, self.branches))}")
+        return self.q[..., chosen[0], :]
+
+    def nearest(self, q: ArrayLike) -> Array:
+        """Return for each pose the solution nearest to ``q``, in the winding nearest to it.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,) or (..., n), rad and m.
+
+        Returns
+        -------
+        Array
+            Shape (..., n): the branch of least sum of squared joint differences, angles the short way round, whole
+            turns added so that it is near ``q``; limits do not count (see :meth:`within_limits`). NaN where no branch
+            reaches.
+
+        Raises
+        ------
+        ValueError
+            ``q`` does not fit.
+        """
+        near = self._near(q)
+        wound = self._wound(near)
+        return self._closest(wound, near, self.valid)
+
+    def within_limits(self, near: ArrayLike | None = None) -> Array:
+        """Return all branches inside the joint limits, shape (..., B, n), the others NaN.
+
+        Parameters
+        ----------
+        near
+            Joint values, shape (n,) or (..., n): each angle gets the whole turns that bring it nearest to its entry,
+            as far as the limits allow. Without it, nearest to the middle of the limits, or to 0 where there are none.
+
+        Raises
+        ------
+        ValueError
+            ``near`` does not fit.
+        """
+        middle = np.where(np.isfinite(self.lower + self.upper), (self.lower + self.upper) / 2, 0.0)
+        at = self._near(middle if near is None else near)[..., None, :]
+        with np.errstate(invalid="ignore"):
+            # Windings inside the limits are q + 2 pi k for k from `first` to `last`.
+            first = np.ceil((self.lower - LIMIT_SLACK - self.q) / TURN)
+            last = np.floor((self.upper + LIMIT_SLACK - self.q) / TURN)
+            turns = np.where(self.prismatic, 0.0, np.clip(np.rint((at - self.q) / TURN), first, last))
+        wound = self.q + TURN * np.where(np.isfinite(turns), turns, 0.0)
+        return np.where(self.within[..., None], wound, np.nan)
+
+    def windings(self, branch: str) -> list[Array]:
+        """Return every joint vector inside the limits that puts one pose's branch there, whole turns added.
+
+        Joints without limits stay as they are.
+
+        Raises
+        ------
+        ValueError
+            A batch of poses, or no such branch.
+        """
+        if self.distance.shape != ():
+            raise ValueError(f"windings of a batch of shape {self.distance.shape}; expected one pose")
+        q = self.branch(branch)
+        choices = [self._choices(i, float(q[i])) for i in range(len(q))]
+        return [np.array(choice) for choice in product(*choices)]
+
+    def require(self, near: ArrayLike | None = None) -> Array:
+        """Return one solution inside the limits for each pose, shape (..., n), the nearest to ``near``.
+
+        Raises
+        ------
+        UnreachableError
+            Some pose has none: says which, and why.
+        """
+        middle = np.where(np.isfinite(self.lower + self.upper), (self.lower + self.upper) / 2, 0.0)
+        at = self._near(middle if near is None else near)
+        chosen = self._closest(self.within_limits(at), at, self.within)
+        missing = np.argwhere(np.isnan(chosen).any(axis=-1))
+        if len(missing):
+            raise UnreachableError(self._reason(tuple(int(k) for k in missing[0]), len(missing)))
+        return chosen
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __repr__(self) -> str:
+        counts = [f"{np.sum(self.status_code == status)} {status.name}" for status in IKStatus]
+        shown = ", ".join(count for count in counts if not count.startswith("0 "))
+        return f"<IKSolutions of {self.distance.size} poses, {len(self)} branches: {shown}>"
+
+    def _near(self, q: ArrayLike) -> Array:
+        near = np.asarray(q, dtype=float)
+        n = self.q.shape[-1]
+        if near.shape[-1:] != (n,):
+            raise ValueError(f"joint values have shape {near.shape}; expected ({n},) or {(*self.distance.shape, n)}")
+        return np.broadcast_to(near, (*self.distance.shape, n))
+
+    def _wound(self, near: Array) -> Array:
+        turns = np.where(self.prismatic, 0.0, np.rint((near[..., None, :] - self.q) / TURN))
+        return self.q + TURN * turns
+
+    def _closest(self, q: Array, near: Array, usable: NDArray[np.bool_]) -> Array:
+        gaps = np.where(usable, np.sum((q - near[..., None, :]) ** 2, axis=-1), np.inf)
+        best = np.argmin(np.where(np.isnan(gaps), np.inf, gaps), axis=-1)
+        chosen = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
+        return np.where(usable.any(axis=-1)[..., None], chosen, np.nan)
+
+    def _choices(self, i: int, value: float) -> list[float]:
+        lower, upper = float(self.lower[i]), float(self.upper[i])
+        if np.isnan(value):
+            return []
+        if self.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
+            return [value] if lower - LIMIT_SLACK <= value <= upper + LIMIT_SLACK or np.isinf(upper - lower) else []
+        first = int(np.ceil((lower - LIMIT_SLACK - value) / TURN))
+        last = int(np.floor((upper + LIMIT_SLACK - value) / TURN))
+        return [value + TURN * k for k in range(first, last + 1)]
+
+    def _reason(self, place: tuple[int, ...], count: int) -> str:
+        where = f"pose {place[0] if len(place) == 1 else place}" if place else "the pose"
+        others = f" (and {count - 1} more)" if count > 1 else ""
+        status = IKStatus(int(self.status_code[place]))
+        if status is IKStatus.not_a_pose:
+            return f"{where}{others} is no pose: NaN, or a rotation that is not orthonormal"
+        if status is IKStatus.out_of_reach:
+            return f"{where}{others} is out of reach by {float(self.distance[place]):.4g} m"
+        return f"{where}{others} is reached only outside the joint limits"
