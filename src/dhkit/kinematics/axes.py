@@ -84,6 +84,10 @@ class Axes:
         """Return whether axis i passes through a point."""
         return self.distance(i, point) <= self.tolerance * self.scale
 
+    def snapped(self, length: float) -> float:
+        """Return a length, or 0 where it is rounding."""
+        return 0.0 if abs(length) <= self.tolerance * self.scale else float(length)
+
     def meeting_point(self, i: int, j: int) -> Array | None:
         """Return where axes i and j intersect, or None where they are parallel or miss each other."""
         a, b = self.direction(i), self.direction(j)

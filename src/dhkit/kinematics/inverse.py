@@ -12,6 +12,7 @@ from dhkit.errors import ModelError
 from dhkit.kernels import kernel
 from dhkit.kinematics.batches import check_threads, result_array
 from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.closed_form.program import OUTPUT_TYPES, limit_parameters, program
 from dhkit.kinematics.solutions import IKSolutions
 
@@ -30,8 +31,8 @@ def inverse_kinematics(
     T
         Poses of the tool in the world, shape (..., 4, 4).
     seed
-        Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, the first of them takes its angle
-        from here, or 0.
+        Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, one joint may take any angle (q4,
+        or q6 of an arm with three parallel axes): it takes that of the seed, or 0.
     out
         Where to write the joint values, shape (..., B, n), float64, contiguous.
     threads
@@ -62,10 +63,11 @@ def inverse_kinematics(
     distance = np.empty(batch)
     valid, flags, status = (np.empty((*batch, *tail), dtype=np.uint8) for tail in ((B,), (B,), ()))
     if count:
-        run = kernel(f"ik_{family.name}", f"{n}", lambda: program(family, fit, prismatic), OUTPUT_TYPES)
+        run = kernel(f"ik_{family.name}", fit.structure, lambda: program(family, fit, prismatic), OUTPUT_TYPES)
         rows = [array.reshape(count, -1) for array in (q, distance, valid, flags, status)]
-        run(_parameters(description), [poses.reshape(count, 16)], rows, threads)
-    solutions = IKSolutions(
+        free = _free_angles(description, fit, seed, batch)
+        run(_parameters(description), [poses.reshape(count, 16), free.reshape(count, 1)], rows, threads)
+    return IKSolutions(
         q=q,
         valid=valid.view(bool),
         flags=flags,
@@ -77,7 +79,6 @@ def inverse_kinematics(
         upper=numbers.upper,
         prismatic=numbers.prismatic,
     )
-    return solutions
 
 
 def pose_rows(T: ArrayLike) -> Array:
@@ -97,6 +98,16 @@ def pose_rows(T: ArrayLike) -> Array:
     if poses.shape[-2:] != (4, 4):
         raise ValueError(f"T has shape {poses.shape}; expected (..., 4, 4)")
     return poses
+
+
+def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
+    if seed is None or fit.free is None:
+        return np.zeros(batch)
+    try:
+        angles = np.broadcast_to(joint_array(description, seed, "seed")[..., fit.free], batch)
+    except ValueError:
+        raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None
+    return np.where(np.isfinite(angles), angles, 0.0)
 
 
 @lru_cache(maxsize=512)

@@ -58,6 +58,7 @@ FOLDING: Mapping[str, Callable[..., float]] = {
 }
 """What is worked out when all arguments are constants."""
 
+LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
 COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
 
 
@@ -205,11 +206,28 @@ class _Builder:
         operands = [self.nodes[k] for k in arguments]
         if operation in FOLDING and all(node.operation == "constant" for node in operands):
             return self.constant(FOLDING[operation](*(node.value for node in operands)))
+        if operation in LOGICAL and (known := self._decided(operation, arguments)) is not None:
+            return known
         if operation == "add" and (chosen := self._selected(arguments)) is not None:
             return chosen
         if operation in COMMUTATIVE:
             arguments = sorted(arguments)
         return self.add(Node(operation, tuple(arguments)))
+
+    def _decided(self, operation: str, arguments: Sequence[int]) -> int | None:
+        """Return the result of a choice or of a logical operation one of whose conditions is a constant."""
+        first, *others = arguments
+        if self.nodes[first].operation != "constant":
+            if operation == "select" or not others or self.nodes[others[0]].operation != "constant":
+                return None
+            first, others = others[0], [first]
+        true = self.nodes[first].value != 0.0
+        if operation == "select":
+            return others[0] if true else others[1]
+        if operation == "logical_not":
+            return self.constant(0.0 if true else 1.0)
+        neutral = operation == "logical_and"
+        return others[0] if true == neutral else self.constant(0.0 if neutral else 1.0)
 
     def _selected(self, arguments: Sequence[int]) -> int | None:
         """Return the choice that CasADi writes as (a if c else 0) + (b if not c else 0)."""

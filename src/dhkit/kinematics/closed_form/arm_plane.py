@@ -6,7 +6,9 @@ zero joint values, with the origin on axis 1 at the height of axis 2, and turn w
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TypeAlias
 
 import casadi as ca
@@ -14,9 +16,11 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.formulas import ROUNDING, SINGULAR, SX, Pair, times, unit, where
+from dhkit.kinematics.closed_form.formulas import ROUNDING, SINGULAR, SX, Pair, chosen, hypot, times, unit, where
 
-__all__ = ["ArmPlane", "Shoulder", "Vector", "as_pair", "shoulders", "turned_back"]
+__all__ = ["FLIPS", "ArmPlane", "Shoulder", "Vector", "as_pair", "branch_names", "ordered_shoulders", "turned_back"]
+
+FLIPS = ("no-flip", "flip")
 
 Vector: TypeAlias = tuple[SX, SX, SX]
 """Coordinates along x, u and v."""
@@ -80,7 +84,7 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
         What rounding and nearness to the singularity are measured by, m.
     """
     x, _, v = point
-    r = ca.sqrt(x * x + v * v)
+    r = hypot(x, v)
     short = ca.fabs(offset) - r
     beyond = short > ROUNDING * scale
     square = (r - ca.fabs(offset)) * (r + ca.fabs(offset))
@@ -97,6 +101,29 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
         )
 
     return side(front), side(-front)
+
+
+def ordered_shoulders(p: Mapping[str, SX], position: Vector, scale: SX) -> tuple[Shoulder, Shoulder]:
+    """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
+
+    An arm without lateral offset has no left and right: there the shoulder in front comes first.
+    """
+    front, back = shoulders(position, p["offset"], scale, p["reach"])
+    swap = p["up"] * p["offset"] > 0
+
+    def either(a: Shoulder, b: Shoulder) -> Shoulder:
+        return Shoulder(chosen(swap, a.q1, b.q1), where(swap, a.x, b.x), a.miss, a.singular, a.clamped)
+
+    return either(back, front), either(front, back)
+
+
+def branch_names(offset: float, *choices: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of branches: the shoulder's side, then every combination of the other choices.
+
+    An arm whose plane holds axis 1 (offset 0) has no left and right: its shoulders are front and back.
+    """
+    sides = ("left", "right") if offset else ("front", "back")
+    return tuple(" ".join(words) for words in product(sides, *choices))
 
 
 def turned_back(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:

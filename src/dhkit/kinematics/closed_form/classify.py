@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from dhkit.description import Description
 from dhkit.kinematics.axes import TOLERANCE, Axes
-from dhkit.kinematics.closed_form import spherical_wrist
+from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
 from dhkit.kinematics.closed_form.family import Family, Fit
 
 __all__ = ["FAMILIES", "Classification", "classify"]
@@ -15,6 +15,13 @@ __all__ = ["FAMILIES", "Classification", "classify"]
 FAMILIES = (
     Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
     Family("slide_wrist", spherical_wrist.slide_fit, spherical_wrist.slide_formulas),
+    Family("three_parallel", three_parallel.three_parallel_fit, three_parallel.three_parallel_formulas),
+    Family("yaw_three", turret.yaw_three_fit, turret.yaw_three_formulas),
+    Family("yaw_two", turret.yaw_two_fit, turret.yaw_two_formulas),
+    Family("pan_tilt", turret.pan_tilt_fit, turret.pan_tilt_formulas),
+    Family("parallel_chain", planar.chain_fit, planar.chain_formulas),
+    Family("polar", planar.polar_fit, planar.polar_formulas),
+    Family("slider", planar.slider_fit, planar.slider_formulas),
 )
 """In the order in which they are tried."""
 NEARLY = 1e-3

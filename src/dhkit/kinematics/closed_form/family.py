@@ -11,7 +11,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.formulas import SX, Branch
+from dhkit.kinematics.closed_form.formulas import SX, Branch, Pair
 
 __all__ = ["ALL", "Family", "Fit", "PoseSymbols", "Seen"]
 
@@ -31,6 +31,10 @@ class Fit:
     branches: tuple[str, ...]
     met: tuple[str, ...]
     """Coordinates of a pose that are met."""
+    structure: str = ""
+    """What the formulas look like beyond their parameters, such as the order of the joints."""
+    free: int | None = None
+    """The joint, from 0, that may take any angle where two axes of the wrist coincide."""
 
     def vector(self) -> Array:
         """Return all parameters in one row."""
@@ -80,6 +84,10 @@ class PoseSymbols:
     """3 x 4."""
     scale: SX
     """What rounding of positions is measured by, m."""
+    structure: str = ""
+    """That of the fit."""
+    free: Pair = (1.0, 0.0)
+    """The angle that the free joint takes at a wrist singularity."""
 
     def seen(self, left: ca.SX, right: ca.SX) -> Seen:
         """Return left T right, all 3 x 4 with a last row 0 0 0 1."""

@@ -17,7 +17,9 @@ __all__ = [
     "Pair",
     "TwoLink",
     "angle",
+    "chosen",
     "half_turn",
+    "hypot",
     "no",
     "positive",
     "sign",
@@ -75,9 +77,14 @@ def no(condition: SX) -> SX:
     return ca.logic_not(condition)
 
 
+def hypot(a: SX, b: SX) -> SX:
+    """Return the length of a vector of two entries."""
+    return ca.sqrt(a * a + b * b)
+
+
 def unit(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
     """Return the direction of (x, y) as a pair; where both are noise at ``scale``, the pair given."""
-    size = ca.sqrt(x * x + y * y)
+    size = hypot(x, y)
     sure = size > NOTHING * scale
     inverse = 1.0 / where(sure, size, 1.0)
     return where(sure, x * inverse, otherwise[0]), where(sure, y * inverse, otherwise[1])
@@ -103,6 +110,11 @@ def wrapped(x: SX) -> SX:
     """Return an angle in [-3 pi, 3 pi] in (-pi, pi]."""
     x = where(x > ca.pi, x - 2 * ca.pi, x)
     return where(x <= -ca.pi, x + 2 * ca.pi, x)
+
+
+def chosen(condition: SX, a: Pair, b: Pair) -> Pair:
+    """Return one of two pairs."""
+    return where(condition, a[0], b[0]), where(condition, a[1], b[1])
 
 
 @dataclass(frozen=True)
@@ -133,7 +145,7 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
     scale
         The size of the numbers that x and y were computed from, m: what rounding is measured by.
     """
-    R = ca.sqrt(x * x + y * y)
+    R = hypot(x, y)
     reach, gap = L1 + L2, ca.fabs(L1 - L2)
     excess = ca.fmax(R - reach, gap - R)
     beyond = excess > ROUNDING * scale

@@ -39,7 +39,7 @@ def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> A
 
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
-    """Return the program of a family: T (4 x 4) to q, distance, valid, flags and status.
+    """Return the program of a family: T (4 x 4) and the free joint's angle to q, distance, valid, flags and status.
 
     Its parameters are ``fit.vector()`` and then :func:`limit_parameters`.
     """
@@ -47,9 +47,10 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     n = len(prismatic)
     limits = ca.SX.sym("limits", 2 * n)
     T = ca.SX.sym("T", 4, 4)
+    free = ca.SX.sym("free")
     is_pose = _is_pose(T)
     scale = named["reach"] + ca.norm_1(T[:3, 3])
-    branches = family.formulas(named, PoseSymbols(T[:3, :], scale))
+    branches = family.formulas(named, PoseSymbols(T[:3, :], scale, fit.structure, (ca.cos(free), ca.sin(free))))
     if len(branches) != len(fit.branches):
         raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
 
@@ -64,7 +65,7 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     status = where(is_pose, found, float(IKStatus.not_a_pose))
     return Graph.of(
         f"ik_{family.name}",
-        {"parameters": ca.vertcat(symbols, limits), "T": T},
+        {"parameters": ca.vertcat(symbols, limits), "T": T, "free": free},
         {
             "q": ca.vertcat(*(ca.horzcat(*row) for row in q)),
             "distance": where(is_pose, where(some, 0.0, miss), np.nan),

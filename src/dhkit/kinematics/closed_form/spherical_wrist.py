@@ -7,7 +7,7 @@ Computer Control, 1968; branches as in Lee & Ziegler, IEEE Trans. AES 20, 1984, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
@@ -15,7 +15,16 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes, inverse_pose
-from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Shoulder, Vector, as_pair, shoulders, turned_back
+from dhkit.kinematics.closed_form.arm_plane import (
+    FLIPS,
+    ArmPlane,
+    Shoulder,
+    Vector,
+    as_pair,
+    branch_names,
+    ordered_shoulders,
+    turned_back,
+)
 from dhkit.kinematics.closed_form.family import ALL, Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
@@ -24,7 +33,9 @@ from dhkit.kinematics.closed_form.formulas import (
     Branch,
     Pair,
     angle,
+    chosen,
     half_turn,
+    hypot,
     positive,
     sign,
     times,
@@ -65,7 +76,7 @@ def elbow_fit(axes: Axes) -> Fit | None:
     upper_pair, fore_pair = as_pair(*upper), as_pair(*fore)
     geometry = {
         "a1": second[0],
-        "offset": _snapped(wrist[2], axes),
+        "offset": axes.snapped(wrist[2]),
         "L2": np.linalg.norm(upper),
         "L3": np.linalg.norm(fore),
         "upper": upper_pair,
@@ -75,8 +86,9 @@ def elbow_fit(axes: Axes) -> Fit | None:
     return Fit(
         words="spherical wrist, axes 2 and 3 parallel",
         parameters=_parameters(axes, plane, centre) | geometry,
-        branches=_labels(bool(geometry["offset"]), ("up", "down")),
+        branches=branch_names(geometry["offset"], ("up", "down"), FLIPS),
         met=ALL,
+        free=3,
     )
 
 
@@ -84,25 +96,23 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches: shoulder, then elbow, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
-    for shoulder in _ordered_shoulders(p, T.position, pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose.scale):
         x, u = shoulder.x - p["a1"], T.position[1]
         arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
         # The left elbow of the line to the wrist is the upper one where the wrist is in front of axis 2.
         front = sign(p["up"] * x)
         for raised in (front, -front):
-            first = tuple(where(raised > 0, a, b) for a, b in zip(*arm.first, strict=True))
-            between = tuple(where(raised > 0, a, b) for a, b in zip(*arm.between, strict=True))
-            q2 = times((first[0], first[1]), p["upper"], -1.0)
-            bent = times((between[0], between[1]), p["bend"], -1.0)
+            q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
+            bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
             region = Region(
                 q=(angle(shoulder.q1), angle(q2), angle((bent[0], p["sense3"] * bent[1]))),
                 rho=times(q2, bent),
                 shoulder=shoulder,
-                miss=_hypot(shoulder.miss, arm.miss),
+                miss=hypot(shoulder.miss, arm.miss),
                 elbow=arm.straight,
                 clamped=ca.logic_or(shoulder.clamped, arm.clamped),
             )
-            branches += _with_wrist(p, T.rotation, region)
+            branches += _with_wrist(p, T.rotation, region, pose.free)
     return branches
 
 
@@ -119,7 +129,7 @@ def slide_fit(axes: Axes) -> Fit | None:
     lever = wrist[:2] - second[:2]
     geometry = {
         "a1": second[0],
-        "offset": _snapped(wrist[2], axes),
+        "offset": axes.snapped(wrist[2]),
         "boom": as_pair(along[0], along[1]),
         "start": lever @ along[:2],
         "lift": along[0] * lever[1] - along[1] * lever[0],
@@ -127,8 +137,9 @@ def slide_fit(axes: Axes) -> Fit | None:
     return Fit(
         words="spherical wrist, joint 3 slides at right angles to axis 2",
         parameters=_parameters(axes, plane, centre) | geometry,
-        branches=_labels(bool(geometry["offset"]), ("out", "in")),
+        branches=branch_names(geometry["offset"], ("out", "in"), FLIPS),
         met=ALL,
+        free=3,
     )
 
 
@@ -136,9 +147,9 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches: shoulder, then boom, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
-    for shoulder in _ordered_shoulders(p, T.position, pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose.scale):
         x, u = shoulder.x - p["a1"], T.position[1]
-        R, lift = ca.sqrt(x * x + u * u), ca.fabs(p["lift"])
+        R, lift = hypot(x, u), ca.fabs(p["lift"])
         short = lift - R
         beyond = short > ROUNDING * pose.scale
         square = (R - lift) * (R + lift)
@@ -150,11 +161,11 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 q=(angle(shoulder.q1), angle(q2), along - p["start"]),
                 rho=q2,
                 shoulder=shoulder,
-                miss=_hypot(shoulder.miss, where(beyond, short, 0.0)),
+                miss=hypot(shoulder.miss, where(beyond, short, 0.0)),
                 elbow=length < SINGULAR * p["reach"],
                 clamped=ca.logic_or(shoulder.clamped, ca.logic_and(square < 0, ca.logic_not(beyond))),
             )
-            branches += _with_wrist(p, T.rotation, region)
+            branches += _with_wrist(p, T.rotation, region, pose.free)
     return branches
 
 
@@ -184,38 +195,13 @@ def _parameters(axes: Axes, plane: ArmPlane, centre: Array) -> dict[str, Array |
     }
 
 
-def _snapped(offset: float, axes: Axes) -> float:
-    """Return 0 for an offset that is rounding: such an arm has no left and right."""
-    return 0.0 if abs(offset) <= axes.tolerance * axes.scale else float(offset)
+def _with_wrist(
+    p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region, free: Pair
+) -> list[Branch]:
+    """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip.
 
-
-def _labels(lateral: bool, elbows: Sequence[str]) -> tuple[str, ...]:
-    shoulder_names = ("left", "right") if lateral else ("front", "back")
-    return tuple(f"{s} {e} {w}" for s in shoulder_names for e in elbows for w in ("no-flip", "flip"))
-
-
-def _ordered_shoulders(p: Mapping[str, SX], position: Vector, scale: SX) -> tuple[Shoulder, Shoulder]:
-    """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
-
-    An arm without lateral offset has no left and right: there the shoulder in front comes first.
+    Where axes 4 and 6 coincide, q4 is ``free``.
     """
-    front, back = shoulders(position, p["offset"], scale, p["reach"])
-    swap = p["up"] * p["offset"] > 0
-
-    def chosen(a: Shoulder, b: Shoulder) -> Shoulder:
-        return Shoulder(
-            (where(swap, a.q1[0], b.q1[0]), where(swap, a.q1[1], b.q1[1])),
-            where(swap, a.x, b.x),
-            a.miss,
-            a.singular,
-            a.clamped,
-        )
-
-    return chosen(back, front), chosen(front, back)
-
-
-def _with_wrist(p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region) -> list[Branch]:
-    """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip."""
     F = p["F"]
 
     def seen(vector: Vector) -> ca.SX:
@@ -223,8 +209,8 @@ def _with_wrist(p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], re
 
     # Where axis 6, axis 5's first direction and their product have gone, in the axes of the wrist at zero.
     a, n, m = (seen(vector) for vector in rotation)
-    swing = ca.sqrt(a[0] * a[0] + a[1] * a[1])
-    q4 = unit(a[0], a[1])
+    swing = hypot(a[0], a[1])
+    q4 = unit(a[0], a[1], otherwise=free)
     # From here on everything is taken from the rotation that q4 leaves over: it closes whatever q4 is.
     bend = unit(q4[0] * a[0] + q4[1] * a[1], a[2])
     alpha = (bend[1], bend[0])
@@ -242,7 +228,3 @@ def _with_wrist(p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], re
         Branch((*region.q, roll, pitch, spin), **flags),
         Branch((*region.q, half_turn(roll), wrapped(-pitch - p["straight"]), half_turn(spin)), **flags),
     ]
-
-
-def _hypot(a: SX, b: SX) -> SX:
-    return ca.sqrt(a * a + b * b)

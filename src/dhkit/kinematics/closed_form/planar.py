@@ -1,0 +1,232 @@
+"""Arms that move in parallel planes: two or three parallel revolute joints with or without a slide along them (planar
+2R and 3R, SCARA), and one revolute joint with a slide across its axis (R-P and P-R).
+
+Coordinates: v along the revolute axes, x and u across, with the origin on the first of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form.arm_plane import Vector, as_pair
+from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
+from dhkit.kinematics.closed_form.formulas import (
+    ROUNDING,
+    SINGULAR,
+    SX,
+    Branch,
+    Pair,
+    angle,
+    hypot,
+    positive,
+    times,
+    two_link,
+    unit,
+    where,
+)
+
+__all__ = [
+    "chain_fit",
+    "chain_formulas",
+    "polar_fit",
+    "polar_formulas",
+    "slider_fit",
+    "slider_formulas",
+]
+
+FLAT = 1e-9
+"""Share of the reach by which a pose may lie off the plane of an arm that cannot leave it."""
+IDENTITY = np.eye(4)[:3]
+CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
+"""Orders of joints: any with two or three revolute ones, and at most one slide."""
+
+
+def chain_fit(axes: Axes) -> Fit | None:
+    """Recognise two or three parallel revolute joints with at most one slide along them."""
+    if axes.kinds not in CHAINS or not all(axes.parallel(1, i) for i in range(2, axes.n + 1)):
+        return None
+    revolute = [i for i in range(1, axes.n + 1) if not axes.prismatic[i - 1]]
+    first = revolute[0]
+    R = _across(axes.direction(first))
+    origin = axes.point(first)
+    tool = R @ (axes.T_world_tool[:3, 3] - origin)
+    elbow = R @ (axes.point(revolute[1]) - origin)
+    end = R @ (axes.point(revolute[2]) - origin) if len(revolute) == 3 else tool
+    upper, fore = elbow[:2], end[:2] - elbow[:2]
+    if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
+        return None
+    seen = R @ axes.T_world_tool[:3, :3]
+    column = int(np.argmax(np.linalg.norm(seen[:2], axis=0)))
+    slides = ", a slide along them" if "P" in axes.kinds else ""
+    return Fit(
+        words=f"{len(revolute)} parallel revolute axes{slides}",
+        parameters={
+            "T_plane_world": _frame(R, origin),
+            "upper": as_pair(*upper),
+            "L2": np.linalg.norm(upper),
+            "L3": np.linalg.norm(fore),
+            "bend": times(as_pair(*fore), as_pair(*upper), -1.0),
+            "lever": tool[:2] - end[:2],
+            "height": tool[2],
+            "axis": np.eye(3)[column],
+            "pointing": as_pair(seen[0, column], seen[1, column]),
+            "senses": tuple(axes.sense(first, i) for i in range(1, axes.n + 1)),
+            "up": 1.0 if R[2, 2] >= 0 else -1.0,
+            "reach": axes.scale,
+        },
+        branches=("left", "right"),
+        met=("x", "y", "z", "yaw") if len(revolute) == 3 else ("x", "y", "z"),
+        structure=axes.kinds,
+    )
+
+
+def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return two branches: the elbow, seen from above, on the left of the line from the first axis, then on the right."""
+    T = pose.seen(p["T_plane_world"], IDENTITY)
+    kinds = pose.structure
+    turning = kinds.count("R") == 3
+    wanted = _combined(p["axis"], T.rotation)
+    rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
+    lever = p["lever"]
+    x, u, v = T.position
+    if turning:
+        x, u = x - (rho[0] * lever[0] - rho[1] * lever[1]), u - (rho[1] * lever[0] + rho[0] * lever[1])
+    arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
+    rise = v - p["height"]
+    off = 0.0 if "P" in kinds else _off_plane(rise, pose.scale)
+    branches = []
+    for side in (0, 1):
+        # Seen from above, left is left where v points up.
+        qa = times(_either(p["up"] > 0, arm.first, side), p["upper"], -1.0)
+        qb = times(_either(p["up"] > 0, arm.between, side), p["bend"], -1.0)
+        turns = iter((qa, qb, times(times(rho, qa, -1.0), qb, -1.0)))
+        joints = [
+            sense * rise if kind == "P" else _sensed(next(turns), sense)
+            for kind, sense in zip(kinds, p["senses"], strict=True)
+        ]
+        branches.append(
+            Branch(tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped)
+        )
+    return branches
+
+
+def polar_fit(axes: Axes) -> Fit | None:
+    """Recognise a revolute joint with a slide across its axis."""
+    if axes.kinds != "RP" or not axes.perpendicular(1, 2):
+        return None
+    R, origin = _across(axes.direction(1)), axes.point(1)
+    tool, along = R @ (axes.T_world_tool[:3, 3] - origin), R @ axes.direction(2)
+    return Fit(
+        words="a slide at right angles to a revolute axis",
+        parameters={
+            "T_plane_world": _frame(R, origin),
+            "boom": as_pair(along[0], along[1]),
+            "start": tool[:2] @ along[:2],
+            "lift": along[0] * tool[1] - along[1] * tool[0],
+            "height": tool[2],
+            "reach": axes.scale,
+        },
+        branches=("out", "in"),
+        met=("x", "y", "z"),
+    )
+
+
+def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return two branches: the tool out along the slide's positive direction, then in."""
+    x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
+    R, lift = hypot(x, u), ca.fabs(p["lift"])
+    beyond = lift - R > ROUNDING * pose.scale
+    square = (R - lift) * (R + lift)
+    length = ca.sqrt(positive(square))
+    miss = hypot(where(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
+    return [
+        Branch(
+            (
+                angle(times(unit(x, u, pose.scale), times(p["boom"], unit(along, p["lift"], pose.scale)), -1.0)),
+                along - p["start"],
+            ),
+            miss=miss,
+            elbow=length < SINGULAR * p["reach"],
+            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+        )
+        for along in (length, -length)
+    ]
+
+
+def slider_fit(axes: Axes) -> Fit | None:
+    """Recognise a slide that carries a revolute joint across it."""
+    if axes.kinds != "PR" or not axes.perpendicular(1, 2):
+        return None
+    v, x = axes.direction(2), axes.direction(1)
+    R, origin = np.stack([x, np.cross(v, x), v]) + 0.0, axes.point(2)
+    tool = R @ (axes.T_world_tool[:3, 3] - origin)
+    length = float(np.linalg.norm(tool[:2]))
+    if length <= axes.tolerance * axes.scale:
+        return None
+    return Fit(
+        words="a revolute axis at right angles to a slide",
+        parameters={
+            "T_plane_world": _frame(R, origin),
+            "L": length,
+            "pointing": as_pair(tool[0], tool[1]),
+            "height": tool[2],
+            "reach": axes.scale,
+        },
+        branches=("ahead", "behind"),
+        met=("x", "y", "z"),
+    )
+
+
+def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return two branches: the tool ahead of the revolute axis along the slide, then behind it."""
+    x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
+    L = p["L"]
+    beyond = ca.fabs(u) - L > ROUNDING * pose.scale
+    square = (L - u) * (L + u)
+    ahead = ca.sqrt(positive(square))
+    miss = hypot(where(beyond, ca.fabs(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
+    return [
+        Branch(
+            (x - along, angle(times(unit(along, u), p["pointing"], -1.0))),
+            miss=miss,
+            elbow=ahead < SINGULAR * p["reach"],
+            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+        )
+        for along in (ahead, -ahead)
+    ]
+
+
+def _across(v: Array) -> Array:
+    """Return rows x, u, v of a right-handed frame, x as near to the world's x or y axis as can be."""
+    helper = np.eye(3)[0] if abs(v[0]) < 0.9 else np.eye(3)[1]
+    x = helper - (helper @ v) * v
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(v, x), v]) + 0.0
+
+
+def _frame(R: Array, origin: Array) -> Array:
+    """Return the world in the frame of rows R at an origin, shape (3, 4)."""
+    return np.column_stack([R, -R @ origin])
+
+
+def _sensed(pair: Pair, sense: SX) -> SX:
+    return angle((pair[0], sense * pair[1]))
+
+
+def _off_plane(rise: SX, scale: SX) -> SX:
+    return where(ca.fabs(rise) > FLAT * scale, ca.fabs(rise), 0.0)
+
+
+def _either(upright: SX, both: tuple[tuple[SX, SX], tuple[SX, SX]], side: int) -> tuple[SX, SX]:
+    one, other = both[side], both[1 - side]
+    return where(upright, one[0], other[0]), where(upright, one[1], other[1])
+
+
+def _combined(weights: tuple[SX, ...], vectors: tuple[Vector, Vector, Vector]) -> Vector:
+    x, u, v = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
+    return x, u, v

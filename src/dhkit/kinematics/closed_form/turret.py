@@ -1,0 +1,202 @@
+"""Arms of fewer than six joints on a turntable: pan and tilt, yaw with two parallel joints, and with three."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form.arm_plane import (
+    ArmPlane,
+    Shoulder,
+    as_pair,
+    branch_names,
+    ordered_shoulders,
+    turned_back,
+)
+from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
+from dhkit.kinematics.closed_form.formulas import (
+    NOTHING,
+    SINGULAR,
+    SX,
+    Branch,
+    Pair,
+    angle,
+    chosen,
+    hypot,
+    sign,
+    times,
+    two_link,
+    unit,
+)
+
+__all__ = [
+    "pan_tilt_fit",
+    "pan_tilt_formulas",
+    "yaw_three_fit",
+    "yaw_three_formulas",
+    "yaw_two_fit",
+    "yaw_two_formulas",
+]
+
+ELBOWS = ("up", "down")
+IDENTITY = np.eye(4)[:3]
+
+
+def pan_tilt_fit(axes: Axes) -> Fit | None:
+    """Recognise two joints at right angles; the tool off axis 2."""
+    if axes.kinds != "RR" or not axes.perpendicular(1, 2):
+        return None
+    plane = ArmPlane.of(axes)
+    second, tool = plane.coordinates(axes.point(2)), plane.coordinates(axes.T_world_tool[:3, 3])
+    lever = tool[:2] - second[:2]
+    if np.linalg.norm(lever) <= axes.tolerance * axes.scale:
+        return None
+    return Fit(
+        words="pan and tilt: axes 1 and 2 at right angles",
+        parameters=_common(axes, plane) | {"offset": axes.snapped(tool[2]), "a1": second[0], "lever": as_pair(*lever)},
+        branches=branch_names(axes.snapped(tool[2])),
+        met=("azimuth", "elevation"),
+    )
+
+
+def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Aim: put the tool in the direction of the pose's origin, whatever its distance."""
+    position = pose.seen(p["T_plane_world"], IDENTITY).position
+    branches = []
+    for shoulder in ordered_shoulders(p, position, pose.scale):
+        x, u = shoulder.x - p["a1"], position[1]
+        tilt = times(unit(x, u, pose.scale), p["lever"], -1.0)
+        branches.append(
+            Branch(
+                (angle(shoulder.q1), angle(tilt)),
+                miss=shoulder.miss,
+                shoulder=shoulder.singular,
+                elbow=hypot(x, u) < SINGULAR * p["reach"],
+                clamped=shoulder.clamped,
+            )
+        )
+    return branches
+
+
+def yaw_two_fit(axes: Axes) -> Fit | None:
+    """Recognise a turntable with two parallel joints."""
+    if axes.kinds != "RRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3)):
+        return None
+    plane = ArmPlane.of(axes)
+    links = _links(axes, plane, axes.T_world_tool[:3, 3])
+    if links is None:
+        return None
+    return Fit(
+        words="a turntable, axes 2 and 3 parallel",
+        parameters=_common(axes, plane) | links,
+        branches=branch_names(float(links["offset"]), ELBOWS),
+        met=("x", "y", "z"),
+    )
+
+
+def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return the four branches that put the tool's origin in place: shoulder, then elbow."""
+    position = pose.seen(p["T_plane_world"], IDENTITY).position
+    branches = []
+    for shoulder in ordered_shoulders(p, position, pose.scale):
+        branches += _elbows(p, shoulder, shoulder.x - p["a1"], position[1], pose.scale, None, 0.0)
+    return branches
+
+
+def yaw_three_fit(axes: Axes) -> Fit | None:
+    """Recognise a turntable with three parallel joints; the tool's z axis points, or its x axis if z is sideways."""
+    if axes.kinds != "RRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
+        return None
+    plane = ArmPlane.of(axes)
+    links = _links(axes, plane, axes.point(4))
+    tool = plane.coordinates(axes.T_world_tool[:3, 3])
+    if links is None:
+        return None
+    column = 2 if np.linalg.norm((plane.R @ axes.T_world_tool[:3, 2])[:2]) > 0.5 else 0
+    pointing = plane.R @ axes.T_world_tool[:3, column]
+    offset = axes.snapped(tool[2])
+    own = {
+        "offset": offset,
+        "lever": tool[:2] - plane.coordinates(axes.point(4))[:2],
+        "pointing": as_pair(pointing[0], pointing[1]),
+        "axis": np.eye(3)[column],
+        "sense4": axes.sense(2, 4),
+    }
+    return Fit(
+        words="a turntable, axes 2, 3 and 4 parallel",
+        parameters=_common(axes, plane) | links | own,
+        branches=branch_names(offset, ELBOWS),
+        met=("x", "y", "z", f"pitch of the tool's {'xyz'[column]} axis"),
+    )
+
+
+def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
+    """Return the four branches that put the tool's origin in place and point it: shoulder, then elbow."""
+    T = pose.seen(p["T_plane_world"], IDENTITY)
+    branches = []
+    for shoulder in ordered_shoulders(p, T.position, pose.scale):
+        wanted = turned_back(_combined(p["axis"], T.rotation), shoulder.q1)
+        rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
+        lever = p["lever"]
+        x = shoulder.x - p["a1"] - (rho[0] * lever[0] - rho[1] * lever[1])
+        u = T.position[1] - (rho[1] * lever[0] + rho[0] * lever[1])
+        sideways = hypot(wanted[0], wanted[1]) < SINGULAR
+        branches += _elbows(p, shoulder, x, u, pose.scale, rho, sideways)
+    return branches
+
+
+def _elbows(
+    p: Mapping[str, SX], shoulder: Shoulder, x: SX, u: SX, scale: SX, rho: Pair | None, sideways: SX
+) -> list[Branch]:
+    arm = two_link(x, u, p["L2"], p["L3"], scale)
+    front = sign(p["up"] * x)
+    branches = []
+    for raised in (front, -front):
+        q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
+        bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
+        joints = [angle(shoulder.q1), angle(q2), angle((bent[0], p["sense3"] * bent[1]))]
+        if rho is not None:
+            rest = times(times(rho, q2, -1.0), bent, -1.0)
+            joints.append(angle((rest[0], p["sense4"] * rest[1])))
+        branches.append(
+            Branch(
+                tuple(joints),
+                miss=hypot(shoulder.miss, arm.miss),
+                shoulder=shoulder.singular,
+                elbow=arm.straight,
+                wrist=sideways,
+                clamped=ca.logic_or(shoulder.clamped, arm.clamped),
+            )
+        )
+    return branches
+
+
+def _common(axes: Axes, plane: ArmPlane) -> dict[str, Array | float]:
+    return {"T_plane_world": plane.T[:3], "up": plane.up, "reach": axes.scale}
+
+
+def _links(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Array | float | tuple[float, ...]] | None:
+    """Return the two links from axis 2 to axis 3 to a point; None where one has no length."""
+    second, third, last = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), end))
+    upper, fore = third[:2] - second[:2], last[:2] - third[:2]
+    if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= NOTHING * axes.scale:
+        return None
+    upper_pair, fore_pair = as_pair(*upper), as_pair(*fore)
+    return {
+        "a1": second[0],
+        "offset": axes.snapped(last[2]),
+        "L2": np.linalg.norm(upper),
+        "L3": np.linalg.norm(fore),
+        "upper": upper_pair,
+        "bend": times(fore_pair, upper_pair, -1.0),
+        "sense3": axes.sense(2, 3),
+    }
+
+
+def _combined(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
+    x, u, v = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
+    return x, u, v
