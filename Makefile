@@ -3,9 +3,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BENCH_READY := $(VENV)/.ready-bench
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: help demo test check accept assets lowest format clean
+.PHONY: help demo test check accept bench assets lowest format clean
 
 help:  ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -29,6 +30,13 @@ check: $(READY)  ## ruff, mypy --strict, import order
 
 accept: $(READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
+
+bench: $(BENCH_READY)  ## kinematics beside its peers; writes benchmarks/results/kinematics.md and .json
+	$(BIN)/python benchmarks/kinematics.py $(ARGS)
+
+$(BENCH_READY): $(READY)
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	@touch $@
 
 assets: $(READY)  ## generate urdf/ and meshes/ anew
 	$(BIN)/python -m dhkit.model.assets

@@ -15,7 +15,7 @@ from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
     from dhkit.description.table import Quantity
-    from dhkit.kinematics import ReferenceAxes
+    from dhkit.kinematics import IKPath, IKSolutions, ReferenceAxes
     from dhkit.model import PinocchioModel
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
@@ -173,6 +173,36 @@ class Arm:
         from dhkit.kinematics import jacobian_dot
 
         return jacobian_dot(self._description, q, qd, frame, out, threads)
+
+    def ik(
+        self, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
+    ) -> IKSolutions:
+        """Return all solutions of fk(q) = T in closed form, for poses (..., 4, 4).
+
+        See :func:`dhkit.kinematics.inverse_kinematics`; ``seed`` decides the joint that is free at a wrist singularity.
+        """
+        from dhkit.kinematics import inverse_kinematics
+
+        return inverse_kinematics(self._description, T, seed, out, threads)
+
+    def ik_numeric(self, T: ArrayLike, q0: ArrayLike | None = None, **options: Any) -> IKSolutions:
+        """Return one solution per pose by iteration, for any arm; see :func:`dhkit.kinematics.solve_numerically`."""
+        from dhkit.kinematics import solve_numerically
+
+        return solve_numerically(self._description, T, q0, **options)
+
+    def ik_path(self, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
+        """Follow one branch along poses (N, 4, 4) from near q0; see :func:`dhkit.kinematics.follow_path`."""
+        from dhkit.kinematics import follow_path
+
+        return follow_path(self._description, T, q0, limits=limits)
+
+    @property
+    def family(self) -> str:
+        """What the axes are like, and whether inverse kinematics have a closed form, in words."""
+        from dhkit.kinematics import classify
+
+        return classify(self._description).words
 
     # The reference path
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
@@ -16,8 +16,20 @@ SETTINGS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "ns
 """Products may be fused into sums and the sign of zero may go; NaN must survive, so no other liberty."""
 
 
-def compiled(signature: str, *, cache: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Compile a kernel for one signature; with a cache, load it from the folder that its module lies in."""
+def compiled(
+    inputs: int, outputs: Sequence[str], *, cache: bool
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Compile a kernel of parameters, inputs and outputs; with a cache, load it from the folder its module lies in.
+
+    Inputs may be read-only; outputs are arrays of the named types. All are C-contiguous.
+    """
+
+    def array(kind: str, axes: int, readonly: bool) -> numba.types.Type:
+        return numba.types.Array(getattr(numba.types, kind), axes, "C", readonly=readonly)
+
+    arguments = [array("float64", 1, True), *(array("float64", 2, True) for _ in range(inputs))]
+    arguments += [array(kind, 2, False) for kind in outputs]
+    signature = numba.types.void(*arguments)
     return numba.njit(signature, cache=cache, boundscheck=False, **SETTINGS)  # type: ignore[no-any-return]
 
 

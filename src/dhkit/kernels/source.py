@@ -66,14 +66,13 @@ def loop_source(graph: Graph, types: Sequence[str], *, cache: bool = True) -> st
         return f"w[{(outputs[output] + entry) * BLOCK} + i] = {poisoned}"
 
     arguments = ["parameters", *(f"x{k}" for k in range(len(inputs) - 1)), *(f"y{k}" for k in range(len(types)))]
-    arrays = ["float64[::1]"] + ["float64[:, ::1]"] * (len(inputs) - 1) + [f"{kind}[:, ::1]" for kind in types]
     lines = [
         f'"""{graph.name}: written by dhkit.kernels."""',
         "import numpy as np",
         "from numpy import inf, nan",
         f"from dhkit.kernels.compiler import compiled, {FUNCTIONS}",
         "",
-        f'@compiled("void({", ".join(arrays)})", cache={cache})',
+        f"@compiled({len(layout.items)}, {list(types)}, cache={cache})",
         f"def kernel({', '.join(arguments)}):",
         f"    w = np.empty({outputs[-1] * BLOCK})",
         *(f"    p{entry} = parameters[{entry}]" for entry in range(layout.parameters.size)),

@@ -1,6 +1,24 @@
-"""Where an arm is and how it moves: forward kinematics and Jacobians, for one state or a batch."""
+"""Where an arm is, how it moves, how it gets there: forward and inverse kinematics, Jacobians, workspace, in batches."""
 
+from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
+from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
+from dhkit.kinematics.path import IKPath, follow_path
+from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
-__all__ = ["ReferenceAxes", "forward_kinematics", "frames", "jacobian", "jacobian_dot"]
+__all__ = [
+    "Classification",
+    "IKFlag",
+    "IKPath",
+    "IKSolutions",
+    "IKStatus",
+    "ReferenceAxes",
+    "classify",
+    "follow_path",
+    "forward_kinematics",
+    "frames",
+    "inverse_kinematics",
+    "jacobian",
+    "jacobian_dot",
+]

@@ -1,0 +1,28 @@
+"""dhkit's kinematics timed beside its peers: same robot, same states, one process, interleaved rounds."""
+
+from dhkit.bench.agreement import Verdict
+from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, UnavailableError, Workload
+from dhkit.bench.machine import Machine
+from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
+from dhkit.bench.report import BenchReport, Missing, Row
+from dhkit.bench.required import Requirement
+from dhkit.bench.runner import run
+
+__all__ = [
+    "QUANTITIES",
+    "BenchReport",
+    "Contender",
+    "FirstCall",
+    "Machine",
+    "Missing",
+    "Mode",
+    "PeakMemory",
+    "Requirement",
+    "Row",
+    "Task",
+    "ThreadScaling",
+    "UnavailableError",
+    "Verdict",
+    "Workload",
+    "run",
+]

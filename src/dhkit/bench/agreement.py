@@ -1,0 +1,64 @@
+"""Whether a contender's answers are the ones that dhkit gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.bench.contenders import Task, Workload
+from dhkit.description import Array
+
+__all__ = ["TOLERANCE", "Verdict", "judge"]
+
+TOLERANCE = 1e-9
+"""Largest error that counts as agreement, m or rotation entry: a nanometre, far above any rounding."""
+CHECKED = 32
+"""Items that are compared: enough to meet every branch, few enough for a solver of 50 ms."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far a contender's answers are from dhkit's.
+
+    Attributes
+    ----------
+    error
+        The largest difference of an entry: of the poses, of the Jacobians, or of the pose where a solution puts the
+        tool from the one asked for; None if there was nothing finite to compare.
+    solutions
+        Solutions a pose on average that put the tool where it was asked for, for ``ik``; None for the rest.
+    """
+
+    error: float | None
+    solutions: float | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether the two agree."""
+        return self.error is not None and self.error <= TOLERANCE
+
+
+def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
+    """Compare the first answers of a task with dhkit's own."""
+    count = min(CHECKED, len(workload.q))
+    answers = task.answers(count)
+    if quantity == "ik":
+        return _closes(workload, answers)
+    ours = getattr(workload.arm, quantity)(workload.q[:count])
+    return Verdict(_worst(np.asarray(answers) - ours))
+
+
+def _closes(workload: Workload, answers: Sequence[Array]) -> Verdict:
+    counts = [len(solutions) for solutions in answers]
+    wanted = np.repeat(workload.T[: len(answers)], counts, axis=0)
+    q = np.concatenate([np.reshape(solutions, (-1, workload.arm.n)) for solutions in answers])
+    misses = np.abs(workload.arm.fk(q) - wanted)
+    closing = int(np.sum(misses.max(axis=(1, 2)) <= TOLERANCE)) if len(q) else 0
+    return Verdict(_worst(misses), closing / len(counts))
+
+
+def _worst(difference: Array) -> float | None:
+    worst = float(np.abs(difference).max()) if difference.size else np.nan
+    return worst if np.isfinite(worst) else None

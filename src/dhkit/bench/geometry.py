@@ -1,0 +1,210 @@
+"""A description in the words of other libraries: joint axes in space, the ortho-parallel parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dhkit.bench.contenders import UnavailableError
+from dhkit.description import Array, Convention, Description, world_to_frames, world_to_tool
+
+__all__ = ["JointAxes", "OrthoParallel", "bare", "has_spherical_wrist", "joint_axes"]
+
+GEOMETRIC = 1e-9
+"""Axes closer than this, in m or as a sine, count as meeting, parallel or perpendicular."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointAxes:
+    """Joint axes of an arm at one state, in the world.
+
+    Attributes
+    ----------
+    directions
+        Unit vectors, shape (n, 3).
+    points
+        A point on each axis, m, shape (n, 3).
+    T_world_tool
+        The tool there, shape (4, 4).
+    """
+
+    directions: Array
+    points: Array
+    T_world_tool: Array
+
+    @property
+    def offsets(self) -> Array:
+        """World to the first point, point to point, last point to tool, shape (n + 1, 3): the P of EAIK and ssik."""
+        return np.diff(self.points, axis=0, prepend=0.0, append=self.T_world_tool[None, :3, 3])
+
+    def without_tool_rotation(self, T: Array) -> Array:
+        """Return poses (..., 4, 4) of a tool whose axes are the world's at this state."""
+        turned = np.array(T)
+        turned[..., :3, :3] = T[..., :3, :3] @ self.T_world_tool[:3, :3].T
+        return turned
+
+    def with_tool_rotation(self, T: Array) -> Array:
+        """Undo :meth:`without_tool_rotation`."""
+        turned = np.array(T)
+        turned[..., :3, :3] = T[..., :3, :3] @ self.T_world_tool[:3, :3]
+        return turned
+
+
+def joint_axes(description: Description, q: Array | None = None) -> JointAxes:
+    """Return the axes of a revolute arm at q, shape (n,), rad; at 0 unless given.
+
+    Raises
+    ------
+    UnavailableError
+        A joint is prismatic.
+    """
+    if description.numbers.prismatic.any():
+        raise UnavailableError("takes revolute joints only; this arm has prismatic ones")
+    q = np.zeros(description.n) if q is None else q
+    frames = world_to_frames(description, q)
+    # Joint i turns about z of frame i - 1 in the standard convention, of frame i in the modified one.
+    turning = frames[:-1] if description.convention is Convention.STANDARD else frames[1:]
+    return JointAxes(turning[:, :3, 2], turning[:, :3, 3], world_to_tool(description, q))
+
+
+def bare(description: Description) -> Description:
+    """Return a description without limits and shapes: the mechanism alone, in one file."""
+    return replace(
+        description,
+        base=replace(description.base, shapes=()),
+        joints=tuple(
+            replace(joint, limits=None if joint.is_revolute else joint.limits, shapes=())
+            for joint in description.joints
+        ),
+        tool=replace(description.tool, shapes=()),
+    )
+
+
+def has_spherical_wrist(axes: JointAxes) -> bool:
+    """Whether the last three axes meet in a point."""
+    return wrist_centre(axes) is not None
+
+
+def wrist_centre(axes: JointAxes) -> Array | None:
+    """Return the point where the last three axes meet, m, or None."""
+    directions, points = axes.directions[-3:], axes.points[-3:]
+    # Least squares of the distances to the three lines: sum (1 - h h^T) (x - p) = 0.
+    projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    centre = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None)[0]
+    distances = np.linalg.norm(np.einsum("kij,kj->ki", projectors, centre - points), axis=1)
+    return centre if distances.max() < GEOMETRIC else None
+
+
+@dataclass(frozen=True, eq=False)
+class OrthoParallel:
+    """An arm with an ortho-parallel basis and a spherical wrist.
+
+    Its zero state has all links upright, axes along z y y z y z; lengths as in Brandstötter, Angerer and Hofbaur, An
+    analytical solution of the inverse kinematics problem of industrial serial manipulators (2014), figure 2.
+
+    Attributes
+    ----------
+    a1, a2, b, c2, c3
+        Lengths, m; c1 and c4 are 0: the basis is taken at shoulder height and the flange in the wrist's centre.
+    T_world_basis, T_flange_tool
+        What lies before and behind, shape (4, 4).
+    zero
+        Our joint values where the arm stands upright, shape (6,), rad.
+    signs
+        1 where the two joint angles grow together, else -1, shape (6,).
+    """
+
+    a1: float
+    a2: float
+    b: float
+    c2: float
+    c3: float
+    T_world_basis: Array
+    T_flange_tool: Array
+    zero: Array
+    signs: Array
+
+    @classmethod
+    def of(cls, description: Description) -> OrthoParallel:
+        """Fit an arm: stand it upright joint by joint, then read its lengths off.
+
+        Raises
+        ------
+        UnavailableError
+            The arm is of another family.
+        """
+        if description.n != 6:
+            raise UnavailableError(f"takes 6 joints; this arm has {description.n}")
+        axes = joint_axes(description)
+        centre = wrist_centre(axes)
+        h = axes.directions
+        across = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
+        if centre is None or max(across) > GEOMETRIC or np.linalg.norm(np.cross(h[1], h[2])) > GEOMETRIC:
+            raise UnavailableError("takes an ortho-parallel basis with a spherical wrist; this arm is built otherwise")
+        return _upright(description)
+
+    def poses(self, T: Array) -> Array:
+        """Return poses of the flange in the basis for poses of the tool in the world, shape (..., 4, 4)."""
+        return np.asarray(np.linalg.inv(self.T_world_basis) @ T @ np.linalg.inv(self.T_flange_tool))
+
+    def tool_poses(self, T: Array) -> Array:
+        """Undo :meth:`poses`."""
+        return np.asarray(self.T_world_basis @ T @ self.T_flange_tool)
+
+    def angles(self, q: Array) -> Array:
+        """Return the family's joint angles for ours, shape (..., 6), rad."""
+        return self.signs * (q - self.zero)
+
+    def ours(self, angles: Array) -> Array:
+        """Undo :meth:`angles`."""
+        return self.zero + self.signs * angles
+
+
+def _upright(description: Description) -> OrthoParallel:
+    axes = joint_axes(description)
+    z, y = axes.directions[0], axes.directions[1]
+    x = np.cross(y, z)
+    q = np.zeros(6)
+
+    def turn(joint: int, current: Array, wanted: Array) -> JointAxes:
+        """Turn a joint until one vector shows where another does."""
+        axis = joint_axes(description, q).directions[joint]
+        q[joint] = np.arctan2(axis @ np.cross(current, wanted), current @ wanted - (axis @ current) * (axis @ wanted))
+        return joint_axes(description, q)
+
+    upper_arm = axes.points[2] - axes.points[1]
+    axes = turn(1, upper_arm - (upper_arm @ y) * y, z)
+    axes = turn(2, _towards(wrist_centre(axes), axes), z)
+    axes = turn(3, axes.directions[4], y)
+    axes = turn(4, axes.directions[5], z)
+    centre = wrist_centre(axes)
+    if centre is None:
+        raise UnavailableError("takes a spherical wrist; the axes of this arm's meet too loosely")
+
+    basis = np.eye(4)
+    basis[:3, :3] = np.column_stack([x, y, z])
+    origin = axes.points[0]
+    basis[:3, 3] = origin + ((axes.points[1] - origin) @ z) * z
+    shoulder, elbow, wrist = (
+        (point - basis[:3, 3]) @ basis[:3, :3] for point in (axes.points[1], axes.points[2], centre)
+    )
+    upright = basis.copy()
+    upright[:3, 3] = centre
+    return OrthoParallel(
+        a1=float(shoulder[0]),
+        a2=float(wrist[0] - elbow[0]),
+        b=float(wrist[1]),
+        c2=float(elbow[2]),
+        c3=float(wrist[2] - elbow[2]),
+        T_world_basis=basis,
+        T_flange_tool=np.linalg.inv(upright) @ axes.T_world_tool,
+        zero=q,
+        signs=np.sign(np.einsum("ij,ij->i", axes.directions, np.array([z, y, y, z, y, z]))),
+    )
+
+
+def _towards(centre: Array | None, axes: JointAxes) -> Array:
+    """Return the direction of the fourth axis that points from the elbow to the wrist's centre."""
+    forearm: Array = axes.directions[3]
+    return -forearm if centre is not None and (centre - axes.points[2]) @ forearm < 0 else forearm

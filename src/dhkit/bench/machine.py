@@ -1,0 +1,96 @@
+"""What a benchmark ran on: processor, Python and packages; nothing that names a host or a person."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from dhkit.kernels import compiling
+
+__all__ = ["Machine", "cores"]
+
+FLAGS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl", "asimd", "sve")
+PACKAGES = (
+    "dhkit",
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "pin",
+    "EAIK",
+    "py-opw-kinematics",
+    "ssik",
+    "roboticstoolbox-python",
+    "ikpy",
+)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where figures come from.
+
+    Attributes
+    ----------
+    processor
+        Its model.
+    cores
+        How many of them this process may use.
+    flags
+        Vector instruction sets that matter here.
+    system
+        Operating system and architecture.
+    python
+        Implementation and version.
+    packages
+        Versions of what took part, by name; missing ones are left out.
+    kernels
+        Whether compiled kernels are on.
+    """
+
+    processor: str
+    cores: int
+    flags: tuple[str, ...]
+    system: str
+    python: str
+    packages: dict[str, str]
+    kernels: bool
+
+    @classmethod
+    def here(cls) -> Machine:
+        """Return the facts of this machine."""
+        facts = _cpuinfo()
+        present = facts.get("flags", facts.get("Features", "")).split()
+        return cls(
+            processor=facts.get("model name") or platform.processor() or platform.machine(),
+            cores=cores(),
+            flags=tuple(flag for flag in FLAGS if flag in present),
+            system=f"{platform.system()} {platform.machine()}",
+            python=f"{platform.python_implementation()} {platform.python_version()}",
+            packages={name: found for name in PACKAGES if (found := _version(name))},
+            kernels=compiling(),
+        )
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _cpuinfo() -> dict[str, str]:
+    """Return the first processor's entries of /proc/cpuinfo; nothing where there is none."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+    except OSError:
+        return {}
+    lines = (line.partition(":") for line in text.split("\n\n")[0].splitlines())
+    return {key.strip(): value.strip() for key, _, value in lines}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

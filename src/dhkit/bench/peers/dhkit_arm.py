@@ -1,0 +1,97 @@
+"""dhkit itself: one call for a batch, with and without an array to write into, and one call a state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, UnavailableError, Workload, one_by_one
+from dhkit.description import Array
+from dhkit.errors import DhkitError
+
+__all__ = ["BATCH", "NEW_ARRAYS", "SINGLE", "contenders", "method", "new_output"]
+
+BATCH = "dhkit, out="
+NEW_ARRAYS = "dhkit"
+SINGLE = "dhkit, one call"
+
+
+def contenders() -> tuple[Contender, ...]:
+    """Return dhkit's ways to compute each quantity."""
+    ways = ((BATCH, Mode.BATCH, _into_out), (NEW_ARRAYS, Mode.BATCH, _into_new_arrays), (SINGLE, Mode.SINGLE, _single))
+    return tuple(
+        Contender(name, quantity, mode, way(quantity), own=True) for quantity in QUANTITIES for name, mode, way in ways
+    )
+
+
+def method(arm: Arm, quantity: str) -> Callable[..., Any]:
+    """Return the arm's method of a quantity.
+
+    Raises
+    ------
+    UnavailableError
+        This dhkit has none, or it refuses the arm.
+    """
+    function: Callable[..., Any] | None = getattr(arm, quantity, None)
+    if function is None:
+        raise UnavailableError(f"this dhkit has no arm.{quantity}")
+    state = np.zeros((1, arm.n))
+    try:
+        function(arm.fk(state) if quantity == "ik" else state)
+    except (DhkitError, NotImplementedError) as error:
+        raise UnavailableError(f"arm.{quantity}: {error}") from None
+    return function
+
+
+def new_output(function: Callable[..., Any], inputs: Array) -> Array:
+    """Return an array to write a batch's results into, its pages touched."""
+    result = function(inputs[:1])
+    one: Array = result if isinstance(result, np.ndarray) else result.q
+    return np.full((len(inputs), *one.shape[1:]), np.nan)
+
+
+def _into_out(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+
+        def prepare(items: int) -> Callable[[], Any]:
+            chosen = inputs[:items]
+            out = new_output(function, chosen)
+            return lambda: function(chosen, out=out, threads=workload.threads)
+
+        return Task(prepare, lambda k: _answers(quantity, prepare(k)()))
+
+    return setup
+
+
+def _into_new_arrays(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+
+        def prepare(items: int) -> Callable[[], Any]:
+            chosen = inputs[:items]
+            return lambda: function(chosen, threads=workload.threads)
+
+        return Task(prepare, lambda k: _answers(quantity, prepare(k)()))
+
+    return setup
+
+
+def _single(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        return Task(
+            one_by_one(function, list(inputs)),
+            lambda k: [_answers(quantity, function(x[None]))[0] for x in inputs[:k]],
+        )
+
+    return setup
+
+
+def _answers(quantity: str, result: Any) -> Sequence[Array]:
+    if quantity != "ik":
+        return list(result)
+    return [q[valid] for q, valid in zip(result.q, result.valid, strict=True)]

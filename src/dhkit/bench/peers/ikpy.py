@@ -1,0 +1,77 @@
+"""ikpy: numeric inverse kinematics in Python, from the URDF that dhkit writes."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.bench.contenders import Contender, Mode, Task, Workload, import_peer, one_by_one
+from dhkit.bench.geometry import bare
+from dhkit.description import Array
+
+__all__ = ["contenders"]
+
+
+def contenders() -> tuple[Contender, ...]:
+    """Return ikpy's contenders; it takes one state or pose a call."""
+    return (
+        Contender("ikpy forward_kinematics", "fk", Mode.SINGLE, _forward),
+        Contender("ikpy inverse_kinematics_frame", "ik", Mode.SINGLE, _inverse),
+    )
+
+
+def _forward(workload: Workload) -> Task:
+    chain, moving = _chain(workload.arm)
+    # The chain counts fixed joints too: a state has a place for each.
+    states = np.zeros((min(len(workload.q), 10_000), len(moving)))
+    states[:, moving] = workload.q[: len(states)]
+    return Task(
+        one_by_one(chain.forward_kinematics, list(states)),
+        lambda k: [chain.forward_kinematics(state) for state in states[:k]],
+    )
+
+
+def _inverse(workload: Workload) -> Task:
+    chain, moving = _chain(workload.arm)
+    solve = partial(chain.inverse_kinematics_frame, orientation_mode="all")
+    return Task(
+        one_by_one(solve, list(workload.T)),
+        lambda k: [np.asarray(solve(T))[None, moving] for T in workload.T[:k]],
+    )
+
+
+def _chain(arm: Arm) -> tuple[Any, Array]:
+    """Return its chain from the world to the tool, and which of its links move, shape (links,)."""
+    package = import_peer("ikpy.chain")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "arm.urdf"
+        urdf = Arm(bare(arm.description)).urdf()
+        path.write_text(urdf, encoding="utf-8")
+        elements = _path_to_tool(urdf)
+        names = {joint.name for joint in arm.description.joints}
+        moving = [False, *(name in names for name in elements[1::2])]
+        chain = package.Chain.from_urdf_file(
+            str(path), base_elements=elements, active_links_mask=moving, symbolic=False
+        )
+    return chain, np.array(moving)
+
+
+def _path_to_tool(urdf: str) -> list[str]:
+    """Return the names of links and joints, in turns, from the world to the tool."""
+    joints = ElementTree.fromstring(urdf).findall("joint")  # noqa: S314 - our own text
+    above = {_end(joint, "child"): (_end(joint, "parent"), joint.get("name", "")) for joint in joints}
+    path = ["tool"]
+    while path[0] in above:
+        path[:0] = above[path[0]]
+    return path
+
+
+def _end(joint: ElementTree.Element, which: str) -> str:
+    element = joint.find(which)
+    return "" if element is None else element.get("link", "")

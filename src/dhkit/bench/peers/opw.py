@@ -1,0 +1,78 @@
+"""py-opw-kinematics (rs-opw-kinematics in Rust): ortho-parallel arms with a spherical wrist."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer, one_by_one
+from dhkit.bench.geometry import OrthoParallel
+from dhkit.description import Array
+
+__all__ = ["contenders"]
+
+NOBODY = [(10.0, 11.0)] * 6
+"""rad; limits that no branch meets: `reach` returns every branch all the same, and spares the singular values."""
+
+
+def contenders() -> tuple[Contender, ...]:
+    """Return py-opw-kinematics' contenders."""
+    return (
+        Contender("py-opw-kinematics forward", "fk", Mode.SINGLE, _forward),
+        Contender("py-opw-kinematics batch_forward", "fk", Mode.BATCH, _batch_forward),
+        Contender("py-opw-kinematics inverse", "ik", Mode.SINGLE, _inverse),
+        Contender("py-opw-kinematics reach", "ik", Mode.BATCH, _reach),
+    )
+
+
+def _forward(workload: Workload) -> Task:
+    robot, family, _ = _robot(workload)
+    angles = family.angles(workload.q)
+    return Task(
+        one_by_one(robot.forward, [tuple(map(float, state)) for state in angles]),
+        lambda k: [family.tool_poses(robot.forward(tuple(state)).as_matrix()) for state in angles[:k]],
+    )
+
+
+def _batch_forward(workload: Workload) -> Task:
+    robot, family, _ = _robot(workload)
+    angles = family.angles(workload.q)
+
+    def prepare(items: int) -> Call:
+        chosen = np.ascontiguousarray(angles[:items])
+        return lambda: robot.batch_forward(chosen)
+
+    return Task(prepare, lambda k: list(family.tool_poses(robot.batch_forward(angles[:k]).as_matrix())))
+
+
+def _inverse(workload: Workload) -> Task:
+    robot, family, transform = _robot(workload)
+    poses = [transform(T) for T in family.poses(workload.T[:10_000])]
+    return Task(
+        one_by_one(robot.inverse, poses),
+        lambda k: [family.ours(np.reshape(robot.inverse(pose), (-1, 6))) for pose in poses[:k]],
+    )
+
+
+def _reach(workload: Workload) -> Task:
+    robot, family, transform = _robot(workload)
+    poses = family.poses(workload.T)
+
+    def prepare(items: int) -> Call:
+        chosen = transform(poses[:items])
+        return lambda: robot.reach(chosen, joint_limits=NOBODY, threads=workload.threads)
+
+    def answers(k: int) -> list[Array]:
+        branches = family.ours(robot.reach(transform(poses[:k]), joint_limits=NOBODY).joints)
+        return [solutions[~np.isnan(solutions).any(axis=1)] for solutions in branches]
+
+    return Task(prepare, answers)
+
+
+def _robot(workload: Workload) -> tuple[Any, OrthoParallel, Any]:
+    """Return its robot, what we know of the arm, and what makes its poses of ours."""
+    package = import_peer("py_opw_kinematics")
+    family = OrthoParallel.of(workload.arm.description)
+    model = package.KinematicModel(a1=family.a1, a2=family.a2, b=family.b, c2=family.c2, c3=family.c3)
+    return package.Robot(model, degrees=False), family, package.RigidTransform.from_matrix

@@ -1,0 +1,215 @@
+"""What a benchmark found, for people (text, Markdown) and machines (JSON)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, TypeAlias
+
+from dhkit.bench.agreement import Verdict
+from dhkit.bench.contenders import Mode
+from dhkit.bench.machine import Machine
+from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
+from dhkit.bench.required import Requirement
+
+__all__ = ["BenchReport", "Missing", "Row"]
+
+Table: TypeAlias = tuple[str, Sequence[str], list[list[str]]]
+RATIO_MEANING = (
+    "x batch and x single: how many times as long as dhkit's batch call with out=, and as its single call; "
+    "medians over the rounds. Error: largest difference from dhkit's answers; a solution is one that closes to 1e-9."
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contender's figures.
+
+    Attributes
+    ----------
+    quantity, contender, mode
+        What was timed and how it was called.
+    own
+        Whether it is dhkit itself.
+    items, rounds
+        Items a batch call, or a loop of single calls; rounds.
+    seconds, lower, upper
+        Median and quartiles over the rounds, s an item.
+    verdict
+        Whether its answers agree with dhkit's.
+    times_batch, times_single
+        Its time over that of dhkit's batch call with ``out=``, and over that of dhkit's single call; None where dhkit
+        was not measured.
+    """
+
+    quantity: str
+    contender: str
+    mode: Mode
+    own: bool
+    items: int
+    rounds: int
+    seconds: float
+    lower: float
+    upper: float
+    verdict: Verdict
+    times_batch: float | None
+    times_single: float | None
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A contender or a probe that did not take part, and why."""
+
+    quantity: str
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class BenchReport:
+    """dhkit's kinematics beside its peers', one robot, one process.
+
+    Attributes
+    ----------
+    robot
+        Its name.
+    batch, threads, seed
+        Items of a batch, threads a batch call may use, seed of the states.
+    rows, missing
+        The contenders' figures; who did not take part, and why.
+    scaling, memory, starts
+        Two threads against one, peak memory, time of a second process.
+    requirements
+        What is asked of dhkit, beside what was measured.
+    machine
+        Where it ran.
+    interrupted
+        Whether it was stopped before the end.
+    """
+
+    robot: str
+    batch: int
+    threads: int
+    seed: int
+    rows: tuple[Row, ...]
+    missing: tuple[Missing, ...]
+    scaling: tuple[ThreadScaling, ...]
+    memory: tuple[PeakMemory, ...]
+    starts: tuple[FirstCall, ...]
+    requirements: tuple[Requirement, ...]
+    machine: Machine
+    interrupted: bool = False
+
+    def json(self) -> dict[str, Any]:
+        """Return everything as what JSON knows: no NaN, no tuples, no classes."""
+        plain = asdict(self)
+        for entry, row in zip(plain["rows"], self.rows, strict=True):
+            verdict = entry.pop("verdict")
+            entry |= verdict | {"mode": row.mode.value, "agrees": row.verdict.ok}
+        for key in ("requirements", "scaling", "memory"):
+            for entry, value in zip(plain[key], getattr(self, key), strict=True):
+                entry |= value.derived
+        listed: dict[str, Any] = _listed(plain)
+        return listed
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+        parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
+        for heading, columns, cells in self._tables:
+            parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
+        return "\n".join([*parts, RATIO_MEANING, ""])
+
+    def __str__(self) -> str:
+        parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
+        for heading, columns, cells in self._tables:
+            parts += [heading, *_text_table(columns, cells), ""]
+        return "\n".join([*parts, RATIO_MEANING])
+
+    @property
+    def _title(self) -> str:
+        threads = "1 thread" if self.threads == 1 else f"{self.threads} threads"
+        ending = " (interrupted)" if self.interrupted else ""
+        return f"{self.robot}: dhkit beside its peers, batches of {self.batch}, {threads}{ending}"
+
+    @property
+    def _facts(self) -> list[str]:
+        machine = self.machine
+        packages = ", ".join(f"{name} {version}" for name, version in machine.packages.items())
+        return [
+            f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
+            f"{machine.system}, {machine.python}, kernels {'on' if machine.kernels else 'off'}",
+            packages,
+        ]
+
+    @property
+    def _tables(self) -> list[Table]:
+        """Headings, columns and cells of the tables that have something to show."""
+        columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
+        quantities = dict.fromkeys(row.quantity for row in self.rows)
+        tables: list[Table] = [
+            (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
+            for quantity in quantities
+        ]
+        tables += [
+            ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
+            ("Two threads", ThreadScaling.COLUMNS, [list(line.cells) for line in self.scaling]),
+            ("Peak memory", PeakMemory.COLUMNS, [list(line.cells) for line in self.memory]),
+            ("A new process", FirstCall.COLUMNS, [list(line.cells) for line in self.starts]),
+            (
+                "Did not take part",
+                ("quantity", "who", "why"),
+                [[gap.quantity, gap.name, gap.reason] for gap in self.missing],
+            ),
+        ]
+        return [table for table in tables if table[2]]
+
+
+def _cells(row: Row) -> list[str]:
+    verdict = row.verdict
+    error = "no answer" if verdict.error is None else f"{verdict.error:.0e}"
+    return [
+        row.contender,
+        row.mode.value,
+        str(row.items),
+        duration(row.seconds),
+        f"{duration(row.lower)} to {duration(row.upper)}",
+        _ratio(row.times_batch),
+        _ratio(row.times_single),
+        "" if verdict.solutions is None else f"{verdict.solutions:.2f}",
+        error if verdict.ok else f"DISAGREES: {error}",
+    ]
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that suits it, three digits."""
+    for unit, scale in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= scale:
+            return f"{seconds / scale:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def _ratio(value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+    lines = [list(columns), *map(list, cells)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+    return [
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
+    ]
+
+
+def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+    lines = [columns, ["---"] * len(columns), *cells]
+    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _listed(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_listed(entry) for entry in value]
+    return value

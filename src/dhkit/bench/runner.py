@@ -1,0 +1,232 @@
+"""The benchmark: set contenders up, check their answers, time them in turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.bench.agreement import Verdict, judge
+from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, UnavailableError, Workload
+from dhkit.bench.machine import Machine
+from dhkit.bench.peers import all_contenders, dhkit_arm
+from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
+from dhkit.bench.report import BenchReport, Missing, Row
+from dhkit.bench.required import BATCH, requirements
+from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
+from dhkit.description import Array
+
+__all__ = ["REPEATS", "run"]
+
+REPEATS = 9
+"""Rounds: odd, so that the median is one of them."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class _Entrant:
+    """A contender that takes part: a call of ``times`` times ``items`` items."""
+
+    contender: Contender
+    verdict: Verdict
+    items: int
+    times: int
+    call: Call
+
+
+@dataclass
+class _Findings:
+    """What was measured so far; an interrupted run reports it."""
+
+    rows: list[Row] = field(default_factory=list)
+    missing: list[Missing] = field(default_factory=list)
+    scaling: list[ThreadScaling] = field(default_factory=list)
+    memory: list[PeakMemory] = field(default_factory=list)
+    starts: list[FirstCall] = field(default_factory=list)
+
+
+def run(
+    arm: Arm,
+    quantities: Sequence[str] = QUANTITIES,
+    batch: int = BATCH,
+    threads: int = 1,
+    repeats: int = REPEATS,
+    seed: int = 0,
+    progress: Progress | None = None,
+    *,
+    probes: bool = True,
+    contenders: Sequence[Contender] | None = None,
+) -> BenchReport:
+    """Time dhkit's kinematics beside every peer that is installed, in one process and in interleaved rounds.
+
+    Parameters
+    ----------
+    arm
+        The robot.
+    quantities
+        Any of ``fk``, ``ik``, ``jacobian``.
+    batch
+        Items of a batch; slow contenders get fewer, as their rows say.
+    threads
+        How many threads batch calls that offer threads may use.
+    repeats
+        Rounds.
+    seed
+        Of the random states.
+    progress
+        Gets a line before each step.
+    probes
+        Whether to measure threads, memory and new processes too.
+    contenders
+        Who takes part; everyone unless given.
+
+    Returns
+    -------
+    BenchReport
+        What was measured; when interrupted from the keyboard, what was measured until then.
+
+    Raises
+    ------
+    ValueError
+        An unknown quantity, or a count below 1.
+
+    Examples
+    --------
+    >>> own = dhkit_arm.contenders()
+    >>> report = run(Arm.load("planar2r"), ["fk"], batch=100, repeats=1, probes=False, contenders=own)
+    >>> report.rows[0].contender, report.rows[0].items
+    ('dhkit, out=', 100)
+    """
+    _check(quantities, batch=batch, threads=threads, repeats=repeats)
+    tell = progress or (lambda line: None)
+    chosen = all_contenders() if contenders is None else contenders
+    findings, interrupted = _Findings(), False
+    try:
+        with calm():
+            workload = Workload.of(arm, batch, threads, seed)
+            for quantity in quantities:
+                _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, findings, tell)
+            for quantity in quantities if probes else ():
+                _probe(workload, quantity, repeats, findings, tell)
+    except KeyboardInterrupt:
+        interrupted = True
+    asked = requirements(
+        findings.rows,
+        quantities,
+        findings.scaling,
+        findings.memory,
+        findings.starts,
+        as_asked=batch >= BATCH and threads == 1,
+    )
+    return BenchReport(
+        robot=arm.name,
+        batch=batch,
+        threads=threads,
+        seed=seed,
+        rows=tuple(findings.rows),
+        missing=tuple(findings.missing),
+        scaling=tuple(findings.scaling),
+        memory=tuple(findings.memory),
+        starts=tuple(findings.starts),
+        requirements=asked,
+        machine=Machine.here(),
+        interrupted=interrupted,
+    )
+
+
+def _check(quantities: Sequence[str], **counts: int) -> None:
+    for quantity in quantities:
+        if quantity not in QUANTITIES:
+            raise ValueError(f"no quantity {quantity!r}; expected {', '.join(QUANTITIES)}")
+    for name, count in counts.items():
+        if count < 1:
+            raise ValueError(f"{name} is {count}; expected 1 or more")
+
+
+def _compare(
+    workload: Workload, contenders: Sequence[Contender], repeats: int, findings: _Findings, tell: Progress
+) -> None:
+    """Check and time the contenders of one quantity; what an interrupted run has seen is kept."""
+    entrants = list(_entrants(workload, contenders, findings, tell))
+    seconds: list[Array] = []
+    try:
+        for measured in rounds([entrant.call for entrant in entrants], repeats):
+            seconds.append(measured)
+            tell(f"{entrants[0].contender.quantity if entrants else ''}: round {len(seconds)} of {repeats}")
+    finally:
+        if seconds and entrants:
+            findings.rows += _rows(entrants, np.array(seconds))
+
+
+def _entrants(
+    workload: Workload, contenders: Sequence[Contender], findings: _Findings, tell: Progress
+) -> Iterator[_Entrant]:
+    for contender in contenders:
+        tell(f"{contender.quantity}: {contender.name}")
+        try:
+            task = contender.setup(workload)
+            verdict = judge(workload, contender.quantity, task)
+            yield _prepared(contender, task, verdict, len(workload.q))
+        except Exception as error:  # a peer may fail in any way; the benchmark goes on and says so
+            findings.missing.append(Missing(contender.quantity, contender.name, _reason(error)))
+
+
+def _prepared(contender: Contender, task: Task, verdict: Verdict, most: int) -> _Entrant:
+    items = items_within(task, contender.mode, most)
+    call = task.prepare(items)
+    times = lasting(call)
+    return _Entrant(contender, verdict, items, times, repeated(call, times))
+
+
+def _reason(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text if isinstance(error, UnavailableError) else f"failed: {type(error).__name__}: {text}"
+
+
+def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
+    """Return rows of seconds, shape (rounds, entrants); ratios are taken within a round."""
+    each = seconds / np.array([entrant.items * entrant.times for entrant in entrants])
+    lower, middle, upper = np.quantile(each, [0.25, 0.5, 0.75], axis=0)
+    names = [entrant.contender.name for entrant in entrants]
+
+    def times(k: int, reference: str) -> float | None:
+        return float(np.median(each[:, k] / each[:, names.index(reference)])) if reference in names else None
+
+    return [
+        Row(
+            quantity=entrant.contender.quantity,
+            contender=entrant.contender.name,
+            mode=entrant.contender.mode,
+            own=entrant.contender.own,
+            items=entrant.items,
+            rounds=len(seconds),
+            seconds=float(middle[k]),
+            lower=float(lower[k]),
+            upper=float(upper[k]),
+            verdict=entrant.verdict,
+            times_batch=times(k, dhkit_arm.BATCH),
+            times_single=times(k, dhkit_arm.SINGLE),
+        )
+        for k, entrant in enumerate(entrants)
+    ]
+
+
+def _probe(workload: Workload, quantity: str, repeats: int, findings: _Findings, tell: Progress) -> None:
+    """Measure what the ratio table does not show; a probe that cannot is listed as missing."""
+    steps: tuple[tuple[str, Callable[[], None]], ...] = (
+        ("two threads", lambda: findings.scaling.append(thread_scaling(workload, quantity, repeats))),
+        *(
+            (f"memory, {called}", lambda called=called: findings.memory.append(peak_memory(workload, quantity, called)))
+            for called in PeakMemory.CALLED
+        ),
+        ("a new process", lambda: findings.starts.append(first_call(workload, quantity))),
+    )
+    for name, step in steps:
+        tell(f"{quantity}: {name}")
+        try:
+            step()
+        except Exception as error:  # as for the contenders
+            findings.missing.append(Missing(quantity, name, _reason(error)))

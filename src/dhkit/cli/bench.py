@@ -1,0 +1,72 @@
+"""`dhkit bench`: kinematics beside its peers, with progress on stderr."""
+
+from __future__ import annotations
+
+import json as json_format
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from dhkit.arm import Arm
+from dhkit.bench import BenchReport
+from dhkit.bench import run as run_bench
+from dhkit.cli.output import print_json, say
+from dhkit.description import write_atomically
+from dhkit.errors import DescriptionError
+
+__all__ = ["run", "write"]
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
+
+
+def run(
+    arm: Arm,
+    quantities: Sequence[str],
+    *,
+    batch: int,
+    threads: int,
+    repeats: int,
+    seed: int,
+    probes: bool,
+    output: Path | None,
+    json: bool,
+) -> int:
+    """Run the benchmark and print its report; return 0, or 130 where Ctrl-C ended it early."""
+    if output is not None and not output.parent.is_dir():
+        raise DescriptionError(f"{output.parent}: no such folder")
+    progress = _Progress()
+    report = run_bench(arm, quantities, batch, threads, repeats, seed, progress.show, probes=probes)
+    progress.clear()
+    for path in write(report, output) if output else ():
+        sys.stderr.write(f"dhkit: wrote {path}\n")
+    if json:
+        print_json(report.json())
+    else:
+        say(str(report))
+    return INTERRUPTED if report.interrupted else 0
+
+
+def write(report: BenchReport, path: Path) -> tuple[Path, Path]:
+    """Write a report as Markdown and as JSON, whatever the path's ending; return the two files."""
+    files = path.with_suffix(".md"), path.with_suffix(".json")
+    write_atomically(files[0], report.markdown())
+    write_atomically(files[1], json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    return files
+
+
+class _Progress:
+    """One line on stderr that is written over in a terminal; a line a step elsewhere."""
+
+    def __init__(self) -> None:
+        self.terminal = sys.stderr.isatty()
+
+    def show(self, line: str) -> None:
+        """Show what is being done."""
+        sys.stderr.write(f"\r\x1b[K{line}" if self.terminal else f"{line}\n")
+        sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Leave the terminal's line empty."""
+        if self.terminal:
+            sys.stderr.write("\r\x1b[K")

@@ -1,0 +1,155 @@
+"""Inverse kinematics along a path: one branch followed from pose to pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.errors import UnreachableError
+from dhkit.kinematics.inverse import inverse_kinematics, pose_rows
+from dhkit.kinematics.jacobian import jacobian
+from dhkit.kinematics.manipulability import Motion, freedoms
+from dhkit.kinematics.solutions import IKFlag, IKSolutions
+
+__all__ = ["IKPath", "follow_path"]
+
+JUMP = np.pi / 4
+"""rad, or as a share of the reach: a joint that moves more between two poses has left its branch."""
+NEAR = 0.02
+"""A pose whose Jacobian has a smaller singular value, lengths over the reach, counts as near a singularity."""
+
+
+@dataclass(frozen=True, eq=False)
+class IKPath:
+    """Joint values along a path of poses, and where following it was not smooth."""
+
+    q: Array
+    """Shape (N, n), rad and m, continuous through whole turns; NaN where no branch reaches."""
+    branch: tuple[str, ...]
+    """The name of the branch at each pose, empty where none reaches."""
+    switches: tuple[int, ...]
+    """Places (of the pose after) where a joint jumps: the branch followed so far ended, or left its limits."""
+    lost: tuple[int, ...]
+    """Places of poses that no branch reaches inside the limits."""
+    near_singular: tuple[int, ...]
+    """Places of poses at which a singular value of the Jacobian that is not always 0, lengths over the reach, is
+    below 0.02: there joints may have to turn fifty times as fast as the tool."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether every pose is reached without a jump."""
+        return not self.switches and not self.lost
+
+    def require(self) -> Array:
+        """Return the joint values, shape (N, n).
+
+        Raises
+        ------
+        UnreachableError
+            A pose is not reached, or the branch had to be switched: says where.
+        """
+        if self.lost:
+            raise UnreachableError(f"{len(self.lost)} poses of the path are not reached, the first is pose {self.lost[0]}")
+        if self.switches:
+            places = ", ".join(map(str, self.switches[:5]))
+            raise UnreachableError(f"the path has to switch branches {len(self.switches)} times, before pose {places}")
+        return self.q
+
+    def __repr__(self) -> str:
+        return (
+            f"<IKPath of {len(self.q)} poses: {len(self.switches)} switches, {len(self.lost)} lost, "
+            f"{len(self.near_singular)} near a singularity>"
+        )
+
+
+def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
+    """Follow one branch along a path of poses.
+
+    The branch nearest to ``q0`` is taken at the first pose, and from then on the solution nearest to the last one,
+    whole turns added: near means the least sum of squared joint differences.
+
+    Parameters
+    ----------
+    description
+        The robot; one whose inverse kinematics have a closed form.
+    T
+        Poses of the tool in the world, shape (N, 4, 4), near enough to each other for joints to move less than 45
+        degrees (or an eighth of the reach) between them.
+    q0
+        Joint values, shape (n,), rad and m, near which the path starts.
+    limits
+        Whether solutions outside the joint limits are left out.
+
+    Returns
+    -------
+    IKPath
+        Joint values, and where the branch had to be switched, was lost, or came near a singularity.
+
+    Raises
+    ------
+    ValueError
+        T has not shape (N, 4, 4), or q0 not (n,) or not finite.
+    ModelError
+        The arm has no closed form.
+    """
+    poses = pose_rows(T)
+    q0 = joint_array(description, q0, "q0")
+    if poses.ndim != 3:
+        raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
+    if q0.shape != (description.n,) or not np.isfinite(q0).all():
+        raise ValueError(f"q0 has shape {q0.shape}; expected ({description.n},), finite values")
+    solutions = inverse_kinematics(description, poses, seed=q0)
+    usable = solutions.within if limits else solutions.valid
+    jump = JUMP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
+    q = np.full((len(poses), description.n), np.nan)
+    places = np.full(len(poses), -1)
+    switches, lost, at = [], [], q0
+    for k in range(len(poses)):
+        candidates, allowed = solutions.q[k], usable[k]
+        if np.any(solutions.flags[k] & IKFlag.wrist):
+            # Where the wrist is straight one joint is free: it keeps its angle.
+            here = inverse_kinematics(description, poses[k], seed=at)
+            candidates, allowed = here.q, here.within if limits else here.valid
+        chosen = _next(candidates, allowed, at, solutions, limits)
+        if chosen is None:
+            lost.append(k)
+            continue
+        q[k], places[k] = candidates[chosen[0]] + chosen[1], chosen[0]
+        if k and not lost[-1:] == [k - 1] and np.any(np.abs(q[k] - at) > jump):
+            switches.append(k)
+        at = q[k]
+    return IKPath(
+        q=q,
+        branch=tuple(solutions.branches[place] if place >= 0 else "" for place in places),
+        switches=tuple(switches),
+        lost=tuple(lost),
+        near_singular=_near_singular(description, q, "whole" if len(solutions.met) == 6 else "translational"),
+    )
+
+
+def _next(
+    candidates: Array, allowed: NDArray[np.bool_], at: Array, solutions: IKSolutions, limits: bool
+) -> tuple[int, Array] | None:
+    """Return the branch nearest to the last joint values and the whole turns to add, or None where there is none."""
+    if not allowed.any():
+        return None
+    turn = np.where(solutions.prismatic, 0.0, 2 * np.pi)
+    turns = turn * np.rint((at - candidates) / (2 * np.pi))
+    if limits:
+        # Where the nearest winding is outside the limits, take the one next to it that is inside.
+        turns += turn * ((candidates + turns < solutions.lower - 1e-9).astype(float))
+        turns -= turn * ((candidates + turns > solutions.upper + 1e-9).astype(float))
+    gaps = np.where(allowed, np.sum((candidates + turns - at) ** 2, axis=-1), np.inf)
+    best = int(np.argmin(np.where(np.isnan(gaps), np.inf, gaps)))
+    return best, turns[best]
+
+
+def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[int, ...]:
+    J = jacobian(description, np.nan_to_num(q))
+    J[:, :3] /= description.reach or 1.0
+    J = J if motion == "whole" else J[:, :3]
+    smallest = np.linalg.svd(J, compute_uv=False)[:, freedoms(description, motion) - 1]
+    return tuple(int(k) for k in np.flatnonzero((smallest < NEAR) & ~np.isnan(q).any(axis=-1)))
