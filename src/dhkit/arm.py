@@ -204,6 +204,12 @@ class Arm:
 
         return classify(self._description).words
 
+    def export_c(self, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
+        """Write the kinematics as C99 source and header; see :func:`dhkit.kinematics.export_kinematics`."""
+        from dhkit.kinematics import export_kinematics
+
+        return export_kinematics(self._description, folder, name)
+
     # The reference path
 
     def urdf(self) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dhkit.description import library_robot, world_to_tool
+from dhkit.kinematics.manipulability import velocity_ellipsoid
 from dhkit.model.shapes import link_parts
 from dhkit.viewer import View
 from dhkit.viewer.drawables import part_transform
@@ -272,3 +273,99 @@ def test_the_whole_page_works_by_keyboard(page, signal_arm, tmp_path):
         page.call("Input.dispatchKeyEvent", type="keyDown", key="Tab", code="Tab", windowsVirtualKeyCode=9)
         names.append(page.evaluate("document.activeElement.id || document.activeElement.localName"))
     assert names[:9] == ["summary", "frames", "trace", "reset", "play", "time", "speed", "loop", "body"]
+
+
+BLUE = (0.0, 0.0, 1.0)
+CROSS = 0.03 * np.concatenate([np.eye(3), -np.eye(3), np.zeros((1, 3))])  # m
+
+
+def blue(picture):
+    """Return which pixels are a pure blue that nothing else has."""
+    r, g, b = np.moveaxis(picture, -1, 0)
+    return (b > 150) & (r < 60) & (g < 60)
+
+
+def test_a_cloud_of_points_is_where_it_should_be_until_it_is_taken_away(page, signal_arm):
+    with View(signal_arm) as view:
+        page.open(view.url)
+        view.wait()
+        assert page.evaluate("document.getElementById('overlays').hidden") is True
+        point = (0.5, -0.3, 0.4)
+        view.points(np.array(point) + CROSS, BLUE)
+        view.wait()
+        picture = page.screenshot()
+        assert blue(picture).sum() > 4
+        assert np.linalg.norm(centre(blue(picture)) - projected(page, point)) < PIXELS
+        page.press("o")
+        assert blue(page.screenshot()).sum() == 0
+        page.press("o")
+        assert blue(page.screenshot()).sum() > 4
+        view.points(None)
+        view.wait()
+        assert blue(page.screenshot()).sum() == 0
+        assert page.evaluate("document.getElementById('overlays').hidden") is True
+        assert page.errors == []
+
+
+def test_a_large_cloud_is_all_in_view(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 1.5)]
+    view.points(corners, BLUE)
+    open_offline(page, view, tmp_path)
+    for corner in corners:
+        x, y = projected(page, corner)
+        assert 0 < x < 900
+        assert 0 < y < 700
+
+
+def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
+    q = STATES[0]
+    ellipsoid = velocity_ellipsoid(signal_arm, q)
+    view = View(signal_arm)
+    view.show(q)
+    open_offline(page, view, tmp_path)
+    without = page.screenshot()
+    view.ellipsoid(ellipsoid)
+    open_offline(page, view, tmp_path)
+    picture = page.screenshot()
+    assert (orange(picture) & ~orange(without)).sum() > 200  # its circles
+    # What the page draws maps the unit ball as Python says, and its middle is the tool.
+    drawn = page.evaluate("dhkit.stage.overlays.layers.ellipsoids.group.children[0].matrix.elements")
+    T = np.reshape(drawn, (4, 4)).T
+    assert np.abs(T[:3, 3] - world_to_tool(signal_arm, q)[:3, 3]).max() < FLOAT32
+    lengths = np.linalg.norm(T[:3, :3], axis=0)
+    assert lengths[1] / lengths[0] == pytest.approx(ellipsoid.lengths[1] / ellipsoid.lengths[0], rel=1e-5)
+    check_tool(page, picture, signal_arm, q)
+    assert hosts(page) == []
+    assert page.errors == []
+
+
+def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(page, signal_arm):
+    with View(signal_arm) as view:
+        view.show(STATES[0])
+        page.open(view.url)
+        view.ghosts([STATES[1], STATES[2]], BLUE)
+        view.wait()
+        copies = page.evaluate(
+            "dhkit.stage.overlays.layers.ghosts.group.children"
+            ".map(copy => { copy.updateMatrixWorld(true); return copy.matrixWorld.elements; })"
+        )
+        in_view = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+        expected = node_transforms(signal_arm, [STATES[1], STATES[2]])[:, 1:].reshape(-1, 4, 4)  # without the base
+        assert len(copies) == len(expected)
+        for copy, T in zip(copies, expected, strict=True):
+            assert np.abs(np.reshape(copy, (4, 4)).T - in_view @ T).max() < FLOAT32
+        picture = page.screenshot()
+        assert shows_the_arm(picture)
+        check_tool(page, picture, signal_arm, STATES[0])
+        for q in (STATES[1], STATES[2]):  # a bluish ball where each ghost's tool is
+            x, y = projected(page, world_to_tool(signal_arm, q)[:3, 3]).astype(int)
+            r, g, b = picture[y, x]
+            assert b > r + 25
+            assert b > g + 25
+        view.show(STATES[2])
+        view.ghosts(None)
+        view.wait()
+        check_tool(page, page.screenshot(), signal_arm, STATES[2])
+        assert page.evaluate("dhkit.stage.overlays.empty") is True
+        assert page.errors == []

@@ -50,6 +50,28 @@ def test_a_trace_comes_back(data, count):
     assert np.array_equal(protocol.decode_trace(protocol.encode_trace(points)), points)
 
 
+@given(st.data(), st.integers(0, 20))
+def test_points_come_back(data, count):
+    points, colors = drawn(data.draw, count, 3), data.draw(arrays(np.uint8, (count, 3)))
+    cloud = protocol.decode_points(protocol.encode_points(points, colors))
+    assert np.array_equal(cloud.points, points)
+    assert np.array_equal(cloud.colors, colors)
+
+
+@given(st.data(), st.integers(0, 5))
+def test_ellipsoids_come_back(data, count):
+    T = drawn(data.draw, count, 4, 4)
+    assert np.array_equal(protocol.decode_ellipsoids(protocol.encode_ellipsoids(T)), T[:, :3])
+
+
+@given(st.data(), joints, st.integers(0, 8))
+def test_ghosts_come_back(data, n, count):
+    T, tints = drawn(data.draw, count, n + 2, 4, 4), data.draw(arrays(np.uint8, (count, 3)))
+    ghosts = protocol.decode_ghosts(protocol.encode_ghosts(T, tints))
+    assert np.array_equal(ghosts.transforms, T[:, :, :3])
+    assert np.array_equal(ghosts.tints, tints)
+
+
 @pytest.mark.parametrize("name", ["planar2r", "puma560"])
 def test_a_scene_comes_back(name):
     arm = library_robot(name)

@@ -7,11 +7,19 @@ import time
 import numpy as np
 import pytest
 
-from dhkit.description import library_robot
+from dhkit.description import from_dh, library_robot
 from dhkit.errors import ModelError
+from dhkit.kinematics.manipulability import force_ellipsoid, velocity_ellipsoid
 from dhkit.viewer import View
-from dhkit.viewer.protocol import decode_animation, decode_pose, decode_trace
-from dhkit.viewer.scene import node_transforms
+from dhkit.viewer.protocol import (
+    decode_animation,
+    decode_ellipsoids,
+    decode_ghosts,
+    decode_points,
+    decode_pose,
+    decode_trace,
+)
+from dhkit.viewer.scene import node_transforms, scene_size
 from dhkit.viewer.session import Slot
 
 FLOAT32 = 1e-6
@@ -57,6 +65,66 @@ def test_a_trace_is_kept_and_taken_away():
         assert len(decode_trace(view._state[Slot.TRACE])) == 0
 
 
+def test_points_are_kept_with_their_colors_and_taken_away():
+    points, colors = np.random.default_rng(0).uniform(0, 1, (2, 50, 3))
+    with View(library_robot("planar2r")) as view:
+        view.points(points, colors)
+        cloud = decode_points(view._state[Slot.POINTS])
+        assert np.abs(cloud.points - points).max() < FLOAT32
+        assert np.abs(cloud.colors / 255 - colors).max() <= 0.5 / 255 + FLOAT32
+        view.points(points, (1, 0, 0))
+        assert np.array_equal(decode_points(view._state[Slot.POINTS]).colors, np.tile([255, 0, 0], (50, 1)))
+        view.points(None)
+        assert len(decode_points(view._state[Slot.POINTS]).points) == 0
+
+
+def test_an_ellipsoid_is_drawn_to_scale():
+    arm = library_robot("puma560")
+    q = np.random.default_rng(0).uniform(-1, 1, (3, arm.n))
+    q[1, 2] = np.nan
+    ellipsoid = velocity_ellipsoid(arm, q)
+    with View(arm) as view:
+        view.ellipsoid(ellipsoid, scale=0.5)
+        drawn = decode_ellipsoids(view._state[Slot.ELLIPSOIDS])
+        assert len(drawn) == 2  # without the NaN
+        expected = 0.5 * ellipsoid.axes[[0, 2]] * ellipsoid.lengths[[0, 2], None, :]
+        assert np.abs(drawn[:, :, :3] - expected).max() < FLOAT32
+        assert np.abs(drawn[:, :, 3] - ellipsoid.center[[0, 2]]).max() < FLOAT32
+        view.ellipsoid(ellipsoid)
+        drawn = decode_ellipsoids(view._state[Slot.ELLIPSOIDS])
+        longest = np.linalg.norm(drawn[:, :, :3], axis=1).max()
+        assert longest == pytest.approx(scene_size(arm) / 4, rel=1e-6)
+        view.ellipsoid(None)
+        assert len(decode_ellipsoids(view._state[Slot.ELLIPSOIDS])) == 0
+
+
+def test_a_flat_ellipsoid_is_drawn_thin_and_one_without_lengths_not_at_all():
+    arm = library_robot("planar2r")
+    with View(arm) as view:
+        view.ellipsoid(velocity_ellipsoid(arm, [0.3, 1.0]))
+        lengths = np.linalg.norm(decode_ellipsoids(view._state[Slot.ELLIPSOIDS])[0, :, :3], axis=0)
+        assert 0 < lengths[2] < 0.02 * lengths[0]
+    wrist = from_dh([(0, 0, 0, "pi/2"), (0, 0, 0, 0)])
+    with View(wrist) as view:
+        view.ellipsoid(velocity_ellipsoid(wrist, [0.3, 1.0]))
+        assert len(decode_ellipsoids(view._state[Slot.ELLIPSOIDS])) == 0
+
+
+def test_ghosts_stand_where_the_kinematics_say_each_in_a_tint_of_its_own():
+    arm = library_robot("puma560")
+    q = np.random.default_rng(0).uniform(-1, 1, (8, arm.n))
+    q[3] = np.nan
+    with View(arm) as view:
+        view.ghosts(q)
+        ghosts = decode_ghosts(view._state[Slot.GHOSTS])
+        shown = np.delete(q, 3, axis=0)
+        assert np.abs(ghosts.transforms - node_transforms(arm, shown)[:, :, :3]).max() < FLOAT32
+        assert len({tuple(tint) for tint in ghosts.tints.tolist()}) == 7
+        for nothing in (None, q[:0]):
+            view.ghosts(nothing)
+            assert len(decode_ghosts(view._state[Slot.GHOSTS]).transforms) == 0
+
+
 @pytest.mark.parametrize(
     ("call", "complaint"),
     [
@@ -67,6 +135,17 @@ def test_a_trace_is_kept_and_taken_away():
         (lambda v: v.play(([1, 0], np.zeros((2, 2)))), "times do not increase"),
         (lambda v: v.trace([[0, 0]]), r"points has shape \(1, 2\); expected \(N, 3\)"),
         (lambda v: v.trace([[0, 0, np.inf]]), "not finite"),
+        (lambda v: v.points([0, 0, 0]), r"positions has shape \(3,\); expected \(N, 3\)"),
+        (lambda v: v.points([[0, 0, np.nan]]), "positions has values that are not finite"),
+        (
+            lambda v: v.points(np.zeros((4, 3)), np.zeros((3, 3))),
+            r"colors has shape \(3, 3\); expected \(3,\) or \(4, 3\)",
+        ),
+        (lambda v: v.points([[0, 0, 0]], [[0, 0, 255]]), "colors has values that are not from 0 to 1"),
+        (lambda v: v.ghosts([0, 0]), r"q has shape \(2,\); expected \(k, 2\)"),
+        (lambda v: v.ghosts([[0, 0]], (0, 0, -1)), "tints has values"),
+        (lambda v: v.ellipsoid(force_ellipsoid(v.description, [0, 1])), "infinite in a direction"),
+        (lambda v: v.ellipsoid(velocity_ellipsoid(v.description, [0, 1]), scale=0), "scale is 0; expected a positive"),
     ],
 )
 def test_wrong_arrays_are_named(call, complaint):

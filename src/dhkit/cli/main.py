@@ -14,6 +14,7 @@ from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli import demo as demo_command
 from dhkit.cli import info as info_command
+from dhkit.cli import workspace as workspace_command
 from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError, DhkitError
 
@@ -133,6 +134,46 @@ def verify(
     else:
         say(str(report))
     return 0 if report.ok else 1
+
+
+@app.command()
+def workspace(
+    robot: Robot,
+    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many random states.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
+    json: Json = False,
+) -> None:
+    """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
+    workspace_command.run(Arm.load(robot), samples, seed, output, json=json)
+
+
+@app.command()
+def bench(
+    quantities: Annotated[list[str] | None, typer.Argument(help="Any of fk, ik, jacobian; all unless given.")] = None,
+    robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
+    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Items of a batch.")] = 100_000,
+    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that batch calls may use.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Interleaved rounds.")] = 9,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    probes: Annotated[bool, typer.Option(help="Measure threads, memory and new processes too.")] = True,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
+    json: Json = False,
+) -> int:
+    """Time our kinematics beside every installed peer: median, spread and ratios."""
+    from dhkit.cli import bench as bench_command
+
+    return bench_command.run(
+        Arm.load(robot),
+        quantities or ("fk", "ik", "jacobian"),
+        batch=batch,
+        threads=threads,
+        repeats=repeats,
+        seed=seed,
+        probes=probes,
+        output=output,
+        json=json,
+    )
 
 
 @app.command()

@@ -1,5 +1,6 @@
 """Where an arm is, how it moves, how it gets there: forward and inverse kinematics, Jacobians, workspace, in batches."""
 
+from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics
@@ -15,6 +16,7 @@ __all__ = [
     "IKStatus",
     "ReferenceAxes",
     "classify",
+    "export_kinematics",
     "follow_path",
     "forward_kinematics",
     "frames",

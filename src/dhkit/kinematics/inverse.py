@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,6 +17,7 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.closed_form.program import OUTPUT_TYPES, limit_parameters, program
 from dhkit.kinematics.solutions import IKSolutions
+from dhkit.symbolic import Graph
 
 __all__ = ["inverse_kinematics"]
 
@@ -52,24 +55,30 @@ def inverse_kinematics(
     """
     check_threads(threads)
     poses = pose_rows(T)
-    found = classify(description)
-    if found.family is None or found.fit is None:
-        raise ModelError(f"{description.name} is {found.words}; ik_numeric solves any arm")
-    family, fit = found.family, found.fit
-    numbers = description.numbers
-    prismatic = tuple(bool(x) for x in numbers.prismatic)
-    batch, count, B, n = poses.shape[:-2], poses.size // 16, len(fit.branches), description.n
+    solver = _solver(description)
+    fit = solver.fit
+    batch = poses.shape[:-2]
+    B, n = len(fit.branches), description.n
     q = result_array((*batch, B, n), out)
     distance = np.empty(batch)
-    valid, flags, status = (np.empty((*batch, *tail), dtype=np.uint8) for tail in ((B,), (B,), ()))
+    valid, flags = np.empty((2, *batch, B), dtype=np.uint8)
+    status = np.empty(batch, dtype=np.uint8)
+    count = poses.size // 16
     if count:
-        run = kernel(f"ik_{family.name}", fit.structure, lambda: program(family, fit, prismatic), OUTPUT_TYPES)
-        rows = [array.reshape(count, -1) for array in (q, distance, valid, flags, status)]
+        run = kernel(solver.name, fit.structure, solver.program, OUTPUT_TYPES)
         free = _free_angles(description, fit, seed, batch)
-        run(_parameters(description), [poses.reshape(count, 16), free.reshape(count, 1)], rows, threads)
+        rows = [
+            q.reshape(count, B * n),
+            distance.reshape(count, 1),
+            valid.reshape(count, B),
+            flags.reshape(count, B),
+            status.reshape(count, 1),
+        ]
+        run(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 1)], rows, threads)
+    numbers = description.numbers
     return IKSolutions(
         q=q,
-        valid=valid.view(bool),
+        valid=valid.view(np.bool_),
         flags=flags,
         status_code=status,
         distance=distance,
@@ -110,10 +119,27 @@ def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, bat
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
+@dataclass(frozen=True)
+class _Solver:
+    """An arm's closed form, made ready for its kernel."""
+
+    name: str
+    fit: Fit
+    parameters: Array
+    program: Callable[[], Graph]
+
+
 @lru_cache(maxsize=512)
-def _parameters(description: Description) -> Array:
-    fit = classify(description).fit
-    assert fit is not None
-    numbers = description.numbers
-    limits = limit_parameters(numbers.lower, numbers.upper, tuple(numbers.prismatic))
-    return np.concatenate([fit.vector(), limits])
+def _solver(description: Description) -> _Solver:
+    found = classify(description)
+    if found.family is None or found.fit is None:
+        raise ModelError(f"{description.name} is {found.words}; ik_numeric solves any arm")
+    family, fit, numbers = found.family, found.fit, description.numbers
+    prismatic = tuple(bool(slides) for slides in numbers.prismatic)
+    limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
+    return _Solver(
+        name=f"ik_{family.name}",
+        fit=fit,
+        parameters=np.concatenate([fit.vector(), limits]),
+        program=lambda: program(family, fit, prismatic),
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -145,7 +145,7 @@ class Graph:
 
         shapes = shapes or {}
         function = casadi.Function(
-            name,
+            "program",
             [casadi.vec(x.T) for x in map(casadi.SX, inputs.values())],
             [casadi.densify(casadi.vec(y.T)) for y in map(casadi.SX, outputs.values())],
         )
@@ -160,6 +160,10 @@ class Graph:
             nodes,
             results,
         )
+
+    def renamed(self, name: str) -> Graph:
+        """Return the same program under another name."""
+        return replace(self, name=name)
 
 
 class _Builder:
@@ -188,7 +192,7 @@ class _Builder:
             elif code in operations:
                 work[into[0]] = self.apply(operations[code], [work[source] for source in sources])
             else:
-                raise ValueError(f"{function.name()}: operation {code} of CasADi is not one of a straight-line program")
+                raise ValueError(f"operation {code} of CasADi is not one of a straight-line program")
         return outputs
 
     def apply(self, operation: str, arguments: Sequence[int]) -> int:

@@ -155,9 +155,9 @@ def _c_expression(graph: Graph, node: Node) -> str:
 
 
 def _c_signature(graph: Graph) -> str:
-    inputs = [f"const double *restrict {variable.name}" for variable in graph.inputs if variable.size]
-    outputs = [f"double *restrict {variable.name}" for variable in graph.outputs]
-    return f"void {graph.name}({', '.join([*inputs, *outputs])})".replace("restrict ", "")
+    inputs = [f"const double *{variable.name}" for variable in graph.inputs if variable.size]
+    outputs = [f"double *{variable.name}" for variable in graph.outputs]
+    return f"void {graph.name}({', '.join([*inputs, *outputs])})"
 
 
 def _c_comment(graph: Graph) -> str:

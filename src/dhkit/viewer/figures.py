@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot", "plot_arm", "plot_motion"]
+__all__ = ["frame_space", "plot", "plot_arm", "plot_motion", "skeleton", "space"]
 
 AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
 """x, y and z, as in the viewer."""
@@ -83,13 +83,13 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     if q.ndim != 1:
         raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
     figure = Figure(figsize=(6.4, 6.0), layout="constrained")
-    axes = _space(figure, 111)
+    axes = space(figure, 111)
     frames = world_to_frames(description, q)
     tool = world_to_tool(description, q)
-    line = _skeleton(description, frames, tool)
+    line = skeleton(description, frames, tool)
     _draw_links(axes, description, frames, line)
     _draw_triads(axes, description, np.concatenate([frames, tool[None]]))
-    _frame_space(axes, line, margin=1.4 * TRIAD * scene_size(description))
+    frame_space(axes, line, margin=1.4 * TRIAD * scene_size(description))
     axes.set_title(description.name, fontsize=13, fontweight="bold")
     return figure
 
@@ -125,7 +125,7 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
         _draw_curves(axes, description, times, q, chosen, unit)
         axes.set_ylabel(label)
     axes.set_xlabel("time [s]")
-    _draw_path(_space(figure, grid[:, 1]), description, q)
+    _draw_path(space(figure, grid[:, 1]), description, q)
     return figure
 
 
@@ -144,10 +144,10 @@ def _draw_path(axes: Any, description: Description, q: Array) -> None:
     lines = []
     for state, color, label in ((q[0], "#a9b1bf", "start"), (q[-1], LINK_COLOR, "end")):
         frames, tool = world_to_frames(description, state), world_to_tool(description, state)
-        lines.append(_skeleton(description, frames, tool))
+        lines.append(skeleton(description, frames, tool))
         axes.plot(*lines[-1].T, color=color, lw=2.5, solid_capstyle="round", solid_joinstyle="round", label=label)
     axes.plot(*path.T, color=PATH_COLOR, lw=1.8, label="tool")
-    _frame_space(axes, np.concatenate([*lines, path]), margin=0.04 * scene_size(description))
+    frame_space(axes, np.concatenate([*lines, path]), margin=0.04 * scene_size(description))
     axes.legend(loc="upper left", frameon=False, fontsize=9)
 
 
@@ -179,7 +179,7 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
     axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3, handlelength=1, columnspacing=1)
 
 
-def _skeleton(description: Description, frames: Array, tool: Array) -> Array:
+def skeleton(description: Description, frames: Array, tool: Array) -> Array:
     """Return the way from the base to the tool as a line, shape (k, 3): by d along z, by a along x of every row."""
     points = [frames[0, :3, 3]]
     for i in range(1, description.n + 1):
@@ -194,7 +194,8 @@ def _skeleton(description: Description, frames: Array, tool: Array) -> Array:
     return np.array([*points, tool[:3, 3]])
 
 
-def _space(figure: Figure, place: Any) -> Any:
+def space(figure: Figure, place: Any) -> Any:
+    """Return new axes of a figure for things in space."""
     axes: Any = figure.add_subplot(place, projection="3d", proj_type="persp", focal_length=0.6)
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
@@ -211,7 +212,7 @@ def _few_ticks() -> Any:
     return MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
 
 
-def _frame_space(axes: Any, points: Array, margin: float) -> None:
+def frame_space(axes: Any, points: Array, margin: float) -> None:
     """Set equal axes around points, shape (k, 3); look at what lies in a plane z = constant from above."""
     low, high = points.min(axis=0), points.max(axis=0)
     flat = high[2] - low[2] <= FLAT * max(float((high - low).max()), 1e-12)

@@ -20,6 +20,7 @@ MODULES = (
     "boxes.js",
     "player.js",
     "trace.js",
+    "overlays.js",
     "labels.js",
     "smooth.js",
     "quality.js",

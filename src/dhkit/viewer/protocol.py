@@ -7,7 +7,10 @@ of joints n (u16), sequence (u32), time (f64, s). What follows depends on the ty
 - pose: q (f32, n), transforms (f32, (n + 2) x 12);
 - animation: count N (u32), zero (u32), times (f64, N), q (f32, N x n), transforms (f32, N x (n + 2) x 12);
 - trace: points in the world (f32, N x 3);
-- frames: nothing; flag 1 shows them.
+- frames: nothing; flag 1 shows them;
+- points: count N (u32), then points in the world (f32, N x 3) and their colors (u8, N x 3);
+- ellipsoids: count k (u32), then transforms of the unit ball (f32, k x 12);
+- ghosts: count k (u32), then transforms (f32, k x (n + 2) x 12) and tints (u8, k x 3).
 
 A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Page to
 Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn.
@@ -23,6 +26,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description.numbers import Array
 
@@ -32,18 +36,26 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Animation",
+    "Cloud",
+    "Ghosts",
     "Header",
     "MessageType",
     "Pose",
     "ProtocolError",
     "decode_animation",
+    "decode_ellipsoids",
+    "decode_ghosts",
     "decode_header",
+    "decode_points",
     "decode_pose",
     "decode_scene",
     "decode_shown",
     "decode_trace",
     "encode_animation",
+    "encode_ellipsoids",
     "encode_frames",
+    "encode_ghosts",
+    "encode_points",
     "encode_pose",
     "encode_scene",
     "encode_trace",
@@ -68,6 +80,9 @@ class MessageType(IntEnum):
     ANIMATION = 3
     TRACE = 4
     FRAMES = 5
+    POINTS = 6
+    ELLIPSOIDS = 7
+    GHOSTS = 8
 
 
 @dataclass(frozen=True)
@@ -103,6 +118,26 @@ class Animation:
     """Shape (N, n + 2, 3, 4)."""
     trace: bool
     """Whether the tool's path is drawn as it plays."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Colored points."""
+
+    points: Array
+    """Shape (N, 3), m, in the world."""
+    colors: NDArray[np.uint8]
+    """Shape (N, 3): red, green and blue."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ghosts:
+    """Further states of the arm, shown beside the one that moves."""
+
+    transforms: Array
+    """Shape (k, n + 2, 3, 4): links and tool in the world."""
+    tints: NDArray[np.uint8]
+    """Shape (k, 3): red, green and blue."""
 
 
 def encode_scene(scene: Scene) -> bytes:
@@ -192,6 +227,50 @@ def decode_trace(message: bytes) -> Array:
     return _array(message[HEADER.size :], "<f4").reshape(-1, 3)
 
 
+def encode_points(points: Array, colors: NDArray[np.uint8]) -> bytes:
+    """Return a message of colored points, shapes (N, 3), m and red, green, blue; none take them away."""
+    return _header(MessageType.POINTS) + LENGTH.pack(len(points)) + _floats(points) + _bytes(colors)
+
+
+def decode_points(message: bytes) -> Cloud:
+    """Return the points in a message of them."""
+    _expect(message, MessageType.POINTS)
+    numbers, colors = _counted(message, 3)
+    return Cloud(numbers, colors)
+
+
+def encode_ellipsoids(transforms: Array) -> bytes:
+    """Return a message of ellipsoids: what maps the unit ball to each, shape (k, 4, 4); none take them away."""
+    return _header(MessageType.ELLIPSOIDS) + LENGTH.pack(len(transforms)) + _floats(transforms[:, :3, :])
+
+
+def decode_ellipsoids(message: bytes) -> Array:
+    """Return the transforms in a message of ellipsoids, shape (k, 3, 4)."""
+    _expect(message, MessageType.ELLIPSOIDS)
+    return _counted(message, 12)[0].reshape(-1, 3, 4)
+
+
+def encode_ghosts(transforms: Array, tints: NDArray[np.uint8]) -> bytes:
+    """Return a message of further states of the arm.
+
+    Parameters
+    ----------
+    transforms
+        Shape (k, n + 2, 4, 4): links and tool in the world; none take the ghosts away.
+    tints
+        Shape (k, 3): red, green and blue.
+    """
+    header = _header(MessageType.GHOSTS, joints=transforms.shape[1] - 2)
+    return header + LENGTH.pack(len(transforms)) + _floats(transforms[:, :, :3, :]) + _bytes(tints)
+
+
+def decode_ghosts(message: bytes) -> Ghosts:
+    """Return the states in a message of ghosts."""
+    nodes = _expect(message, MessageType.GHOSTS).joints + 2
+    transforms, tints = _counted(message, 12 * nodes)
+    return Ghosts(transforms.reshape(-1, nodes, 3, 4), tints)
+
+
 def encode_frames(visible: bool) -> bytes:
     """Return a message that shows or hides the triads with their labels."""
     return _header(MessageType.FRAMES, flags=FLAG * visible)
@@ -255,6 +334,19 @@ def _floats(array: Array) -> bytes:
 
 def _array(content: bytes, kind: str) -> Array:
     return np.frombuffer(content, dtype=kind).astype(float)
+
+
+def _bytes(colors: NDArray[np.uint8]) -> bytes:
+    return colors.astype(np.uint8).tobytes()
+
+
+def _counted(message: bytes, width: int) -> tuple[Array, NDArray[np.uint8]]:
+    """Return a message's floats, so many for each of what it counts, and its colors, shapes (k, width) and (., 3)."""
+    (count,) = LENGTH.unpack_from(message, HEADER.size)
+    start = HEADER.size + LENGTH.size
+    end = start + 4 * width * count
+    colors = np.frombuffer(message[end:], dtype=np.uint8).reshape(-1, 3)
+    return _array(message[start:end], "<f4").reshape(count, width), colors
 
 
 def _blocks(body: bytes) -> Iterable[bytes]:

@@ -17,7 +17,10 @@ class Slot(IntEnum):
     SCENE = 0
     FRAMES = 1
     TRACE = 2
-    MOTION = 3
+    POINTS = 3
+    ELLIPSOIDS = 4
+    GHOSTS = 5
+    MOTION = 6
     """A pose or an animation."""
 
 

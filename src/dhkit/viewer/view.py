@@ -17,18 +17,22 @@ from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
 from dhkit.viewer.motion import check_motion, sampled
+from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints
 from dhkit.viewer.page import offline_page
-from dhkit.viewer.scene import build_scene, first_configuration, node_transforms
+from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
 from dhkit.viewer.session import Slot
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.viewer.server import ViewerServer
 
 __all__ = ["View"]
 
 IFRAME_HEIGHT = 480
+ELLIPSOID = 0.25
+"""What an ellipsoid's longest half axis is drawn as, of the arm's size."""
 
 
 class View:
@@ -150,6 +154,73 @@ class View:
         if not np.isfinite(line).all():
             raise ValueError("points has values that are not finite")
         self._publish(Slot.TRACE, protocol.encode_trace(line))
+
+    def points(self, positions: ArrayLike | None, colors: ArrayLike | None = None) -> None:
+        """Draw a cloud of points, in place of the last; None takes it away.
+
+        Parameters
+        ----------
+        positions
+            Shape (N, 3), m, in the world. Some ten thousand are drawn at a good rate.
+        colors
+            Red, green and blue from 0 to 1, shape (N, 3) or (3,) for all; grey if not given.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or colors below 0 or above 1.
+        """
+        cloud = np.zeros((0, 3)) if positions is None else np.asarray(positions, dtype=float)
+        if cloud.ndim != 2 or cloud.shape[1] != 3:
+            raise ValueError(f"positions has shape {cloud.shape}; expected (N, 3)")
+        if not np.isfinite(cloud).all():
+            raise ValueError("positions has values that are not finite")
+        self._publish(Slot.POINTS, protocol.encode_points(cloud, color_bytes(colors, len(cloud))))
+
+    def ellipsoid(self, ellipsoid: Ellipsoid | None, scale: float | None = None) -> None:
+        """Draw an ellipsoid or a batch of them, in place of the last; None takes them away.
+
+        Parameters
+        ----------
+        ellipsoid
+            As :func:`dhkit.kinematics.manipulability.velocity_ellipsoid` gives it; what is NaN is left out.
+        scale
+            What a half axis of length 1 is drawn as, m; by default such that the longest is a quarter of the
+            arm's size.
+
+        Raises
+        ------
+        ValueError
+            An infinite half axis, or a scale that is not positive.
+        """
+        none = np.zeros((0, 4, 4))
+        longest = ELLIPSOID * scene_size(self._description)
+        transforms = none if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
+        self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
+
+    def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None) -> None:
+        """Draw translucent copies of the arm in further states, in place of the last; None takes them away.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (k, n), rad and m; rows with NaN are left out, so that the branches of an inverse
+            kinematics solution can be given as they are.
+        tints
+            Red, green and blue from 0 to 1, shape (k, 3) or (3,) for all; each its own if not given.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, or colors below 0 or above 1.
+        """
+        states = np.zeros((0, self._description.n)) if q is None else joint_array(self._description, q)
+        if states.ndim != 2:
+            raise ValueError(f"q has shape {states.shape}; expected (k, {self._description.n})")
+        colors = ghost_tints(len(states)) if tints is None else color_bytes(tints, len(states), "tints")
+        shown = np.isfinite(states).all(axis=1)
+        transforms = node_transforms(self._description, states[shown])
+        self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
 
     def frames(self, visible: bool) -> None:
         """Show or hide the DH frames."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any
 
@@ -11,11 +11,11 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.closed_form.family import Family, Fit, PoseSymbols
-from dhkit.kinematics.closed_form.formulas import Branch, where
+from dhkit.kinematics.closed_form.formulas import SX, Branch, where
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKStatus
 from dhkit.symbolic import Graph
 
-__all__ = ["OUTPUT_TYPES", "limit_parameters", "program"]
+__all__ = ["OUTPUT_TYPES", "arm_program", "limit_parameters", "program"]
 
 ORTHONORMAL = 1e-6
 """By how much a rotation's columns may miss being orthonormal, as for every pose that dhkit takes."""
@@ -44,8 +44,23 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     Its parameters are ``fit.vector()`` and then :func:`limit_parameters`.
     """
     named, symbols = fit.symbols()
-    n = len(prismatic)
-    limits = ca.SX.sym("limits", 2 * n)
+    limits = ca.SX.sym("limits", 2 * len(prismatic))
+    return _graph(family, fit, prismatic, named, limits, {"parameters": ca.vertcat(symbols, limits)})
+
+
+def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
+    """Return the same program with one arm's numbers in place of the parameters."""
+    return _graph(family, fit, prismatic, fit.values(), ca.SX(limits), {})
+
+
+def _graph(
+    family: Family,
+    fit: Fit,
+    prismatic: Sequence[bool],
+    named: Mapping[str, SX],
+    limits: ca.SX,
+    parameters: Mapping[str, ca.SX],
+) -> Graph:
     T = ca.SX.sym("T", 4, 4)
     free = ca.SX.sym("free")
     is_pose = _is_pose(T)
@@ -62,16 +77,15 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     miss = reduce(ca.fmin, (branch.miss for branch in branches))
     reached = where(special, float(IKStatus.singular), float(IKStatus.ok))
     found = where(some, reached, float(IKStatus.out_of_reach))
-    status = where(is_pose, found, float(IKStatus.not_a_pose))
     return Graph.of(
-        f"ik_{family.name}",
-        {"parameters": ca.vertcat(symbols, limits), "T": T, "free": free},
+        "inverse_kinematics",
+        {**parameters, "T": T, "free": free},
         {
             "q": ca.vertcat(*(ca.horzcat(*row) for row in q)),
             "distance": where(is_pose, where(some, 0.0, miss), np.nan),
             "valid": ca.vertcat(*(where(ok, 1.0, 0.0) for ok in valid)),
             "flags": ca.vertcat(*flags),
-            "status": status,
+            "status": where(is_pose, found, float(IKStatus.not_a_pose)),
         },
     )
 

@@ -1,7 +1,7 @@
 // The viewer's page, live and offline: messages from Python move the scene, the person moves the rest.
 
 import { Connection } from "./connection.js";
-import { ANIMATION, FRAMES, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
+import { ANIMATION, ELLIPSOIDS, FRAMES, GHOSTS, POINTS, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
 import { Player } from "./player.js";
 import { Readout } from "./readout.js";
 import { Stage, THREE } from "./stage.js";
@@ -28,6 +28,9 @@ class Page {
       [ANIMATION]: () => this.takeAnimation(message),
       [TRACE]: () => this.stage.setTrace(this.stage.given, message.points),
       [FRAMES]: () => this.showFrames(message.flag),
+      [POINTS]: () => this.takeOverlay(() => this.stage.setPoints(message)),
+      [ELLIPSOIDS]: () => this.takeOverlay(() => this.stage.setEllipsoids(message)),
+      [GHOSTS]: () => this.takeOverlay(() => this.stage.setGhosts(message)),
     };
     take[message.type]();
     this.drawn.push(message.sequence);
@@ -67,6 +70,11 @@ class Page {
     this.player.load(motion.times[motion.times.length - 1]);
   }
 
+  takeOverlay(draw) {
+    draw();
+    element("overlays").hidden = this.stage.overlays.empty;
+  }
+
   // Samples are at equal steps: dhkit/viewer/motion.py.
   showTime(time) {
     const { times, q, joints, nodes, positions, quaternions } = this.motion;
@@ -96,6 +104,11 @@ class Page {
     this.stage.showTraces(visible);
   }
 
+  showOverlays(visible) {
+    element("overlays").setAttribute("aria-pressed", String(visible));
+    this.stage.showOverlays(visible);
+  }
+
   tick(now) {
     requestAnimationFrame((next) => this.tick(next));
     this.player.tick(now);
@@ -111,15 +124,18 @@ class Page {
     const flip = (id) => element(id).getAttribute("aria-pressed") !== "true";
     const frames = () => this.showFrames(flip("frames"));
     const trace = () => this.showTraces(flip("trace"));
+    const overlays = () => this.showOverlays(flip("overlays"));
     const reset = () => this.stage.resetCamera();
     element("frames").addEventListener("click", frames);
     element("trace").addEventListener("click", trace);
+    element("overlays").addEventListener("click", overlays);
     element("reset").addEventListener("click", reset);
     element("readout").addEventListener("toggle", () => this.stage.refit());
     const { player } = this;
     const keys = {
       f: frames,
       t: trace,
+      o: () => !element("overlays").hidden && overlays(),
       r: reset,
       l: () => player.active && player.repeat(!player.loop),
       " ": () => player.active && player.toggle(),

@@ -1,8 +1,9 @@
 // Messages from Python: the layout is described in dhkit/viewer/protocol.py.
 
 export const SCENE = 1, POSE = 2, ANIMATION = 3, TRACE = 4, FRAMES = 5;
+export const POINTS = 6, ELLIPSOIDS = 7, GHOSTS = 8;
 const HEADER = 16, FLAG = 1;
-const PER_TRANSFORM = 12;
+export const PER_TRANSFORM = 12;
 
 export function decode(buffer) {
   const view = new DataView(buffer);
@@ -45,7 +46,23 @@ const BODIES = {
   },
   [TRACE]: (buffer) => ({ points: new Float32Array(buffer, HEADER) }),
   [FRAMES]: () => ({}),
+  [POINTS]: (buffer, view) => {
+    const { floats, bytes } = counted(buffer, view, 3);
+    return { points: floats, colors: bytes };
+  },
+  [ELLIPSOIDS]: (buffer, view) => ({ transforms: counted(buffer, view, PER_TRANSFORM).floats }),
+  [GHOSTS]: (buffer, view, { joints }) => {
+    const { floats, bytes } = counted(buffer, view, (joints + 2) * PER_TRANSFORM);
+    return { transforms: floats, tints: bytes };
+  },
 };
+
+// So many floats for each of what a message counts, and the bytes behind them.
+function counted(buffer, view, width) {
+  const count = view.getUint32(HEADER, true), start = HEADER + 4;
+  const floats = new Float32Array(buffer, start, count * width);
+  return { floats, bytes: new Uint8Array(buffer, start + floats.byteLength) };
+}
 
 // Positions (3 a node) and unit quaternions (x y z w, 4 a node) of transforms given as rows of 3 x 4 matrices.
 export function placements(transforms, THREE) {

@@ -2,6 +2,7 @@
 
 import { corners, inView, localBox } from "./boxes.js";
 import { Labels } from "./labels.js";
+import { Overlays } from "./overlays.js";
 import { Quality } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
 import { Trace } from "./trace.js";
@@ -11,6 +12,7 @@ const FIELD = 34; // degrees of view, vertically
 const MARGIN = 1.07; // around the arm
 const SAMPLES = 60; // states of an animation that the camera must take in
 const TRACE_RADIUS = 0.0035; // share of the arm's size
+const POINT = 0.008; // diameter of a point, share of the arm's size
 const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/scene.py
 
 export class Stage {
@@ -32,6 +34,7 @@ export class Stage {
     this.plain = false;
     this.given = new Trace(this.viewer.scene, THREE);
     this.drawn = new Trace(this.viewer.scene, THREE);
+    this.overlays = new Overlays(this.viewer.scene, THREE);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.color());
     this.color();
@@ -83,6 +86,7 @@ export class Stage {
     this.sky.groundColor.set(dark ? 0x6a7080 : 0xb4b8c4);
     this.floor.material.opacity = dark ? 0.35 : 0.13;
     for (const trace of [this.given, this.drawn]) trace.color(value("--accent"));
+    this.overlays.color(value("--accent"));
     this.dirty();
   }
 
@@ -168,6 +172,7 @@ export class Stage {
     const stride = Math.max(1, Math.floor(count / SAMPLES));
     for (let k = 0; k < count; k += stride) this.seen.union(this.boxAt(positions, quaternions, k));
     this.seen.union(this.boxAt(positions, quaternions, count - 1));
+    this.overlays.growBox(this.seen);
     if (this.touched || this.framed.containsBox(this.seen)) return;
     this.frame(this.seen);
   }
@@ -264,6 +269,33 @@ export class Stage {
 
   setTrace(trace, points) {
     trace.set(points, TRACE_RADIUS * this.size);
+    this.dirty();
+  }
+
+  setPoints(message) {
+    this.overlays.setPoints(message, POINT * this.size, FIELD);
+    this.overlaid();
+  }
+
+  setEllipsoids(message) {
+    this.overlays.setEllipsoids(message);
+    this.overlaid();
+  }
+
+  setGhosts(message) {
+    const { nodes } = this;
+    this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state) });
+    this.overlaid();
+  }
+
+  showOverlays(visible) {
+    this.overlays.show(visible);
+    this.overlaid();
+  }
+
+  // What is drawn beside the arm is in view too.
+  overlaid() {
+    if (!this.touched) this.reframe();
     this.dirty();
   }
 

@@ -1,0 +1,163 @@
+"""`dhkit workspace`: where an arm's tool can be, in numbers, as a figure and as a page."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.arm import Arm
+from dhkit.cli.output import print_json, print_table, say
+from dhkit.description import write_atomically
+from dhkit.errors import DescriptionError
+from dhkit.kinematics.manipulability import velocity_ellipsoid
+from dhkit.kinematics.workspace import Workspace
+from dhkit.kinematics.workspace import workspace as sample
+
+__all__ = ["run"]
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+SHOWN = 12_000
+"""Points on the page: more are slow without a graphics card."""
+PATIENCE = 1.0
+"""s: work that takes longer shows how far it is."""
+
+
+def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -> None:
+    """Sample an arm's workspace, print its figures, and write a picture and a page into a folder."""
+    folder = output or Path("out") / arm.name
+    if folder.exists() and not folder.is_dir():
+        raise DescriptionError(f"{folder}: not a folder")
+    with _Bar("sampling") as bar:
+        space = sample(arm.description, samples, seed, progress=bar)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [_figure(space, folder / "workspace.png"), _page(arm, space, folder / "workspace.html")]
+    if json:
+        print_json(_facts(arm, space) | {"files": [str(file) for file in files]})
+        return
+    _print(arm, space)
+    say("\n" + "\n".join(f"wrote {file}" for file in files))
+
+
+class _Bar:
+    """A progress bar on stderr that appears when work takes long and someone is looking."""
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._start = time.monotonic()
+        self._bar: Any = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self._bar is None and sys.stderr.isatty() and time.monotonic() - self._start > PATIENCE:
+            self._open(total)
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done)
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _open(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        self._bar = Progress(console=Console(stderr=True), transient=True)
+        self._task = self._bar.add_task(self._title, total=total)
+        self._bar.start()
+
+
+def _print(arm: Arm, space: Workspace) -> None:
+    say(f"{arm.name}: what {space.samples} random states reach", "bold")
+    for note in space.assumed:
+        say(f"assumed: {note}", "yellow")
+    rows = [("distance from frame 0 [m]", *space.distances), ("distance from axis 1 [m]", *space.radii)]
+    rows += [(f"{axis} [m]", *span) for axis, span in zip("xyz", space.bounds.T.tolist(), strict=True)]
+    say("")
+    print_table(
+        ("tool", "least", "most"), [(name, f"{low + 0.0:.4f}", f"{high + 0.0:.4f}") for name, low, high in rows]
+    )
+    say(f"\n{_size(space)}")
+    shares = ", ".join(f"{w:.4g} ({100 * q:.0f} %)" for q, w in zip(QUANTILES, _quantiles(space), strict=True))
+    say(f"manipulability (translational, SI): {shares}")
+    q = ", ".join(_value(arm, i, x) for i, x in enumerate(space.best))
+    place = ", ".join(f"{x + 0.0:.4f}" for x in arm.fk(space.best)[:3, 3])
+    say(f"best {space.manipulability.max():.4g} with the tool at ({place}) m, joints ({q})")
+
+
+def _size(space: Workspace) -> str:
+    if space.estimate is None or space.grid is None:
+        kept = "one point" if space.grid is None else ("one point", "a curve", "a curved surface")[space.freedoms]
+        return f"the tool keeps to {kept}, which has no volume"
+    kind = ("length", "area", "volume")[space.estimate.dimension - 1]
+    return f"{kind} reached: about {space.estimate}, an estimate by cells of {space.grid.edge:.3g} m"
+
+
+def _quantiles(space: Workspace) -> list[float]:
+    return [float(w) for w in np.quantile(space.manipulability, QUANTILES)]
+
+
+def _value(arm: Arm, i: int, x: float) -> str:
+    return f"{x:.4g} m" if arm.description.numbers.prismatic[i] else f"{np.degrees(x):.4g}°"
+
+
+def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
+    estimate = space.estimate
+    return {
+        "robot": arm.name,
+        "samples": space.samples,
+        "seed": space.seed,
+        "assumed": list(space.assumed),
+        "reach": arm.description.reach,
+        "distances": list(space.distances),
+        "radii": list(space.radii),
+        "bounds": space.bounds.tolist(),
+        "freedoms": space.freedoms,
+        "estimate": None if estimate is None else vars(estimate) | {"edge": space.grid and space.grid.edge},
+        "manipulability": {f"{q:.0%}": w for q, w in zip(QUANTILES, _quantiles(space), strict=True)},
+        "best": {
+            "manipulability": float(space.manipulability.max()),
+            "q": space.best.tolist(),
+            "position": arm.fk(space.best)[:3, 3].tolist(),
+        },
+    }
+
+
+def _figure(space: Workspace, path: Path) -> Path:
+    from dhkit.viewer import plot
+
+    buffer = io.BytesIO()
+    plot(space).savefig(buffer, format="png", dpi=120)
+    write_atomically(path, buffer.getvalue())
+    return path
+
+
+def _page(arm: Arm, space: Workspace, path: Path) -> Path:
+    """Write a page with the arm as it is first shown, its ellipsoid there, and the points that it reaches."""
+    from dhkit.viewer import heat_colors
+    from dhkit.viewer.scene import first_configuration
+
+    shown = _cut_open(space)
+    with arm.view() as view:
+        view.points(space.positions[shown], heat_colors(space.manipulability[shown]))
+        view.ellipsoid(velocity_ellipsoid(arm.description, first_configuration(arm.description)))
+        view.save_html(path)
+    return path
+
+
+def _cut_open(space: Workspace) -> NDArray[np.intp]:
+    """Return which points to show: behind the arm, where y is above frame 0's, so that what is inside is seen."""
+    behind = np.flatnonzero(space.positions[:, 1] >= space.description.numbers.T_world_base[1, 3])
+    if space.grid is None or len(space.grid.axes) < 3 or len(behind) < space.samples / 10:
+        return np.arange(min(SHOWN, space.samples), dtype=np.intp)
+    return behind[:SHOWN]

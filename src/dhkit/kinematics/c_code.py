@@ -1,0 +1,58 @@
+"""An arm's kinematics as C99 source, for machines without Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dhkit.description import Description
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.program import arm_program, limit_parameters
+from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
+
+__all__ = ["export_kinematics"]
+
+
+def export_kinematics(description: Description, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
+    """Write forward kinematics, Jacobian and, where it has a closed form, inverse kinematics as ``NAME.c`` and ``.h``.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    folder
+        An existing folder.
+    name
+        The files' name, an identifier of C; the robot's by default. Functions begin with it.
+
+    Returns
+    -------
+    tuple[Path, Path]
+        Source and header: self-contained C99; link with ``-lm``. Functions take and fill arrays of doubles, row by row,
+        SI and radians; the header says of what shape. ``free`` is the angle of the joint that is free at a wrist
+        singularity; branches are in the order of ``Arm.ik``'s.
+
+    Raises
+    ------
+    ValueError
+        ``name`` is no identifier.
+    """
+    name = description.name if name is None else name
+    graphs = [_forward(description, name), _jacobian(description, name)]
+    found = classify(description)
+    remark = f"{description.name}: {found.words}. Written by dhkit."
+    if found.family is not None and found.fit is not None:
+        numbers = description.numbers
+        prismatic = tuple(bool(slides) for slides in numbers.prismatic)
+        limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
+        graphs.append(arm_program(found.family, found.fit, prismatic, limits).renamed(f"{name}_inverse_kinematics"))
+    return export_c(graphs, folder, name, remark)
+
+
+def _forward(description: Description, name: str) -> Graph:
+    q = joint_symbols("q", description.n)
+    return Graph.of(f"{name}_forward_kinematics", {"q": q}, {"T": SymbolicTable.of(description).world_to_tool(q)})
+
+
+def _jacobian(description: Description, name: str) -> Graph:
+    q = joint_symbols("q", description.n)
+    return Graph.of(f"{name}_jacobian", {"q": q}, {"J": jacobian(SymbolicTable.of(description), q)})

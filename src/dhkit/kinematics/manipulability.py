@@ -1,0 +1,232 @@
+"""How well an arm can move its tool from where it stands: manipulability, isotropy and their ellipsoids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.kinematics.forward import forward_kinematics
+from dhkit.kinematics.jacobian import jacobian
+
+__all__ = [
+    "Ellipsoid",
+    "Motion",
+    "condition_number",
+    "force_ellipsoid",
+    "freedoms",
+    "isotropy",
+    "manipulability",
+    "singular_values",
+    "velocity_ellipsoid",
+]
+
+Motion: TypeAlias = Literal["translational", "rotational", "whole"]
+"""Which of the tool's motions: its origin's velocity, its angular velocity, or both (in m and rad, unweighted)."""
+
+ROWS = {"translational": slice(0, 3), "rotational": slice(3, 6), "whole": slice(0, 6)}
+ZERO = 1e-9
+"""A singular value below this share of the largest is none: far above rounding, far below any drawn arm's."""
+PROBES = 4
+"""Random configurations that tell the generic rank; one has it with probability 1."""
+FLATTEST = 6 * np.finfo(float).eps
+"""An ellipsoid whose shortest axis is at most this share of its longest is flat: that is the rounding of an SVD."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """Ellipsoids in the world, one or a batch; NaN where the configuration was.
+
+    A point of the surface is center + axes @ (lengths * u) with a unit vector u.
+    """
+
+    center: Array
+    """The tool's origin, shape (..., 3), m."""
+    axes: Array
+    """Directions of the half axes in columns, the longest first, right-handed, shape (..., 3, 3)."""
+    lengths: Array
+    """Their lengths, shape (..., 3): (m/s or rad/s) per unit of joint rates, or (N or N m) per unit of joint torques;
+    0 or infinite in a direction that the tool cannot move in."""
+
+
+def manipulability(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+    """Return Yoshikawa's manipulability: the volume, up to a constant, of what joint rates of unit norm can do.
+
+    That is sqrt(det(J J^T)) (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 9). An arm that can never
+    move its tool in all directions is measured in those that it has: the product of the :func:`freedoms` largest
+    singular values, so that a planar arm with links l1 and l2 has l1 l2 abs(sin q2).
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        Which rows of the Jacobian. ``"whole"`` mixes m and rad: its values depend on the unit of length.
+
+    Returns
+    -------
+    Array
+        Shape (...), m/rad and m/m (rad/rad) to the power of the freedoms; 0 where singular, NaN where q is.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n); another motion.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> round(float(manipulability(library_robot("planar2r"), [0.2, 3.14159265 / 2])), 6)  # 0.5 m and 0.4 m long
+    0.2
+    """
+    rank = freedoms(description, motion)
+    if motion == "whole":
+        sigma = singular_values(description, q, motion)
+        return np.asarray(np.prod(sigma[..., :rank], axis=-1)) if rank else 0.0 * sigma[..., 0]
+    return _volume(_rows(description, q, motion), rank)
+
+
+def isotropy(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+    """Return the reciprocal of the condition number: 1 where all directions are alike, 0 where singular.
+
+    Arguments are those of :func:`manipulability`. The smallest singular value that counts is that of the arm's
+    :func:`freedoms` (Salisbury and Craig, Articulated Hands, 1982); an arm with none has 0.
+
+    Returns
+    -------
+    Array
+        Shape (...), from 0 to 1; NaN where q is.
+    """
+    rank = freedoms(description, motion)
+    sigma = singular_values(description, q, motion)
+    if not rank:
+        return 0.0 * sigma[..., 0]
+    largest, smallest = sigma[..., 0], sigma[..., rank - 1]
+    flat = smallest <= FLATTEST * largest
+    return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
+
+
+def condition_number(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+    """Return the ratio of the largest to the smallest singular value, infinite where singular; see :func:`isotropy`."""
+    with np.errstate(divide="ignore"):
+        return 1.0 / isotropy(description, q, motion)
+
+
+def singular_values(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+    """Return the Jacobian's singular values, the largest first.
+
+    Arguments are those of :func:`manipulability`.
+
+    Returns
+    -------
+    Array
+        Shape (..., min(n, 3)), or (..., min(n, 6)) for the whole motion; NaN where q is.
+    """
+    J, missing = _known(_rows(description, q, motion))
+    sigma = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=float)
+    sigma[missing] = np.nan
+    return sigma
+
+
+def freedoms(description: Description, motion: Motion = "translational") -> int:
+    """Return in how many independent directions the tool can move in general: the generic rank of the Jacobian.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> freedoms(library_robot("planar3r")), freedoms(library_robot("planar3r"), "whole")
+    (2, 3)
+    """
+    q = np.random.default_rng(0).uniform(0.3, 1.2, (PROBES, description.n))
+    sigma = singular_values(description, q, motion)
+    return int(np.sum(sigma > ZERO * sigma.max(initial=0.0), axis=-1).max())
+
+
+def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
+    """Return the tool's velocities for joint rates of unit norm: the ellipsoid v^T (J J^T)^-1 v = 1.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        ``"translational"`` or ``"rotational"``.
+
+    Returns
+    -------
+    Ellipsoid
+        Of shape (...), in world axes, m/s or rad/s.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n); another motion.
+    """
+    if motion not in ("translational", "rotational"):
+        raise ValueError(f"motion is {motion!r}; expected 'translational' or 'rotational'")
+    J, missing = _known(_rows(description, q, motion))
+    U, sigma, _ = np.linalg.svd(J)
+    U[..., 2] *= np.linalg.det(U)[..., None]  # right-handed
+    lengths = np.zeros((*U.shape[:-2], 3))
+    lengths[..., : sigma.shape[-1]] = np.where(sigma <= FLATTEST * sigma[..., :1], 0.0, sigma)
+    for array in (U, lengths):
+        array[missing] = np.nan
+    return Ellipsoid(forward_kinematics(description, q)[..., :3, 3], U, lengths)
+
+
+def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
+    """Return the tool's forces (moments) for joint torques of unit norm: the ellipsoid f^T J J^T f = 1.
+
+    It has the axes of the :func:`velocity_ellipsoid` and reciprocal lengths: where the tool moves fast it holds
+    little (Yoshikawa 1985, section 6). A direction without motion is held by the structure: its length is infinite.
+    Arguments are those of :func:`velocity_ellipsoid`.
+    """
+    velocity = velocity_ellipsoid(description, q, motion)
+    with np.errstate(divide="ignore"):
+        lengths = 1.0 / velocity.lengths[..., ::-1]
+    axes = velocity.axes[..., ::-1] * (1.0, -1.0, 1.0)  # the order turned about: one axis too, to stay right-handed
+    return Ellipsoid(velocity.center, axes, lengths)
+
+
+def _rows(description: Description, q: ArrayLike, motion: Motion) -> Array:
+    if motion not in ROWS:
+        raise ValueError(f"motion is {motion!r}; expected {', '.join(map(repr, ROWS))}")
+    return jacobian(description, joint_array(description, q))[..., ROWS[motion], :]
+
+
+def _known(J: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return matrices (..., m, n) with zeros for those that have NaN, which LAPACK refuses, and which these are."""
+    missing = np.asarray(np.isnan(J).any(axis=(-2, -1)))
+    return np.where(missing[..., None, None], 0.0, J), missing
+
+
+def _volume(J: Array, rank: int) -> Array:
+    """Return the product of the first so many singular values of matrices (..., 3, n) that have no more.
+
+    Its square is the sum of the squares of all minors of that size (Cauchy and Binet), which, unlike det(J J^T),
+    loses no digits near singularities.
+    """
+    columns = np.ascontiguousarray(np.moveaxis(J, -1, 0))  # (n, ..., 3)
+    n = len(columns)
+    if rank == 0:
+        return 0.0 * J[..., 0, 0]
+    if rank == 1:
+        return np.asarray(np.linalg.norm(J, axis=(-2, -1)))
+    squares = np.zeros(J.shape[:-2])
+    for i, j in combinations(range(n), 2):
+        normal = np.cross(columns[i], columns[j])
+        if rank == 2:
+            squares += np.sum(normal**2, axis=-1)
+            continue
+        for k in range(j + 1, n):
+            squares += np.sum(normal * columns[k], axis=-1) ** 2
+    volume: Array = np.sqrt(squares)
+    return volume

@@ -1,0 +1,259 @@
+"""Figures of where a tool can be and how well it moves: workspaces in two views, manipulability ellipsoids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array, world_to_frames, world_to_tool
+from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
+from dhkit.kinematics.workspace import Workspace, first_axis
+from dhkit.viewer.figures import GRID_COLOR, LINK_COLOR, frame_space, plot, skeleton, space
+from dhkit.viewer.scene import first_configuration, scene_size
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_ellipsoid", "plot_workspace"]
+
+COLORS = "viridis"
+BEST_COLOR, ELLIPSOID_COLOR = "#e5484d", "#d9480f"
+FINEST = 160
+"""Pixels along a view's longer side at most."""
+PER_PIXEL = 12
+"""Samples for each pixel of the box around them: with few, the largest of their values is noise."""
+BESIDE = 2
+"""Pixels that are left free at a view's edges; one fewer is smoothed over to each side."""
+BESIDE_TICKS = 0.8
+"""Room for a view's numbers and label, inches."""
+LARGEST = (9.5, 5.0)
+"""Width and height of a figure's views together, inches."""
+PIECES = 24
+"""Pieces of a link: straight in space, it is curved in a section about an axis."""
+ROOM = 0.04
+"""Left free around what is drawn, as a share of its size."""
+DRAWN = 0.3
+"""What the longest half axis of an ellipsoid is drawn as, of the arm's size."""
+MESH = 33
+"""Lines of an ellipsoid's mesh each way."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """A flat view of points in space."""
+
+    title: str
+    labels: tuple[str, str]
+    flatten: Any
+    """Takes points (..., 3) in the world and returns them in the view, (..., 2), m."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Reach:
+    """What is reached in a flat view, in pixels."""
+
+    plane: _Plane
+    corner: Array
+    """Of pixel (0, 0), shape (2,), m."""
+    edge: float
+    """Of a pixel, m."""
+    best: Array
+    """The best manipulability in each pixel, NaN where none was reached, shape (nx, ny)."""
+
+    def shape(self, line: Array) -> tuple[float, float]:
+        """Return the width and height of the view with a line of the world in it, m."""
+        points = self.plane.flatten(line)
+        ends = np.stack([self.corner, self.corner + self.edge * np.array(self.best.shape)])
+        width, height = np.ptp(np.concatenate([points, ends]), axis=0)
+        return float(width), float(height)
+
+    def draw(self, axes: Axes, most: float) -> Any:
+        """Draw the pixels and the border of what is reached; return the image."""
+        x, y = (self.corner[k] + self.edge * np.arange(self.best.shape[k] + 1) for k in range(2))
+        pixels = np.ma.masked_invalid(self.best).T
+        image = axes.pcolormesh(x, y, pixels, cmap=COLORS, vmin=0, vmax=most or 1.0, rasterized=True)
+        centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
+        reached = np.isfinite(self.best).astype(float).T
+        axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
+        axes.set(xlabel=self.plane.labels[0], ylabel=self.plane.labels[1], aspect="equal")
+        axes.set_title(self.plane.title, fontsize=10)
+        axes.grid(color=GRID_COLOR, lw=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        return image
+
+
+def plot_workspace(workspace: Workspace) -> Figure:
+    """Return what an arm reaches, colored by the best manipulability found there, with the arm in it.
+
+    An arm in space is seen from the side, as distance from the first joint's axis and height along it, and along
+    that axis; one with a sliding first joint along y and z. A tool that keeps to a plane is seen in it.
+    """
+    from matplotlib.figure import Figure
+
+    description = workspace.description
+    reaches = [_reach(plane, workspace) for plane in _planes(workspace)]
+    line = _arm_in_pieces(description, first_configuration(description))
+    best = world_to_tool(description, workspace.best)[:3, 3]
+    widths, heights = np.transpose([reach.shape(line) for reach in reaches])
+    scale = min(LARGEST[0] / widths.sum(), LARGEST[1] / heights.max())
+    columns = scale * widths + BESIDE_TICKS
+    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
+    for ax, reach in zip(axes, reaches, strict=True):
+        image = reach.draw(ax, float(workspace.manipulability.max()))
+        _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
+    bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
+    bar.set_label("best translational manipulability (SI)", fontsize=9)
+    bar.outline.set_visible(False)
+    name = "ready" if "ready" in description.configurations else "zero"
+    handles = [axes[0].lines[1], axes[0].lines[2]]
+    labels = [f"the arm at {name}", "best manipulability"]
+    figure.legend(handles, labels, loc="outside lower center", frameon=False, fontsize=9, ncols=2)
+    figure.suptitle(_headline(workspace), fontsize=12, fontweight="bold")
+    return figure
+
+
+def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
+    """Return an arm with the velocity ellipsoid of its tool's origin; the title says its scale.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (n,), rad and m.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or values that are not finite.
+    """
+    from matplotlib.figure import Figure
+
+    q = joint_array(description, q)
+    if q.ndim != 1:
+        raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
+    if not np.isfinite(q).all():
+        raise ValueError(f"q is {q.tolist()}; expected finite values")
+    ellipsoid = velocity_ellipsoid(description, q)
+    longest = float(ellipsoid.lengths[0])
+    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    axes = space(figure, 111)
+    line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
+    axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85)
+    surface = _surface(ellipsoid, DRAWN * scene_size(description) / longest if longest else 1.0)
+    _draw_surface(axes, surface)
+    frame_space(axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=ROOM * scene_size(description))
+    axes.set_title(f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12)
+    return figure
+
+
+@plot.register(Workspace)
+def _(value: Workspace) -> Figure:
+    return plot_workspace(value)
+
+
+@plot.register(Ellipsoid)
+def _(value: Ellipsoid) -> Figure:
+    from matplotlib.figure import Figure
+
+    centers, axes = value.center.reshape(-1, 3), value.axes.reshape(-1, 3, 3)
+    surfaces = [_surface(Ellipsoid(*one), 1.0) for one in zip(centers, axes, value.lengths.reshape(-1, 3), strict=True)]
+    surfaces = [surface for surface in surfaces if np.isfinite(surface).all()]
+    if not surfaces:
+        raise ValueError("no ellipsoid is finite: expected one to draw")
+    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    room = space(figure, 111)
+    for surface in surfaces:
+        _draw_surface(room, surface)
+    points = np.concatenate(surfaces).reshape(-1, 3)
+    frame_space(room, points, margin=ROOM * float(np.ptp(points, axis=0).max()))
+    return figure
+
+
+def _planes(workspace: Workspace) -> list[_Plane]:
+    description, grid = workspace.description, workspace.grid
+    if grid is not None and len(grid.axes) == 2:
+        return [_in_plane(grid.axes)]
+    T = first_axis(description)
+    if not description.joints[0].is_revolute:
+        return [
+            _Plane("from the side", ("x [m]", "z [m]"), lambda points: points[..., [0, 2]]),
+            _Plane("from above", ("x [m]", "y [m]"), lambda points: points[..., [0, 1]]),
+        ]
+
+    def local(points: Array) -> Array:
+        return np.asarray((points - T[:3, 3]) @ T[:3, :3])
+
+    def section(points: Array) -> Array:
+        x, y, z = np.moveaxis(local(points), -1, 0)
+        return np.stack([np.hypot(x, y), z], axis=-1)
+
+    return [
+        _Plane("section, all turns of the first joint in one", ("distance from axis 1 [m]", "height [m]"), section),
+        _Plane("along axis 1", ("x₀ [m]", "y₀ [m]"), lambda points: local(points)[..., :2]),
+    ]
+
+
+def _in_plane(axes: Array) -> _Plane:
+    """Return the view of a plane; its axes are named where they are the world's."""
+    names = [f"{'xyz'[int(np.argmax(axis))]} [m]" if axis.max() == 1 else "along the plane [m]" for axis in axes]
+    return _Plane("", (names[0], names[1]), lambda points: points @ axes.T)
+
+
+def _reach(plane: _Plane, workspace: Workspace) -> _Reach:
+    """Return the best manipulability in each pixel of a view, smoothed over its neighbours."""
+    from scipy.ndimage import binary_closing, maximum_filter
+
+    places = plane.flatten(workspace.positions)
+    low, high = places.min(axis=0), places.max(axis=0)
+    span = float((high - low).max()) or scene_size(workspace.description)
+    edge = span / float(np.clip(np.sqrt(len(places) / PER_PIXEL), 8, FINEST))
+    counts = np.ceil((high - low) / edge).astype(int) + 2 * BESIDE
+    corner = (low + high - edge * counts) / 2
+    best = np.full(tuple(counts), -np.inf)
+    np.maximum.at(best, tuple(((places - corner) / edge).astype(int).T), workspace.manipulability)
+    # A single pixel has too few samples for the best of them to be smooth, and some have none.
+    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=BESIDE - 1)
+    return _Reach(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * BESIDE - 1), np.nan))
+
+
+def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
+    """Draw an arm's line, shape (k, 2), with a white edge, and the best place, shape (2,)."""
+    for color, width in (("white", 6.5), (LINK_COLOR, 3.5)):
+        axes.plot(*line.T, color=color, lw=width, solid_capstyle="round", solid_joinstyle="round")
+    axes.plot(*best, "*", color=BEST_COLOR, mec="white", ms=15, zorder=5)
+
+
+def _arm_in_pieces(description: Description, q: Array) -> Array:
+    """Return the way from the base to the tool as a line of short pieces, shape (k, 3), m, world."""
+    line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
+    share = np.linspace(0, 1, PIECES, endpoint=False)[:, None]
+    pieces = line[:-1, None] + share * (line[1:, None] - line[:-1, None])
+    return np.concatenate([pieces.reshape(-1, 3), line[-1:]])
+
+
+def _headline(workspace: Workspace) -> str:
+    estimate = workspace.estimate
+    if estimate is None or workspace.grid is None:
+        return workspace.description.name
+    return f"{workspace.description.name}: reaches about {estimate}, by cells of {workspace.grid.edge:.2g} m"
+
+
+def _surface(ellipsoid: Ellipsoid, scale: float) -> Array:
+    """Return an ellipsoid's mesh, shape (MESH, MESH, 3), m."""
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, MESH), np.linspace(0, np.pi, MESH))
+    sphere = np.stack([np.cos(turn) * np.sin(height), np.sin(turn) * np.sin(height), np.cos(height)], axis=-1)
+    return np.asarray(ellipsoid.center + scale * (sphere * ellipsoid.lengths) @ ellipsoid.axes.T)
+
+
+def _draw_surface(axes: Any, surface: Array) -> None:
+    x, y, z = np.moveaxis(surface, -1, 0)
+    axes.plot_surface(x, y, z, color=ELLIPSOID_COLOR, alpha=0.25, linewidth=0, rstride=1, cstride=1, shade=False)
+    axes.plot_wireframe(x, y, z, color=ELLIPSOID_COLOR, linewidth=0.5, rstride=4, cstride=4)
