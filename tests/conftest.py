@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -11,6 +12,9 @@ from hypothesis import HealthCheck, settings
 import acceptance
 from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
 from viewer.chromium import Chromium, require_chromium
+
+# Kernels compiled by tests stay with the checkout, for the next run.
+os.environ.setdefault("DHKIT_CACHE_DIR", str(Path(__file__).resolve().parents[1] / ".cache"))
 
 settings.register_profile(
     "dhkit",
@@ -31,6 +35,12 @@ def pytest_configure(config: pytest.Config) -> None:
 def check_urdf() -> str:
     """Path of urdfdom's check_urdf; skips where it is missing and not required."""
     return require("check_urdf", "Debian's liburdfdom-tools has it")
+
+
+@pytest.fixture
+def array_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels in NumPy: for tests of so many tables that compiling each would take hours."""
+    monkeypatch.setenv("DHKIT_KERNELS", "off")
 
 
 def require(program: str, hint: str) -> str:

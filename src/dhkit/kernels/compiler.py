@@ -39,10 +39,9 @@ def select(condition: Any, true: Any, false: Any) -> Any:
     return true if condition else false
 
 
-def _twin(function: Callable[..., Any]) -> Callable[..., Any]:
+def _twin(function: Any) -> Callable[..., Any]:
     """Compile a function of ``elementary`` with what is compiled here in place of what it calls."""
     names = vars(elementary) | {name: globals()[name] for name in elementary.__all__ if name in globals()}
-    assert isinstance(function, types.FunctionType)
     return numba.njit(types.FunctionType(function.__code__, names), **SETTINGS)  # type: ignore[no-any-return]
 
 

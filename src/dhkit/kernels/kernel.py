@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,7 @@ class Kernel:
             self._run(parameters, (*inputs, *outputs))
             return
         edges = np.linspace(0, count, shares + 1).astype(int)
-        parts = [
-            tuple(array[start:stop] for array in (*inputs, *outputs))
-            for start, stop in zip(edges[:-1], edges[1:], strict=True)
-        ]
+        parts = [tuple(array[start:stop] for array in (*inputs, *outputs)) for start, stop in pairwise(edges)]
         pending = [_workers(shares - 1).submit(self._run, parameters, part) for part in parts[1:]]
         self._run(parameters, parts[0])
         for share in pending:

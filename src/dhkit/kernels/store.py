@@ -27,7 +27,9 @@ def cache_folder() -> Path | None:
 
     None where it cannot be written, or could be written by others: what lies in it is run.
     """
-    folder = Path(os.environ.get("DHKIT_CACHE_DIR") or platformdirs.user_cache_dir("dhkit", appauthor=False)) / "kernels"
+    folder = (
+        Path(os.environ.get("DHKIT_CACHE_DIR") or platformdirs.user_cache_dir("dhkit", appauthor=False)) / "kernels"
+    )
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
@@ -97,7 +99,7 @@ def _sources(derivation: str) -> str:
     here = Path(__file__).parent
     folders = {here, here.parent / "symbolic", Path(derivation).parent}
     total = hashlib.sha256()
-    for path in sorted(path for folder in folders for path in folder.glob("*.py")):
+    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
         total.update(path.read_bytes())
     return total.hexdigest()
 

@@ -1,4 +1,4 @@
-"""Where an arm is, how it moves, how it gets there: forward and inverse kinematics, Jacobians, workspace, in batches."""
+"""Where an arm is, how it moves and how it gets there: forward and inverse kinematics, Jacobians, workspace."""
 
 from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify

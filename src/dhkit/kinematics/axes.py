@@ -58,11 +58,13 @@ class Axes:
 
     def direction(self, i: int) -> Array:
         """Return the direction of axis i (from 1)."""
-        return self.directions[i - 1]
+        direction: Array = self.directions[i - 1]
+        return direction
 
     def point(self, i: int) -> Array:
         """Return a point of axis i (from 1), m."""
-        return self.points[i - 1]
+        point: Array = self.points[i - 1]
+        return point
 
     def parallel(self, i: int, j: int) -> bool:
         """Return whether axes i and j have the same or opposite direction."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dhkit.description import Description
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.closed_form.program import arm_program, limit_parameters
+from dhkit.kinematics.closed_form.family import limit_parameters
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
 
 __all__ = ["export_kinematics"]
@@ -41,6 +41,8 @@ def export_kinematics(description: Description, folder: str | Path, name: str | 
     found = classify(description)
     remark = f"{description.name}: {found.words}. Written by dhkit."
     if found.family is not None and found.fit is not None:
+        from dhkit.kinematics.closed_form.program import arm_program
+
         numbers = description.numbers
         prismatic = tuple(bool(slides) for slides in numbers.prismatic)
         limits = limit_parameters(numbers.lower, numbers.upper, prismatic)

@@ -52,7 +52,9 @@ class IKPath:
             A pose is not reached, or the branch had to be switched: says where.
         """
         if self.lost:
-            raise UnreachableError(f"{len(self.lost)} poses of the path are not reached, the first is pose {self.lost[0]}")
+            raise UnreachableError(
+                f"{len(self.lost)} poses of the path are not reached, the first is pose {self.lost[0]}"
+            )
         if self.switches:
             places = ", ".join(map(str, self.switches[:5]))
             raise UnreachableError(f"the path has to switch branches {len(self.switches)} times, before pose {places}")
@@ -118,7 +120,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
             lost.append(k)
             continue
         q[k], places[k] = candidates[chosen[0]] + chosen[1], chosen[0]
-        if k and not lost[-1:] == [k - 1] and np.any(np.abs(q[k] - at) > jump):
+        if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
             switches.append(k)
         at = q[k]
     return IKPath(

@@ -81,7 +81,8 @@ class IKSolutions:
     @property
     def within(self) -> NDArray[np.bool_]:
         """Whether the branch reaches the pose and is inside the limits, shape (..., B)."""
-        return self.valid & (self.flags & IKFlag.out_of_limits == 0)
+        inside: NDArray[np.bool_] = self.valid & (self.flags & IKFlag.out_of_limits == 0)
+        return inside
 
     def branch(self, name: str) -> Array:
         """Return the joint values of one branch, shape (..., n), NaN where it does not reach.
@@ -206,7 +207,7 @@ class IKSolutions:
         gaps = np.where(usable, np.sum((q - near[..., None, :]) ** 2, axis=-1), np.inf)
         best = np.argmin(np.where(np.isnan(gaps), np.inf, gaps), axis=-1)
         chosen = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
-        return np.where(usable.any(axis=-1)[..., None], chosen, np.nan)
+        return np.where(np.any(usable, axis=-1, keepdims=True), chosen, np.nan)
 
     def _choices(self, i: int, value: float) -> list[float]:
         lower, upper = float(self.lower[i]), float(self.upper[i])

@@ -158,7 +158,8 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
     if frame == "world":
         return J
     R_tool_world = tool[:3, :3].T
-    return casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
+    resolved: casadi.SX = casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
+    return resolved
 
 
 def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:

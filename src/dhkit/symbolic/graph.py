@@ -32,8 +32,8 @@ class Node:
     """One operation.
 
     ``constant`` has a value, ``input`` the places (variable, entry); all others work on the results of earlier nodes:
-    add, subtract, multiply, divide, negate, absolute, floor, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal, equal,
-    unequal, logical_and, logical_or, logical_not, and select (condition, where true, where false).
+    add, subtract, multiply, divide, negate, absolute, floor, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal,
+    equal, unequal, logical_and, logical_or, logical_not, and select (condition, where true, where false).
     """
 
     operation: str
@@ -273,4 +273,6 @@ def _pruned(
             return node
         return Node(node.operation, tuple(place[k] for k in node.arguments), node.value)
 
-    return tuple(moved(nodes[k]) for k in sorted(needed)), tuple(tuple(place[k] for k in entries) for entries in results)
+    return tuple(moved(nodes[k]) for k in sorted(needed)), tuple(
+        tuple(place[k] for k in entries) for entries in results
+    )

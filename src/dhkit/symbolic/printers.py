@@ -45,9 +45,7 @@ C = PYTHON | {
 C_NUMBERS = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
 
 
-def python_lines(
-    graph: Graph, load: Callable[[int, int], str], store: Callable[[int, int, str], str]
-) -> Iterator[str]:
+def python_lines(graph: Graph, load: Callable[[int, int], str], store: Callable[[int, int, str], str]) -> Iterator[str]:
     """Yield assignments ``v0 = ...``; sine and cosine of one angle are one call of ``sincos``.
 
     The text knows ``nan`` and ``inf``, and a function for every operation that has no sign.
@@ -87,7 +85,9 @@ def c_source(graph: Graph) -> str:
 
     Inputs and outputs must not overlap. Beyond the standard mathematical functions it needs nothing.
     """
+    used = {node.arguments[0] for node in graph.nodes if node.operation == "input"}
     lines = [f"{_c_signature(graph)}\n{{"]
+    lines += [f"    (void){x.name};" for k, x in enumerate(graph.inputs) if x.size and k not in used]
     for k, node in enumerate(graph.nodes):
         lines.append(f"    const double v{k} = {_c_expression(graph, node)};")
     for variable, entries in zip(graph.outputs, graph.results, strict=True):

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dhkit.description import Array, Description, world_to_frames, world_to_tool
-from dhkit.kinematics import jacobian
+from dhkit.description import Array, Description
+from dhkit.kinematics import forward_kinematics, frames, jacobian
 from dhkit.model import PinocchioModel, pinocchio_model
 from dhkit.verification.report import Agreement, VerificationReport
 
@@ -60,7 +60,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     import pinocchio as pin
 
     q = random_states(description, samples, seed)
-    T_world_frames, T_world_tool = world_to_frames(description, q), world_to_tool(description, q)
+    T_world_frames, T_world_tool = frames(description, q), forward_kinematics(description, q)
     J_world, J_tool = jacobian(description, q), jacobian(description, q, frame="tool")
     names = [*(f"dh{i}" for i in range(description.n + 1)), "tool"]
     scale = max(1.0, description.reach)

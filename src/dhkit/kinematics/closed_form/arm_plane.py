@@ -1,7 +1,7 @@
 """Joint 1 as a turntable under an arm that moves in a plane: where the plane goes, and what it looks like inside.
 
-Coordinates: u along axis 1, v along the parallel axes behind it (at right angles to axis 1), x = u x v. They are taken at
-zero joint values, with the origin on axis 1 at the height of axis 2, and turn with joint 1.
+Coordinates: u along axis 1, v along the parallel axes behind it (at right angles to axis 1), x = u x v. They are taken
+at zero joint values, with the origin on axis 1 at the height of axis 2, and turn with joint 1.
 """
 
 from __future__ import annotations
@@ -9,14 +9,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.formulas import ROUNDING, SINGULAR, SX, Pair, chosen, hypot, times, unit, where
+from dhkit.kinematics.closed_form.formulas import (
+    ROUNDING,
+    SINGULAR,
+    SX,
+    Pair,
+    absolute,
+    both,
+    chosen,
+    hypot,
+    no,
+    sqrt,
+    times,
+    unit,
+    where,
+)
 
 __all__ = ["FLIPS", "ArmPlane", "Shoulder", "Vector", "as_pair", "branch_names", "ordered_shoulders", "turned_back"]
 
@@ -42,9 +55,7 @@ class ArmPlane:
         """Return the frame of axes 1 and 2."""
         u, v = axes.direction(1), axes.direction(2)
         height = u @ (axes.point(2) - axes.point(1))
-        return cls(
-            np.stack([np.cross(u, v), u, v]) + 0.0, axes.point(1) + height * u, 1.0 if u[2] >= 0 else -1.0
-        )
+        return cls(np.stack([np.cross(u, v), u, v]) + 0.0, axes.point(1) + height * u, 1.0 if u[2] >= 0 else -1.0)
 
     def coordinates(self, point: Array) -> Array:
         """Return a point's coordinates (x, u, v), m."""
@@ -85,10 +96,10 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
     """
     x, _, v = point
     r = hypot(x, v)
-    short = ca.fabs(offset) - r
+    short = absolute(offset) - r
     beyond = short > ROUNDING * scale
-    square = (r - ca.fabs(offset)) * (r + ca.fabs(offset))
-    front = ca.sqrt(where(square > 0, square, 0.0))
+    square = (r - absolute(offset)) * (r + absolute(offset))
+    front = sqrt(where(square > 0, square, 0.0))
 
     def side(along: SX) -> Shoulder:
         # The plane's point (along, offset) seen in the fixed frame is (x, v): their angle is that of joint 1.
@@ -97,7 +108,7 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
             x=along,
             miss=where(beyond, short, 0.0),
             singular=front < SINGULAR * reach,
-            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+            clamped=both(square < 0, no(beyond)),
         )
 
     return side(front), side(-front)
@@ -117,7 +128,7 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, scale: SX) -> tuple
     return either(back, front), either(front, back)
 
 
-def branch_names(offset: float, *choices: Sequence[str]) -> tuple[str, ...]:
+def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
     """Return the names of branches: the shoulder's side, then every combination of the other choices.
 
     An arm whose plane holds axis 1 (offset 0) has no left and right: its shoulders are front and back.
@@ -133,7 +144,7 @@ def turned_back(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
     return rho[0] * x + rho[1] * u, rho[0] * u - rho[1] * x, v
 
 
-def as_pair(x: float, y: float) -> tuple[float, float]:
-    """Return the direction of a vector that is not zero as (cosine, sine)."""
+def as_pair(x: SX, y: SX) -> tuple[float, float]:
+    """Return the direction of a vector of numbers that is not zero as (cosine, sine)."""
     size = float(np.hypot(x, y))
     return x / size + 0.0, y / size + 0.0

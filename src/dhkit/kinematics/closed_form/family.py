@@ -2,22 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.formulas import SX, Branch, Pair
+from dhkit.kinematics.solutions import LIMIT_SLACK
 
-__all__ = ["ALL", "Family", "Fit", "PoseSymbols", "Seen"]
+if TYPE_CHECKING:
+    import casadi as ca
+
+__all__ = ["ALL", "OUTPUT_TYPES", "TURN", "Family", "Fit", "Parameter", "PoseSymbols", "Seen", "limit_parameters"]
 
 ALL = ("x", "y", "z", "rx", "ry", "rz")
 """The coordinates of a pose: position, and rotation about the axes."""
+OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")
+"""Of joint values, distance, valid, flags and status."""
+TURN = 2 * np.pi
 Vector: TypeAlias = tuple[SX, SX, SX]
+Parameter: TypeAlias = "Array | float | np.floating[Any] | tuple[float, ...]"
+
+
+def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> Array:
+    """Return two numbers a joint: where its limits begin and how wide they are, m, or rad over a turn.
+
+    A joint without limits begins anywhere and is as wide as can be.
+    """
+    begin = np.where(np.isfinite(lower), lower - LIMIT_SLACK, -1e300)
+    width = np.where(np.isfinite(upper), upper + LIMIT_SLACK - begin, 2e300)
+    unlimited = ~(np.isfinite(lower) & np.isfinite(upper))
+    turning = ~np.asarray(prismatic)
+    begin = np.where(turning & unlimited, 0.0, begin)
+    width = np.where(turning & unlimited, TURN, width)
+    return np.where(turning, np.stack([begin, width]) / TURN, np.stack([begin, width])).T.ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +47,7 @@ class Fit:
 
     words: str
     """What the axes are like."""
-    parameters: Mapping[str, Array | float | tuple[float, ...]]
+    parameters: Mapping[str, Parameter]
     """The numbers that the family's formulas work with, by name."""
     branches: tuple[str, ...]
     met: tuple[str, ...]
@@ -42,6 +63,8 @@ class Fit:
 
     def values(self) -> dict[str, SX]:
         """Return the parameters themselves in the shapes that :meth:`symbols` has."""
+        import casadi as ca
+
         row = iter(self.vector().tolist())
         named: dict[str, SX] = {}
         for name, value in self.parameters.items():
@@ -55,6 +78,8 @@ class Fit:
 
     def symbols(self) -> tuple[dict[str, SX], ca.SX]:
         """Return symbols of the parameters' shapes (pairs as tuples, matrices as matrices), and all in one column."""
+        import casadi as ca
+
         row = ca.SX.sym("p", sum(np.size(value) for value in self.parameters.values()))
         named: dict[str, SX] = {}
         start = 0
@@ -102,12 +127,14 @@ class PoseSymbols:
     free: Pair = (1.0, 0.0)
     """The angle that the free joint takes at a wrist singularity."""
 
-    def seen(self, left: ca.SX, right: ca.SX) -> Seen:
+    def seen(self, left: SX, right: SX) -> Seen:
         """Return left T right, all 3 x 4 with a last row 0 0 0 1."""
         T = _product(_product(left, self.T), right)
-        columns = [tuple(ca.vertsplit(T[:, k])) for k in range(4)]
+        columns = [tuple(T[i, k] for i in range(3)) for k in range(4)]
         return Seen((columns[0], columns[1], columns[2]), columns[3])
 
 
-def _product(A: ca.SX, B: ca.SX) -> ca.SX:
+def _product(A: SX, B: SX) -> SX:
+    import casadi as ca
+
     return ca.horzcat(A[:, :3] @ B[:, :3], A[:, :3] @ B[:, 3] + A[:, 3])

@@ -1,28 +1,35 @@
 """The pieces that closed forms are made of, as CasADi SX expressions without branches.
 
-An angle is carried as its (cosine, sine) pair: no sine or cosine is ever taken, and only the results need an arc tangent.
+An angle is carried as its (cosine, sine) pair: no sine or cosine is ever taken, and only results need an arc tangent.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import casadi as ca
-
 __all__ = [
+    "NOTHING",
     "ROUNDING",
     "SINGULAR",
+    "SX",
     "Branch",
     "Pair",
     "TwoLink",
+    "absolute",
     "angle",
+    "both",
     "chosen",
+    "either",
     "half_turn",
     "hypot",
+    "larger",
     "no",
     "positive",
+    "rotated",
     "sign",
+    "sqrt",
     "times",
     "two_link",
     "unit",
@@ -57,9 +64,41 @@ class Branch:
     clamped: SX = 0.0
 
 
+def _casadi() -> Any:
+    """CasADi, imported when a formula is derived: who finds its kernel on the disk never needs it."""
+    import casadi
+
+    return casadi
+
+
+def sqrt(x: SX) -> SX:
+    """Return the square root."""
+    return _casadi().sqrt(x)
+
+
+def absolute(x: SX) -> SX:
+    """Return the absolute value."""
+    return _casadi().fabs(x)
+
+
+def larger(a: SX, b: SX) -> SX:
+    """Return the greater of two numbers."""
+    return _casadi().fmax(a, b)
+
+
+def both(a: SX, b: SX) -> SX:
+    """Return whether both conditions hold."""
+    return _casadi().logic_and(a, b)
+
+
+def either(a: SX, b: SX) -> SX:
+    """Return whether one of two conditions holds."""
+    return _casadi().logic_or(a, b)
+
+
 def where(condition: SX, true: SX, false: SX) -> SX:
     """Return one of two values."""
-    return ca.if_else(condition, true, false)
+    return _casadi().if_else(condition, true, false)
 
 
 def positive(x: SX) -> SX:
@@ -74,12 +113,18 @@ def sign(x: SX) -> SX:
 
 def no(condition: SX) -> SX:
     """Return the opposite of a condition."""
-    return ca.logic_not(condition)
+    return _casadi().logic_not(condition)
 
 
 def hypot(a: SX, b: SX) -> SX:
     """Return the length of a vector of two entries."""
-    return ca.sqrt(a * a + b * b)
+    return sqrt(a * a + b * b)
+
+
+def rotated(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
+    """Return a vector times a 3 x 3 matrix."""
+    x, y, z = (sum(R[i, k] * vector[k] for k in range(3)) for i in range(3))
+    return x, y, z
 
 
 def unit(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
@@ -98,18 +143,18 @@ def times(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
 
 def angle(pair: Pair) -> SX:
     """Return the angle of a pair in (-pi, pi]."""
-    return ca.atan2(pair[1], pair[0])
+    return _casadi().atan2(pair[1], pair[0])
 
 
 def half_turn(x: SX) -> SX:
     """Return an angle in (-pi, pi] turned by pi, in (-pi, pi]."""
-    return where(x > 0, x - ca.pi, x + ca.pi)
+    return where(x > 0, x - math.pi, x + math.pi)
 
 
 def wrapped(x: SX) -> SX:
     """Return an angle in [-3 pi, 3 pi] in (-pi, pi]."""
-    x = where(x > ca.pi, x - 2 * ca.pi, x)
-    return where(x <= -ca.pi, x + 2 * ca.pi, x)
+    x = where(x > math.pi, x - 2 * math.pi, x)
+    return where(x <= -math.pi, x + 2 * math.pi, x)
 
 
 def chosen(condition: SX, a: Pair, b: Pair) -> Pair:
@@ -146,15 +191,15 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
         The size of the numbers that x and y were computed from, m: what rounding is measured by.
     """
     R = hypot(x, y)
-    reach, gap = L1 + L2, ca.fabs(L1 - L2)
-    excess = ca.fmax(R - reach, gap - R)
+    reach, gap = L1 + L2, absolute(L1 - L2)
+    excess = larger(R - reach, gap - R)
     beyond = excess > ROUNDING * scale
     # 1 + cos b and 1 - cos b as products: nothing cancels near the stretched and the folded arm.
     folded = (R - gap) * (R + gap) / (2 * L1 * L2)
     stretched = (reach - R) * (reach + R) / (2 * L1 * L2)
     near_folded = folded < 1.0
     square = folded * stretched
-    c, s = unit(where(near_folded, folded - 1.0, 1.0 - stretched), ca.sqrt(positive(square)))
+    c, s = unit(where(near_folded, folded - 1.0, 1.0 - stretched), sqrt(positive(square)))
     # Both elbows mirror each other at the line to the point: a = arg(point) -+ arg(L1 + L2 e^(i b)).
     forward = unit(x, y, scale)
     inside = unit(where(near_folded, L1 - L2 + L2 * folded, L1 + L2 * c), L2 * s, L1)
@@ -163,5 +208,5 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
         between=((c, -s), (c, s)),
         miss=where(beyond, excess, 0.0),
         straight=s < SINGULAR,
-        clamped=ca.logic_and(square < 0, no(beyond)),
+        clamped=both(square < 0, no(beyond)),
     )

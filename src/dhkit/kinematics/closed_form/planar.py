@@ -1,5 +1,7 @@
-"""Arms that move in parallel planes: two or three parallel revolute joints with or without a slide along them (planar
-2R and 3R, SCARA), and one revolute joint with a slide across its axis (R-P and P-R).
+"""Arms that move in parallel planes.
+
+Two or three parallel revolute joints with or without a slide along them (planar 2R and 3R, SCARA), and one revolute
+joint with a slide across its axis (R-P and P-R).
 
 Coordinates: v along the revolute axes, x and u across, with the origin on the first of them.
 """
@@ -8,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
@@ -21,9 +22,13 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
+    absolute,
     angle,
+    both,
     hypot,
+    no,
     positive,
+    sqrt,
     times,
     two_link,
     unit,
@@ -86,7 +91,7 @@ def chain_fit(axes: Axes) -> Fit | None:
 
 
 def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the elbow, seen from above, on the left of the line from the first axis, then on the right."""
+    """Return two branches: the elbow, seen from above, left of the line from the first axis, then right of it."""
     T = pose.seen(p["T_plane_world"], IDENTITY)
     kinds = pose.structure
     turning = kinds.count("R") == 3
@@ -109,9 +114,7 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
             sense * rise if kind == "P" else _sensed(next(turns), sense)
             for kind, sense in zip(kinds, p["senses"], strict=True)
         ]
-        branches.append(
-            Branch(tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped)
-        )
+        branches.append(Branch(tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped))
     return branches
 
 
@@ -139,10 +142,10 @@ def polar_fit(axes: Axes) -> Fit | None:
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool out along the slide's positive direction, then in."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
-    R, lift = hypot(x, u), ca.fabs(p["lift"])
+    R, lift = hypot(x, u), absolute(p["lift"])
     beyond = lift - R > ROUNDING * pose.scale
     square = (R - lift) * (R + lift)
-    length = ca.sqrt(positive(square))
+    length = sqrt(positive(square))
     miss = hypot(where(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
     return [
         Branch(
@@ -152,7 +155,7 @@ def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
             ),
             miss=miss,
             elbow=length < SINGULAR * p["reach"],
-            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+            clamped=both(square < 0, no(beyond)),
         )
         for along in (length, -length)
     ]
@@ -186,16 +189,16 @@ def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool ahead of the revolute axis along the slide, then behind it."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     L = p["L"]
-    beyond = ca.fabs(u) - L > ROUNDING * pose.scale
+    beyond = absolute(u) - L > ROUNDING * pose.scale
     square = (L - u) * (L + u)
-    ahead = ca.sqrt(positive(square))
-    miss = hypot(where(beyond, ca.fabs(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
+    ahead = sqrt(positive(square))
+    miss = hypot(where(beyond, absolute(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
     return [
         Branch(
             (x - along, angle(times(unit(along, u), p["pointing"], -1.0))),
             miss=miss,
             elbow=ahead < SINGULAR * p["reach"],
-            clamped=ca.logic_and(square < 0, ca.logic_not(beyond)),
+            clamped=both(square < 0, no(beyond)),
         )
         for along in (ahead, -ahead)
     ]
@@ -219,7 +222,7 @@ def _sensed(pair: Pair, sense: SX) -> SX:
 
 
 def _off_plane(rise: SX, scale: SX) -> SX:
-    return where(ca.fabs(rise) > FLAT * scale, ca.fabs(rise), 0.0)
+    return where(absolute(rise) > FLAT * scale, absolute(rise), 0.0)
 
 
 def _either(upright: SX, both: tuple[tuple[SX, SX], tuple[SX, SX]], side: int) -> tuple[SX, SX]:

@@ -10,38 +10,21 @@ import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.kinematics.closed_form.family import Family, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import TURN, Family, Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import SX, Branch, where
-from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKStatus
+from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.symbolic import Graph
 
-__all__ = ["OUTPUT_TYPES", "arm_program", "limit_parameters", "program"]
+__all__ = ["arm_program", "program"]
 
 ORTHONORMAL = 1e-6
 """By how much a rotation's columns may miss being orthonormal, as for every pose that dhkit takes."""
-OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")
-"""Of joint values, distance, valid, flags and status."""
-TURN = 2 * np.pi
-
-
-def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> Array:
-    """Return two numbers a joint: where its limits begin and how wide they are, m, or rad over a turn.
-
-    A joint without limits begins anywhere and is as wide as can be.
-    """
-    begin = np.where(np.isfinite(lower), lower - LIMIT_SLACK, -1e300)
-    width = np.where(np.isfinite(upper), upper + LIMIT_SLACK - begin, 2e300)
-    unlimited = ~(np.isfinite(lower) & np.isfinite(upper))
-    turning = ~np.asarray(prismatic)
-    begin = np.where(turning & unlimited, 0.0, begin)
-    width = np.where(turning & unlimited, TURN, width)
-    return np.where(turning, np.stack([begin, width]) / TURN, np.stack([begin, width])).T.ravel()
 
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     """Return the program of a family: T (4 x 4) and the free joint's angle to q, distance, valid, flags and status.
 
-    Its parameters are ``fit.vector()`` and then :func:`limit_parameters`.
+    Its parameters are ``fit.vector()`` and then ``limit_parameters``.
     """
     named, symbols = fit.symbols()
     limits = ca.SX.sym("limits", 2 * len(prismatic))

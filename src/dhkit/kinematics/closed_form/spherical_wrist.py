@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
@@ -25,19 +24,25 @@ from dhkit.kinematics.closed_form.arm_plane import (
     ordered_shoulders,
     turned_back,
 )
-from dhkit.kinematics.closed_form.family import ALL, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import ALL, Fit, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
     SINGULAR,
     SX,
     Branch,
     Pair,
+    absolute,
     angle,
+    both,
     chosen,
+    either,
     half_turn,
     hypot,
+    no,
     positive,
+    rotated,
     sign,
+    sqrt,
     times,
     two_link,
     unit,
@@ -110,7 +115,7 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, arm.miss),
                 elbow=arm.straight,
-                clamped=ca.logic_or(shoulder.clamped, arm.clamped),
+                clamped=either(shoulder.clamped, arm.clamped),
             )
             branches += _with_wrist(p, T.rotation, region, pose.free)
     return branches
@@ -149,11 +154,11 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose.scale):
         x, u = shoulder.x - p["a1"], T.position[1]
-        R, lift = hypot(x, u), ca.fabs(p["lift"])
+        R, lift = hypot(x, u), absolute(p["lift"])
         short = lift - R
         beyond = short > ROUNDING * pose.scale
         square = (R - lift) * (R + lift)
-        length = ca.sqrt(positive(square))
+        length = sqrt(positive(square))
         for along in (length, -length):
             # The wrist is at e^(i q2) boom (along + i lift) from axis 2.
             q2 = times(unit(x, u, pose.scale), times(p["boom"], unit(along, p["lift"], pose.scale)), -1.0)
@@ -163,7 +168,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, where(beyond, short, 0.0)),
                 elbow=length < SINGULAR * p["reach"],
-                clamped=ca.logic_or(shoulder.clamped, ca.logic_and(square < 0, ca.logic_not(beyond))),
+                clamped=either(shoulder.clamped, both(square < 0, no(beyond))),
             )
             branches += _with_wrist(p, T.rotation, region, pose.free)
     return branches
@@ -177,7 +182,7 @@ def _wrist_centre(axes: Axes) -> Array | None:
     return centre if centre is not None and axes.on(6, centre) else None
 
 
-def _parameters(axes: Axes, plane: ArmPlane, centre: Array) -> dict[str, Array | float]:
+def _parameters(axes: Axes, plane: ArmPlane, centre: Array) -> dict[str, Parameter]:
     """Return what both regional structures need: where plane and wrist are, and the wrist's axes at zero."""
     z4, z5, z6 = (axes.direction(i) for i in (4, 5, 6))
     T_world_wrist = np.eye(4)
@@ -204,8 +209,8 @@ def _with_wrist(
     """
     F = p["F"]
 
-    def seen(vector: Vector) -> ca.SX:
-        return F @ ca.vertcat(*turned_back(vector, region.shoulder.q1, region.rho))
+    def seen(vector: Vector) -> Vector:
+        return rotated(F, turned_back(vector, region.shoulder.q1, region.rho))
 
     # Where axis 6, axis 5's first direction and their product have gone, in the axes of the wrist at zero.
     a, n, m = (seen(vector) for vector in rotation)

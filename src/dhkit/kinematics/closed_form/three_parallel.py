@@ -1,14 +1,14 @@
 """Six joints of which 2, 3 and 4 are parallel, and 5 and 6 meet at right angles: the Universal Robots family.
 
-The point where axes 5 and 6 meet and the direction of axis 6 give joints 1, 5 and 6 and the sum of the three in between;
-those are then two links in a plane (Hawkins, Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms, 2013).
+The point where axes 5 and 6 meet and the direction of axis 6 give joints 1, 5 and 6 and the sum of the three in
+between; those are then two links in a plane (Hawkins, Analytic inverse kinematics for the Universal Robots UR-5/UR-10
+arms, 2013).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import casadi as ca
 import numpy as np
 
 from dhkit.kinematics.axes import Axes, inverse_pose
@@ -30,8 +30,10 @@ from dhkit.kinematics.closed_form.formulas import (
     Pair,
     angle,
     chosen,
+    either,
     half_turn,
     hypot,
+    rotated,
     sign,
     times,
     two_link,
@@ -106,7 +108,7 @@ def _wrists(
 ) -> tuple[tuple[Branch, Branch], tuple[Branch, Branch]]:
     """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it."""
     F = p["F"]
-    a, n, m = (F @ ca.vertcat(*turned_back(vector, shoulder.q1)) for vector in T.rotation)
+    a, n, m = (rotated(F, turned_back(vector, shoulder.q1)) for vector in T.rotation)
     swing = hypot(a[0], a[1])
     # rho is how far links 2 to 4 have turned in all. Where axis 6 is parallel to them only rho and joint 6 together
     # are determined: joint 6 is then free, and rho is read off axis 5 with joint 6 undone.
@@ -151,7 +153,7 @@ def _elbows(
             shoulder=shoulder.singular,
             elbow=arm.straight,
             wrist=singular,
-            clamped=ca.logic_or(shoulder.clamped, arm.clamped),
+            clamped=either(shoulder.clamped, arm.clamped),
         )
 
     return branch(front), branch(-front)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
@@ -17,7 +16,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
     ordered_shoulders,
     turned_back,
 )
-from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import Fit, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     NOTHING,
     SINGULAR,
@@ -26,6 +25,7 @@ from dhkit.kinematics.closed_form.formulas import (
     Pair,
     angle,
     chosen,
+    either,
     hypot,
     sign,
     times,
@@ -93,7 +93,7 @@ def yaw_two_fit(axes: Axes) -> Fit | None:
     return Fit(
         words="a turntable, axes 2 and 3 parallel",
         parameters=_common(axes, plane) | links,
-        branches=branch_names(float(links["offset"]), ELBOWS),
+        branches=branch_names(links["offset"], ELBOWS),
         met=("x", "y", "z"),
     )
 
@@ -169,17 +169,17 @@ def _elbows(
                 shoulder=shoulder.singular,
                 elbow=arm.straight,
                 wrist=sideways,
-                clamped=ca.logic_or(shoulder.clamped, arm.clamped),
+                clamped=either(shoulder.clamped, arm.clamped),
             )
         )
     return branches
 
 
-def _common(axes: Axes, plane: ArmPlane) -> dict[str, Array | float]:
+def _common(axes: Axes, plane: ArmPlane) -> dict[str, Parameter]:
     return {"T_plane_world": plane.T[:3], "up": plane.up, "reach": axes.scale}
 
 
-def _links(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Array | float | tuple[float, ...]] | None:
+def _links(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parameter] | None:
     """Return the two links from axis 2 to axis 3 to a point; None where one has no length."""
     second, third, last = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), end))
     upper, fore = third[:2] - second[:2], last[:2] - third[:2]
