@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.description import write_atomically
-from dhkit.errors import DescriptionError
+from dhkit.errors import DescriptionError, ModelError
 from dhkit.kinematics.manipulability import velocity_ellipsoid
+from dhkit.kinematics.singularities import Singularities, singularities
 from dhkit.kinematics.workspace import Workspace
 from dhkit.kinematics.workspace import workspace as sample
 
@@ -93,6 +94,18 @@ def _print(arm: Arm, space: Workspace) -> None:
     q = ", ".join(_value(arm, i, x) for i, x in enumerate(space.best))
     place = ", ".join(f"{x + 0.0:.4f}" for x in arm.fk(space.best)[:3, 3])
     say(f"best {space.manipulability.max():.4g} with the tool at ({place}) m, joints ({q})")
+    found = _singularities(arm)
+    if found is not None:
+        say("\nsingular where, limits aside")
+        say("\n".join(f"  {line}" for line in str(found).splitlines()))
+
+
+def _singularities(arm: Arm) -> Singularities | None:
+    """Return where the arm is singular, None where that is not known in closed form."""
+    try:
+        return singularities(arm.description)
+    except ModelError:
+        return None
 
 
 def _size(space: Workspace) -> str:
@@ -112,7 +125,7 @@ def _value(arm: Arm, i: int, x: float) -> str:
 
 
 def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
-    estimate = space.estimate
+    estimate, singular = space.estimate, _singularities(arm)
     return {
         "robot": arm.name,
         "samples": space.samples,
@@ -130,6 +143,16 @@ def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
             "q": space.best.tolist(),
             "position": arm.fk(space.best)[:3, 3].tolist(),
         },
+        "singularities": None if singular is None else _singular_facts(singular),
+    }
+
+
+def _singular_facts(found: Singularities) -> dict[str, Any]:
+    """Return each kind's joint, counted from 1 as in words, its singular values, rad or m, and its words."""
+    joints = {kind: None if joint is None else joint + 1 for kind, joint in found.joints.items()}
+    return {
+        kind: {"joint": joints[kind], "values": list(found.values[kind]), "words": found.words[kind]}
+        for kind in found.kinds
     }
 
 

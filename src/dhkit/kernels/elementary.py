@@ -67,25 +67,28 @@ def sincos(x: Any) -> Any:
     beyond it, and of what is not finite, they are NaN.
     """
     k = (x * TWO_OVER_PI + NEAREST) - NEAREST
-    r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
-    r = select(absolute(x) <= EXACT_RANGE, r, np.nan)
+    # The remainder is r + tail: its rounding is kept, or it would cost half a unit in the last place.
+    t = x - k * HALF_PI_1
+    second = k * HALF_PI_2
+    r = select(absolute(x) <= EXACT_RANGE, t - second, np.nan)
+    tail = ((t - r) - second) - k * HALF_PI_3
     z = r * r
+    half = 0.5 * z
     p = 1.58969099521155010221e-10
     p = p * z - 2.50507602534068634195e-08
     p = p * z + 2.75573137070700676789e-06
     p = p * z - 1.98412698298579493134e-04
     p = p * z + 8.33333333332248946124e-03
     p = p * z - 1.66666666666666324348e-01
-    sine = r + r * (z * p)
+    sine = r + (r * (z * p) + tail * (1.0 - half))
     p = -1.13596475577881948265e-11
     p = p * z + 2.08757232129817482790e-09
     p = p * z - 2.75573143513906633035e-07
     p = p * z + 2.48015872894767294178e-05
     p = p * z - 1.38888888888741095749e-03
     p = p * z + 4.16666666666666019037e-02
-    half = 0.5 * z
     near_one = 1.0 - half
-    cosine = near_one + (((1.0 - near_one) - half) + (z * z) * p)
+    cosine = near_one + ((((1.0 - near_one) - half) + (z * z) * p) - r * tail)
     # The quadrant: k/4 less its nearest integer is 0, 1/4, ±1/2 or -1/4 for k = 0, 1, 2, 3 modulo 4.
     quarter = k * 0.25
     quadrant = quarter - ((quarter + NEAREST) - NEAREST)

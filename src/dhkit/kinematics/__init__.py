@@ -5,6 +5,7 @@ from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
+from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
@@ -23,4 +24,5 @@ __all__ = [
     "inverse_kinematics",
     "jacobian",
     "jacobian_dot",
+    "solve_numerically",
 ]

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.errors import ModelError
 from dhkit.kernels import kernel
 from dhkit.kinematics.batches import check_threads, result_array
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.closed_form.family import Fit
-from dhkit.kinematics.closed_form.program import OUTPUT_TYPES, limit_parameters, program
+from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
@@ -27,6 +25,9 @@ def inverse_kinematics(
 ) -> IKSolutions:
     """Return all solutions of T_world_tool(q) = T in closed form.
 
+    Arms of six or seven revolute joints without a closed form of ours are handed to the package ssik, which finds all
+    solutions of six joints too: see :func:`dhkit.kinematics.external.solve_externally`.
+
     Parameters
     ----------
     description
@@ -35,9 +36,9 @@ def inverse_kinematics(
         Poses of the tool in the world, shape (..., 4, 4).
     seed
         Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, one joint may take any angle (q4,
-        or q6 of an arm with three parallel axes): it takes that of the seed, or 0.
+        or q6 of an arm with three parallel axes): it takes that of the seed, or 0. ssik does not use it.
     out
-        Where to write the joint values, shape (..., B, n), float64, contiguous.
+        Where to write the joint values, shape (..., B, n), float64, contiguous. Not with ssik.
     threads
         How many threads share a large batch.
 
@@ -49,13 +50,16 @@ def inverse_kinematics(
     Raises
     ------
     ModelError
-        No closed form is known for this arm: says what its axes are like and what to use.
+        No closed form is known for this arm, and ssik does not take it or is not installed: says what its axes are
+        like and what to use.
     ValueError, TypeError
         T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
     """
     check_threads(threads)
     poses = pose_rows(T)
     solver = _solver(description)
+    if solver is None:
+        return _solved_externally(description, poses, out, threads)
     fit = solver.fit
     batch = poses.shape[:-2]
     B, n = len(fit.branches), description.n
@@ -109,6 +113,15 @@ def pose_rows(T: ArrayLike) -> Array:
     return poses
 
 
+def _solved_externally(description: Description, T: Array, out: Array | None, threads: int) -> IKSolutions:
+    from dhkit.kinematics.external import solve_externally
+
+    if out is not None:
+        words = classify(description).words
+        raise ValueError(f"out is given, but {description.name} is {words}: how many branches there will be is open")
+    return solve_externally(description, T, threads=threads)
+
+
 def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
     if seed is None or fit.free is None:
         return np.zeros(batch)
@@ -130,10 +143,11 @@ class _Solver:
 
 
 @lru_cache(maxsize=512)
-def _solver(description: Description) -> _Solver:
+def _solver(description: Description) -> _Solver | None:
+    """Return an arm's closed form, or None where we have none."""
     found = classify(description)
     if found.family is None or found.fit is None:
-        raise ModelError(f"{description.name} is {found.words}; ik_numeric solves any arm")
+        return None
     family, fit, numbers = found.family, found.fit, description.numbers
     prismatic = tuple(bool(slides) for slides in numbers.prismatic)
     limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
@@ -141,5 +155,11 @@ def _solver(description: Description) -> _Solver:
         name=f"ik_{family.name}",
         fit=fit,
         parameters=np.concatenate([fit.vector(), limits]),
-        program=lambda: program(family, fit, prismatic),
+        program=lambda: _derived(family, fit, prismatic),
     )
+
+
+def _derived(family: Family, fit: Fit, prismatic: tuple[bool, ...]) -> Graph:
+    from dhkit.kinematics.closed_form.program import program
+
+    return program(family, fit, prismatic)

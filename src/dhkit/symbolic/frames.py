@@ -173,4 +173,5 @@ def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: Refer
 def _matrix(*rows: Sequence[Any]) -> casadi.SX:
     import casadi
 
-    return casadi.vertcat(*(casadi.horzcat(*row) for row in (*rows, (0, 0, 0, 1))))
+    matrix: casadi.SX = casadi.vertcat(*(casadi.horzcat(*row) for row in (*rows, (0, 0, 0, 1))))
+    return matrix

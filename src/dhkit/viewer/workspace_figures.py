@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, world_to_frames, world_to_tool
+from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
 from dhkit.viewer.figures import GRID_COLOR, LINK_COLOR, frame_space, plot, skeleton, space
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["plot_ellipsoid", "plot_workspace"]
 
 COLORS = "viridis"
-BEST_COLOR, ELLIPSOID_COLOR = "#e5484d", "#d9480f"
+BEST_COLOR, ELLIPSOID_COLOR, BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
+DASHES = {"outer": "--", "inner": ":", "shoulder": "-."}
+"""How boundaries are drawn, by name."""
 FINEST = 160
 """Pixels along a view's longer side at most."""
 PER_PIXEL = 12
@@ -30,6 +33,8 @@ BESIDE = 2
 """Pixels that are left free at a view's edges; one fewer is smoothed over to each side."""
 BESIDE_TICKS = 0.8
 """Room for a view's numbers and label, inches."""
+LEGEND_ROW = 0.25
+"""Room for two more names in the legend, inches."""
 LARGEST = (9.5, 5.0)
 """Width and height of a figure's views together, inches."""
 PIECES = 24
@@ -50,6 +55,12 @@ class _Plane:
     labels: tuple[str, str]
     flatten: Any
     """Takes points (..., 3) in the world and returns them in the view, (..., 2), m."""
+    along_axis: bool = True
+    """Whether a surface about axis 1 is seen as its circle; in a section it is a curve."""
+
+    def border(self, boundary: Boundary) -> Array:
+        """Return what a boundary looks like, shape (k, 2), NaN between pieces."""
+        return np.asarray(self.flatten(boundary.circle if self.along_axis else boundary.section))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +75,10 @@ class _Reach:
     best: Array
     """The best manipulability in each pixel, NaN where none was reached, shape (nx, ny)."""
 
-    def shape(self, line: Array) -> tuple[float, float]:
-        """Return the width and height of the view with a line of the world in it, m."""
-        points = self.plane.flatten(line)
+    def shape(self, points: Array) -> tuple[float, float]:
+        """Return the width and height of the view with points (k, 2) in it, m."""
         ends = np.stack([self.corner, self.corner + self.edge * np.array(self.best.shape)])
-        width, height = np.ptp(np.concatenate([points, ends]), axis=0)
+        width, height = np.ptp(np.concatenate([points[np.isfinite(points[:, 0])], ends]), axis=0)
         return float(width), float(height)
 
     def draw(self, axes: Axes, most: float) -> Any:
@@ -91,7 +101,9 @@ def plot_workspace(workspace: Workspace) -> Figure:
     """Return what an arm reaches, colored by the best manipulability found there, with the arm in it.
 
     An arm in space is seen from the side, as distance from the first joint's axis and height along it, and along
-    that axis; one with a sliding first joint along y and z. A tool that keeps to a plane is seen in it.
+    that axis; one with a sliding first joint along y and z. A tool that keeps to a plane is seen in it. Thin lines are
+    how far the arm would reach without limits of its turning joints, where that has a closed form
+    (:func:`dhkit.kinematics.boundaries.boundaries`).
     """
     from matplotlib.figure import Figure
 
@@ -99,21 +111,26 @@ def plot_workspace(workspace: Workspace) -> Figure:
     reaches = [_reach(plane, workspace) for plane in _planes(workspace)]
     line = _arm_in_pieces(description, first_configuration(description))
     best = world_to_tool(description, workspace.best)[:3, 3]
-    widths, heights = np.transpose([reach.shape(line) for reach in reaches])
+    borders = boundaries(description)
+    drawn = [np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)]) for reach in reaches]
+    widths, heights = np.transpose([reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)])
     scale = min(LARGEST[0] / widths.sum(), LARGEST[1] / heights.max())
     columns = scale * widths + BESIDE_TICKS
-    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6
+    rows = (len(borders) + 1) // 2
+    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + LEGEND_ROW * rows
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
     for ax, reach in zip(axes, reaches, strict=True):
         image = reach.draw(ax, float(workspace.manipulability.max()))
         _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
+        for boundary in borders:
+            _draw_border(ax, reach.plane.border(boundary), DASHES[boundary.name])
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
     bar.set_label("best translational manipulability (SI)", fontsize=9)
     bar.outline.set_visible(False)
     name = "ready" if "ready" in description.configurations else "zero"
-    handles = [axes[0].lines[1], axes[0].lines[2]]
-    labels = [f"the arm at {name}", "best manipulability"]
+    handles = axes[0].lines[1:]
+    labels = [f"the arm at {name}", "best manipulability", *map(_border_words, borders)]
     figure.legend(handles, labels, loc="outside lower center", frameon=False, fontsize=9, ncols=2)
     figure.suptitle(_headline(workspace), fontsize=12, fontweight="bold")
     return figure
@@ -195,8 +212,9 @@ def _planes(workspace: Workspace) -> list[_Plane]:
         x, y, z = np.moveaxis(local(points), -1, 0)
         return np.stack([np.hypot(x, y), z], axis=-1)
 
+    title, labels = "section, all turns of the first joint in one", ("distance from axis 1 [m]", "height [m]")
     return [
-        _Plane("section, all turns of the first joint in one", ("distance from axis 1 [m]", "height [m]"), section),
+        _Plane(title, labels, section, along_axis=False),
         _Plane("along axis 1", ("x₀ [m]", "y₀ [m]"), lambda points: local(points)[..., :2]),
     ]
 
@@ -229,6 +247,17 @@ def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
     for color, width in (("white", 6.5), (LINK_COLOR, 3.5)):
         axes.plot(*line.T, color=color, lw=width, solid_capstyle="round", solid_joinstyle="round")
     axes.plot(*best, "*", color=BEST_COLOR, mec="white", ms=15, zorder=5)
+
+
+def _draw_border(axes: Axes, points: Array, dashes: str) -> None:
+    """Draw a boundary, shape (k, 2), below the arm."""
+    axes.plot(*points.T, dashes, color=BOUNDARY_COLOR, lw=1.3, zorder=1.9)
+
+
+def _border_words(boundary: Boundary) -> str:
+    if boundary.name == "shoulder":
+        return f"least distance of the {boundary.point} from axis 1"
+    return f"{boundary.name} boundary of the {boundary.point}, turning freely"
 
 
 def _arm_in_pieces(description: Description, q: Array) -> Array:

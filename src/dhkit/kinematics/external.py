@@ -1,0 +1,144 @@
+"""Inverse kinematics of arms without a closed form of ours, by the package ssik (Srinivasa), which is optional."""
+
+from __future__ import annotations
+
+import logging
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description
+from dhkit.errors import ModelError
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.batches import check_threads
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import ALL
+from dhkit.kinematics.inverse import pose_rows
+from dhkit.kinematics.newton import Newton
+from dhkit.kinematics.numeric import closes, descend
+from dhkit.kinematics.solutions import IKSolutions
+
+__all__ = ["solve_externally"]
+
+log = logging.getLogger(__name__)
+
+CLOSES = 1e-10
+"""What a solution may miss: of the position as a share of the reach, of the rotation in rad."""
+EXACT = 1e-13
+"""What Newton's method is to get the solutions down to."""
+SAME = 1e-6
+"""rad: angles are told apart by more than this when solutions are put in order."""
+
+
+def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -> IKSolutions:
+    """Return the solutions of T_world_tool(q) = T that ssik finds, polished and checked by our own kinematics.
+
+    For arms of six joints these are all solutions. An arm of seven joints has infinitely many, in curves; ssik
+    returns points of them, by the defaults of its solver for the arm: up to eight or so for each of sixteen values of
+    the redundant coordinate, or a few values in each interval where there is a solution (as for the Panda). The first
+    call for an arm prepares a solver, which takes up to a minute for arms of six joints without any special geometry;
+    ssik keeps what it derived in a cache of its own. A pose takes milliseconds.
+
+    Parameters
+    ----------
+    description
+        The robot; six or seven revolute joints.
+    T
+        Poses of the tool in the world, shape (..., 4, 4).
+    threads
+        How many threads share the check.
+
+    Returns
+    -------
+    IKSolutions
+        Branches ``"solution 1"`` ... ``"solution B"``, B the largest number found for a pose of the batch and at least
+        1. They are ordered by their joint values, the first joint's first: the same number at another pose need not
+        be the same way to reach. Singular branches are not flagged. ``distance`` is NaN where nothing was found:
+        how far it is is not known.
+
+    Raises
+    ------
+    ModelError
+        The arm has prismatic joints, or not six or seven, or ssik is not installed.
+    ValueError, TypeError
+        T has not shape (..., 4, 4), ``threads`` is below 1.
+    """
+    check_threads(threads)
+    poses = pose_rows(T)
+    solver = _solver(description)
+    posed = are_poses(poses)
+    goals, n = orthonormal(poses[posed]), description.n
+    found = [_solutions(solver, goal, n) for goal in goals @ _tool_axes(description)]
+    counts = np.array([len(q) for q in found], dtype=int)
+    owner = np.repeat(np.flatnonzero(posed), counts)
+    q = np.concatenate([np.empty((0, n)), *found])
+    q, closed = _polished(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0), threads)
+    table = _ordered(q[closed], owner[closed], posed.size)
+    B = table.shape[1]
+    return collect(
+        description,
+        table.reshape(*poses.shape[:-2], B, n),
+        np.full(posed.shape, np.nan),
+        posed=posed,
+        branches=tuple(f"solution {k + 1}" for k in range(B)),
+        met=ALL,
+    )
+
+
+@lru_cache(maxsize=64)
+def _solver(description: Description) -> Any:
+    """Return ssik's ``Manipulator`` for an arm, prepared."""
+    words = f"{description.name} is {classify(description).words}"
+    if description.numbers.prismatic.any() or description.n not in (6, 7):
+        raise ModelError(f"{words}; ik_numeric solves any arm")
+    try:
+        import ssik
+    except ImportError:
+        message = f"{words}; `pip install dhkit[ik]` brings ssik, which finds its solutions; ik_numeric solves any arm"
+        raise ModelError(message) from None
+    log.info("preparing ssik for %s, which may take a minute the first time", description.name)
+    axes = Axes.of(description)
+    # From the world to the first axis, from axis to axis, from the last to the tool: ssik's P, with H the directions.
+    offsets = np.diff(axes.points, axis=0, prepend=0.0, append=axes.T_world_tool[None, :3, 3])
+    solver = ssik.Manipulator.from_axes(axes.directions, offsets)
+    solver.prepare()
+    return solver
+
+
+def _tool_axes(description: Description) -> Array:
+    """Return what turns our tool into ssik's, whose axes are the world's where all joint values are 0, (4, 4)."""
+    turn = np.eye(4)
+    turn[:3, :3] = Axes.of(description).T_world_tool[:3, :3].T
+    return turn
+
+
+def _solutions(solver: Any, goal: Array, n: int) -> Array:
+    """Return what ssik finds for one pose, limits or not, shape (K, n)."""
+    try:
+        with np.errstate(all="ignore"):
+            found = solver.solve(goal, respect_limits=False)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        log.warning("ssik failed at a pose, which counts as not reached: %s", error)
+        found = []
+    return np.array([solution.q for solution in found], dtype=float).reshape(-1, n)
+
+
+def _polished(description: Description, q: Array, goals: Array, threads: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return joint values (K, n) with angles in (-pi, pi] after some steps of Newton, and which of them close."""
+    newton = Newton.of(description, position_only=False, limits=False, threads=threads)
+    with np.errstate(all="ignore"):
+        q, error = descend(newton, goals, q, EXACT)
+    return wrapped(q, ~description.numbers.prismatic), closes(error, CLOSES)
+
+
+def _ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
+    """Return solutions (K, n) of the poses that own them as a table (poses, B, n), NaN where there are no more."""
+    counts = np.bincount(owner, minlength=poses)
+    order = np.lexsort([*np.rint(q.T / SAME)[::-1], owner])
+    place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table = np.full((poses, max(1, int(counts.max(initial=0))), q.shape[1]), np.nan)
+    table[owner[order], place] = q[order]
+    return table

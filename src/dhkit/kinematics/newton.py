@@ -1,0 +1,129 @@
+"""One damped Newton step towards a pose, inside the joint limits: what iterative inverse kinematics repeat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Description
+from dhkit.kernels import kernel
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.forward import forward_kinematics
+from dhkit.kinematics.jacobian import jacobian
+from dhkit.symbolic import Graph
+
+__all__ = ["Newton"]
+
+TURN = 2 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Newton:
+    """Errors and steps of an arm: lengths are measured by the reach, so that metres and radians compare."""
+
+    description: Description
+    length: float
+    """What counts as much as a radian, m: the reach."""
+    size: int
+    """How many coordinates of a pose are to be met: 6, or 3 for the position alone."""
+    lower: Array
+    """Limits that are kept, shape (n,), rad and m."""
+    upper: Array
+    threads: int = 1
+
+    @classmethod
+    def of(cls, description: Description, *, position_only: bool, limits: bool, threads: int = 1) -> Newton:
+        """Return the steps of an arm."""
+        numbers, anywhere = description.numbers, np.full(description.n, np.inf)
+        return cls(
+            description,
+            length=Axes.of(description).scale,
+            size=3 if position_only else 6,
+            lower=numbers.lower if limits else -anywhere,
+            upper=numbers.upper if limits else anywhere,
+            threads=threads,
+        )
+
+    @property
+    def units(self) -> Array:
+        """What one step of a joint is measured by, shape (n,): rad, or m."""
+        return np.where(self.description.numbers.prismatic, self.length, 1.0)
+
+    @property
+    def endless(self) -> NDArray[np.bool_]:
+        """Joints that need not stop at a limit since a whole turn leads back inside, shape (n,)."""
+        endless: NDArray[np.bool_] = ~self.description.numbers.prismatic & (self.upper - self.lower >= TURN)
+        return endless
+
+    @property
+    def middle(self) -> Array:
+        """The middle of the limits, 0 where there are none, shape (n,)."""
+        lower, upper = self.ranges(0.0)
+        return (lower + upper) / 2
+
+    def ranges(self, room: Array | float) -> tuple[Array, Array]:
+        """Return the limits, shape (n,) each; without limits a joint goes as far as ``room`` to both sides."""
+        limited = np.isfinite(self.upper - self.lower)
+        return np.where(limited, self.lower, -np.asarray(room)), np.where(limited, self.upper, room)
+
+    def inside(self, q: Array) -> Array:
+        """Return joint values (..., n) moved into the limits: by whole turns, or else to the nearest limit."""
+        outside = (q < self.lower) | (q > self.upper)
+        turns = np.where(self.description.numbers.prismatic, 0.0, TURN * np.rint((q - self.middle) / TURN))
+        return np.clip(np.where(outside, q - turns, q), self.lower, self.upper)
+
+    def error(self, q: Array, goals: Array) -> Array:
+        """Return what is missing from poses of the tool to goals.
+
+        Parameters
+        ----------
+        q
+            Shape (N, n).
+        goals
+            Poses, shape (N, 16), row by row.
+
+        Returns
+        -------
+        Array
+            Shape (N, 6) or (N, 3): the way to go over ``length``, then the rotation vector to turn by, rad, both in
+            world axes.
+        """
+        T = forward_kinematics(self.description, q, threads=self.threads).reshape(-1, 16)
+        error = np.empty((len(q), self.size))
+        run = kernel("pose_error", f"{self.size}", lambda: _error_program(self.size))
+        run(np.array([self.length]), [T, goals], [error], self.threads)
+        return error
+
+    def step(self, q: Array, error: Array, damping: Array) -> Array:
+        """Return the joint values after one step, inside the limits.
+
+        Parameters
+        ----------
+        q
+            Shape (N, n), inside the limits.
+        error
+            Shape (N, 6) or (N, 3), as of :meth:`error`.
+        damping
+            What is added to the squares of the Jacobian's singular values, positive, shape (N,).
+        """
+        n = self.description.n
+        J = jacobian(self.description, q, threads=self.threads).reshape(-1, 6 * n)
+        new = np.empty_like(q)
+        run = kernel("newton_step", f"{n} {self.size}", lambda: _step_program(n, self.size))
+        parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
+        run(parameters, [q, error, J, damping[:, None]], [new], self.threads)
+        return new
+
+
+def _error_program(size: int) -> Graph:
+    from dhkit.kinematics.newton_program import error_program
+
+    return error_program(size)
+
+
+def _step_program(n: int, size: int) -> Graph:
+    from dhkit.kinematics.newton_program import step_program
+
+    return step_program(n, size)

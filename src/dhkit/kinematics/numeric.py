@@ -1,0 +1,323 @@
+"""Inverse kinematics of any arm by iteration: damped Newton steps from several starts, a batch at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.kinematics.batches import check_threads
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
+from dhkit.kinematics.closed_form.family import ALL
+from dhkit.kinematics.forward import forward_kinematics
+from dhkit.kinematics.inverse import pose_rows
+from dhkit.kinematics.newton import Newton
+from dhkit.kinematics.solutions import IKSolutions
+
+__all__ = ["solve_numerically"]
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with how many poses are done and how many there are."""
+
+CHUNK = 8_192
+"""Searches that run side by side: what they work on takes about 5 MB."""
+CANDIDATES = 512
+"""Random joint values at least among which starts are looked for."""
+SMOOTH = 1e-2
+"""Squared error, (rad, share of the reach)^2, below which steps are taken without asking whether they help: along a
+curved valley Newton's method gets worse before it gets better."""
+PROGRESS = 0.7
+"""A search gets on as long as its squared error falls below this share of what it was ..."""
+PATIENCE = 10
+"""... in so many steps."""
+LEAST, EASIER, HARDER = 1e-4, 0.25, 4.0
+"""Damping over the squared error: its least value, and what a step that helps and one that does not change it by."""
+ROUNDING = 1e-13
+"""Damping that is always there, for Jacobians without full rank."""
+
+
+def solve_numerically(
+    description: Description,
+    T: ArrayLike,
+    q0: ArrayLike | None = None,
+    *,
+    position_only: bool = False,
+    restarts: int = 63,
+    tolerance: float = 1e-12,
+    seed: int = 0,
+    limits: bool = True,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> IKSolutions:
+    """Return one solution of T_world_tool(q) = T for each pose, by iteration, for any arm.
+
+    Newton's method with Levenberg's damping, which is in proportion to the squared error, so that the last steps are
+    undamped and converge quadratically, for redundant arms too (Yamashita and Fukushima 2001, On the rate of
+    convergence of the Levenberg-Marquardt method; Sugihara 2011, Solvability-unconcerned inverse kinematics by the
+    Levenberg-Marquardt method). A pose whose search gets stuck is searched for again from random joint values, those
+    whose pose is nearest to it first, twice as many each time; of solutions found together the one nearest to the
+    first start is returned. What is found for a pose does not depend on the other poses.
+
+    Parameters
+    ----------
+    description
+        The robot: any joints, any number of them.
+    T
+        Poses of the tool in the world, shape (..., 4, 4).
+    q0
+        Where to start, shape (n,) or (..., n), rad and m; moved into the limits. None, and rows that are not finite:
+        the middle of the limits, 0 where there are none.
+    position_only
+        Whether the tool's position alone is to be met. Otherwise the whole pose is, by arms of fewer than six joints
+        too: a pose that such an arm does not meet in full is out of its reach.
+    restarts
+        How many more starts a pose is given at most.
+    tolerance
+        What may be missing: of the position as a share of the reach, of the rotation in rad. Rounding allows about
+        1e-14.
+    seed
+        Of the random starts.
+    limits
+        Whether joints are kept inside their limits. Otherwise a flag says where they are not.
+    threads
+        How many threads share the kinematics of a large batch.
+    progress
+        Called after every few thousand poses; an exception in it ends the work.
+
+    Returns
+    -------
+    IKSolutions
+        One branch, ``"numeric"``. Angles of joints without limits are in (-pi, pi], all are with ``limits=False``;
+        others are inside their limits. Singular branches are not flagged. Where nothing was found ``distance`` is
+        what is missing of the position after the best search: 0 means that only the rotation is not met. It is no
+        proof that the pose is out of reach.
+
+    Raises
+    ------
+    ValueError
+        T has not shape (..., 4, 4); ``q0`` does not fit; ``restarts`` is negative, ``tolerance`` not positive or
+        ``threads`` below 1.
+    TypeError
+        T or ``q0`` is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> panda = library_robot("panda")
+    >>> q = np.array([0.1, -0.7, 0.2, -2.2, 0.1, 1.6, 0.8])
+    >>> found = solve_numerically(panda, forward_kinematics(panda, q), q0=q + 0.05)
+    >>> found.status, bool(abs(found.q[0] - q).max() < 0.1)
+    (array('ok', dtype='<U12'), True)
+    """
+    check_threads(threads)
+    if restarts < 0:
+        raise ValueError(f"restarts is {restarts}; expected 0 or more")
+    if not tolerance > 0:
+        raise ValueError(f"tolerance is {tolerance}; expected a positive number")
+    poses = pose_rows(T)
+    batch, n = poses.shape[:-2], description.n
+    newton = Newton.of(description, position_only=position_only, limits=limits, threads=threads)
+    starts = _first_starts(newton, q0, batch).reshape(-1, n)
+    posed = are_poses(poses)
+    q, distance = np.full((posed.size, n), np.nan), np.full(posed.size, np.nan)
+    search = Search(newton, tolerance, restarts, seed)
+    rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
+    for some in _chunks(len(rows), CHUNK):
+        with np.errstate(all="ignore"):
+            q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
+        if progress is not None:
+            progress(int(rows[some][-1]) + 1, posed.size)
+    return collect(
+        description,
+        wrapped(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
+        distance.reshape(batch),
+        posed=posed,
+        branches=("numeric",),
+        met=ALL[: newton.size],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """How one solution for each pose is looked for."""
+
+    newton: Newton
+    tolerance: float
+    restarts: int
+    seed: int
+
+    def __call__(self, goals: Array, first: Array) -> tuple[Array, Array]:
+        """Return joint values (N, n), NaN where none were found, and what is missing of the positions, m, (N,).
+
+        Parameters
+        ----------
+        goals
+            Poses, shape (N, 16).
+        first
+            The first start of each, shape (N, n).
+        """
+        q, error = descend(self.newton, goals, first, self.tolerance)
+        open_rows = np.flatnonzero(~closes(error, self.tolerance))
+        if len(open_rows) and self.restarts:
+            more = self._starts(goals[open_rows])
+            for begin, end in _doubling(self.restarts):
+                for some in _chunks(len(open_rows), max(1, CHUNK // (end - begin))):
+                    rows = open_rows[some]
+                    self._improve(q, error, rows, goals[rows], first[rows], more[some, begin:end])
+                left = ~closes(error[open_rows], self.tolerance)
+                open_rows, more = open_rows[left], more[left]
+        self._polish(q, error, goals)
+        q[~closes(error, self.tolerance)] = np.nan
+        return q, self.newton.length * np.linalg.norm(error[:, :3], axis=1)
+
+    def _polish(self, q: Array, error: Array, goals: Array) -> None:
+        """Take one more step where that helps: it squares what is missing, down to rounding."""
+        last = self.newton.step(q, error, np.full(len(q), ROUNDING))
+        last_error = self.newton.error(last, goals)
+        helps = np.sum(last_error**2, axis=1) < np.sum(error**2, axis=1)
+        q[helps], error[helps] = last[helps], last_error[helps]
+
+    def _starts(self, goals: Array) -> Array:
+        """Return random joint values whose poses are near the goals, nearest first, shape (N, restarts, n)."""
+        newton = self.newton
+        lower, upper = newton.ranges(np.where(newton.description.numbers.prismatic, newton.length, np.pi))
+        draws = np.random.default_rng(self.seed).random((max(CANDIDATES, self.restarts), newton.description.n))
+        q = lower + (upper - lower) * draws
+        theirs = self._coordinates(forward_kinematics(newton.description, q).reshape(-1, 16))
+        # |a - b|^2 = a a - 2 a b + b b, of which a a orders nothing.
+        gaps = np.sum(theirs**2, axis=1) - 2 * self._coordinates(goals) @ theirs.T
+        nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
+        order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
+        starts: Array = q[np.take_along_axis(nearest, order, axis=1)]
+        return starts
+
+    def _coordinates(self, poses: Array) -> Array:
+        """Return points whose distances are those of poses (N, 16): lengths over the reach, angles up to a cube."""
+        rows = poses.reshape(-1, 4, 4)[:, :3]
+        position = rows[:, :, 3] / self.newton.length
+        if self.newton.size == 3:
+            return position
+        # Rotations an angle t apart differ by sqrt(8) sin(t / 2) in the root of their entries' squared differences.
+        return np.concatenate([position, rows[:, :, :3].reshape(-1, 9) / np.sqrt(2)], axis=1)
+
+    def _improve(
+        self, q: Array, error: Array, rows: NDArray[np.intp], goals: Array, first: Array, starts: Array
+    ) -> None:
+        """Search from starts (M, k, n) and put what is better into rows of ``q`` and ``error``."""
+        count, k, n = starts.shape
+        many = np.ascontiguousarray(starts.reshape(-1, n))
+        found, misses = descend(self.newton, np.repeat(goals, k, axis=0), many, self.tolerance)
+        found, misses = found.reshape(count, k, n), misses.reshape(count, k, -1)
+        closed = closes(misses, self.tolerance)
+        moved = np.sum(((found - first[:, None]) / self.newton.units) ** 2, axis=-1)
+        # Any that closes is better than any that does not.
+        rank = np.where(closed, -1 / (1 + moved), np.sum(misses**2, axis=-1))
+        best = np.argmin(rank, axis=1)
+        better = closed.any(axis=1) | (rank.min(axis=1) < np.sum(error[rows] ** 2, axis=-1))
+        chosen = (np.flatnonzero(better), best[better])
+        q[rows[better]], error[rows[better]] = found[chosen], misses[chosen]
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Searches that are under way; N rows."""
+
+    row: NDArray[np.intp]
+    """Where each came from."""
+    goals: Array
+    q: Array
+    error: Array
+    cost: Array
+    """The squared error."""
+    damping: Array
+    """Over the squared error."""
+    mark: Array
+    """The squared error that has last been got down to ..."""
+    waited: NDArray[np.intp]
+    """... and the steps since."""
+
+    @classmethod
+    def start(cls, newton: Newton, goals: Array, q: Array) -> Descent:
+        """Begin at q, shape (N, n)."""
+        error, N = newton.error(q, goals), len(q)
+        cost = np.sum(error**2, axis=1)
+        return cls(np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp))
+
+    def kept(self, keep: NDArray[np.bool_]) -> Descent:
+        """Return some of the searches."""
+        return self if keep.all() else Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
+
+    def stepped(self, newton: Newton) -> Descent:
+        """Take a step, or where it does not help raise the damping."""
+        q = newton.step(self.q, self.error, self.damping * self.cost + ROUNDING)
+        error = newton.error(q, self.goals)
+        cost = np.sum(error**2, axis=1)
+        helps = cost < self.cost
+        taken = helps | (np.maximum(cost, self.cost) < SMOOTH)
+        cost = np.where(taken, cost, self.cost)
+        gets_on = cost < PROGRESS * self.mark
+        eased = np.maximum(self.damping * EASIER, LEAST)
+        return Descent(
+            self.row,
+            self.goals,
+            np.where(taken[:, None], q, self.q),
+            np.where(taken[:, None], error, self.error),
+            cost,
+            np.where(helps, eased, np.where(taken, self.damping, self.damping * HARDER)),
+            np.where(gets_on, cost, self.mark),
+            np.where(gets_on, 0, self.waited + 1),
+        )
+
+
+def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
+    """Search for poses (N, 16) from q (N, n) until all are met or stuck; return joint values and errors."""
+    last_q, last_error = np.empty_like(q), np.empty((len(q), newton.size))
+    searches = Descent.start(newton, goals, q)
+    while len(searches.row):
+        over = closes(searches.error, tolerance) | (searches.waited >= PATIENCE)
+        last_q[searches.row[over]], last_error[searches.row[over]] = searches.q[over], searches.error[over]
+        searches = searches.kept(~over)
+        if len(searches.row):
+            searches = searches.stepped(newton)
+    return last_q, last_error
+
+
+def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Return which errors (..., 6) or (..., 3) are within the tolerance, position and rotation each."""
+    squares = error**2
+    position, rotation = squares[..., :3].sum(axis=-1), squares[..., 3:].sum(axis=-1)
+    within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
+    return within
+
+
+def _first_starts(newton: Newton, q0: ArrayLike | None, batch: tuple[int, ...]) -> Array:
+    """Return the joint values to start from, inside the limits, shape (..., n)."""
+    description = newton.description
+    if q0 is None:
+        return np.broadcast_to(newton.middle, (*batch, description.n))
+    given = joint_array(description, q0, "q0")
+    try:
+        given = np.broadcast_to(given, (*batch, description.n))
+    except ValueError:
+        expected = f"({description.n},) or {(*batch, description.n)}"
+        raise ValueError(f"q0 has shape {given.shape}; expected {expected}") from None
+    finite = np.isfinite(given).all(axis=-1, keepdims=True)
+    return newton.inside(np.where(finite, given, newton.middle))
+
+
+def _doubling(count: int) -> Iterator[tuple[int, int]]:
+    """Yield 0, 1; 1, 3; 3, 7 ... up to a count."""
+    begin = 0
+    while begin < count:
+        end = min(2 * begin + 1, count)
+        yield begin, end
+        begin = end
+
+
+def _chunks(count: int, size: int) -> Iterator[slice]:
+    for begin in range(0, count, size):
+        yield slice(begin, min(begin + size, count))

@@ -1,0 +1,307 @@
+"""Singular configurations in closed form: where the determinant of the Jacobian, a product, has a factor that is 0.
+
+For six joints with a spherical wrist on two parallel axes it is
+
+    abs(det J) = L2 L3 abs(sin(elbow)) abs(x) abs(sin(wrist)),
+
+x being the wrist centre's distance from axis 1 along the arm's plane: only the first three joints move the wrist centre
+(Siciliano et al., Robotics, 2009, section 3.3). It holds for an arm of the UR family too, with x that of the point
+where axes 5 and 6 meet: in the plane, joints 2, 3 and 4 move that point by velocities that differ by those of two
+links, and the axes 2, 5 and 6 turn the tool as a wrist does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array, world_to_tool
+from dhkit.errors import ModelError
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import Fit
+from dhkit.kinematics.singular_factors import Factor, Kind, Link, Side, Slide, Turn
+
+__all__ = ["Singularities", "determinant", "measures", "singular_configurations", "singularities"]
+
+BATCH, BATCHES = 256, 64
+"""Random states tried at once, and how often, until enough are singular inside the limits."""
+STRETCHED = ("stretched", "folded")
+
+
+@dataclass(frozen=True, eq=False)
+class Singularities:
+    """Where an arm is singular; as text, one line for each kind."""
+
+    kinds: tuple[Kind, ...]
+    """What they are called: shoulder, elbow, wrist, as in :class:`dhkit.kinematics.IKFlag`."""
+    factors: tuple[Factor, ...]
+    """Those of the determinant, one for each kind."""
+    point: str
+    """What the shoulder's words are about, such as the wrist centre."""
+    task: Array
+    """The twists that the arm controls: rows, in the tool's axes, that make its Jacobian square, shape (n, 6).
+
+    They are all six for a six-joint arm, the velocity for a turntable with two joints.
+    """
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Where each kind is, such as ``q5 = 0° or 180°: axes 4 and 6 coincide``."""
+        return {factor.kind: factor.words(self.point) for factor in self.factors}
+
+    @property
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """The singular values of the one joint that a kind is about, rad or m; none for the shoulder.
+
+        Angles are in (-pi, pi]; an elbow's first one stretches the arm, the second folds it.
+        """
+        return {factor.kind: factor.values for factor in self.factors}
+
+    @property
+    def joints(self) -> dict[str, int | None]:
+        """The joint, from 0, whose :attr:`values` these are."""
+        return {factor.kind: None if isinstance(factor, Side) else factor.joint for factor in self.factors}
+
+    def __str__(self) -> str:
+        return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
+
+
+@lru_cache(maxsize=512)
+def singularities(description: Description) -> Singularities:
+    """Return where an arm is singular, in closed form.
+
+    Raises
+    ------
+    ModelError
+        It is not known for this arm: says what its axes are like and what to use.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> print(singularities(library_robot("irb140")))
+    shoulder: the wrist centre is on axis 1: 0.07 + 0.36 cos q2 - 0.38 sin(q2 + q3) = 0
+    elbow: q3 = -90° (stretched) or 90° (folded)
+    wrist: q5 = 0° or 180°: axes 4 and 6 coincide
+    """
+    found = classify(description)
+    build = None if found.family is None else BUILDERS.get(found.family.name)
+    if build is None or found.fit is None:
+        raise ModelError(
+            f"{description.name} is {found.words}; its singularities are not known in closed form: manipulability and"
+            " singular_values find them numerically"
+        )
+    factors, point, task = build(found.fit)
+    rotation = world_to_tool(description, np.zeros(description.n))[:3, :3]
+    rows = task @ np.kron(np.eye(2), _parameters(found.fit)["T_plane_world"][:, :3] @ rotation)
+    rows.flags.writeable = False
+    return Singularities(tuple(factor.kind for factor in factors), factors, point, rows)
+
+
+def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
+    """Return how far joint values are from each kind of singularity: 0 on it, without unit.
+
+    They are abs(sin) of the elbow's and the wrist's angle, and abs(x) over the reach for the shoulder and for a slide.
+    Inverse kinematics flag a branch where one is below 1e-6.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    dict
+        For each of :attr:`Singularities.kinds` an array of shape (...).
+
+    Raises
+    ------
+    ModelError
+        See :func:`singularities`.
+    ValueError
+        q has not shape (..., n).
+    """
+    q = joint_array(description, q)
+    return {factor.kind: factor.measure(q) for factor in singularities(description).factors}
+
+
+def determinant(description: Description, q: ArrayLike) -> Array:
+    """Return abs(det J) as the product of its factors, shape (...), for joint values (..., n).
+
+    J is the Jacobian, or for an arm of fewer than six joints ``task @ jacobian(description, q, "tool")``: see
+    :attr:`Singularities.task`. SI; raises as :func:`measures` does.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> round(float(determinant(library_robot("planar2r"), [0.3, np.pi / 2])), 6)  # 0.5 m and 0.4 m long
+    0.2
+    """
+    q = joint_array(description, q)
+    product = np.ones(q.shape[:-1])
+    for factor in singularities(description).factors:
+        product = product * (factor.size * factor.measure(q))
+    return product
+
+
+def singular_configurations(description: Description, kind: str, count: int, seed: int = 0) -> Array:
+    """Return random joint values at one kind of singularity, inside the joint limits where there are such.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    kind
+        One of its :attr:`Singularities.kinds`.
+    count
+        How many.
+    seed
+        Of the other joints' values, which are uniform inside limits, over a full turn without limits, and over twice
+        the reach to both sides for a slide without. For the shoulder joint 2 is solved for.
+
+    Returns
+    -------
+    Array
+        Shape (count, n), rad and m.
+
+    Raises
+    ------
+    ModelError
+        See :func:`singularities`; or the arm has no such singularity.
+    ValueError
+        Another kind.
+    """
+    factor = _factor(description, kind)
+    lower, upper = _ranges(description)
+    rng = np.random.default_rng(seed)
+    inside, outside = [np.empty((0, description.n))], [np.empty((0, description.n))]
+    for batch in range(BATCHES):
+        limited = batch < BATCHES / 2 or bool(sum(map(len, inside)))
+        low, high = (lower, upper) if limited else (-_room(description), _room(description))
+        drawn = low + (high - low) * rng.random((max(BATCH, count), description.n))
+        met = factor.met(drawn, lower, upper, rng)
+        met = met[np.isfinite(met).all(axis=1)]
+        within = ((met >= lower) & (met <= upper)).all(axis=1)
+        inside.append(met[within])
+        outside.append(met[~within])
+        if sum(map(len, inside)) >= count:
+            break
+    found: Array = np.concatenate([*inside, *outside])[:count]
+    if len(found) < count:
+        where = singularities(description).words[kind]
+        raise ModelError(f"{description.name}: found {len(found)} of {count} {kind} singularities ({where})")
+    return found
+
+
+def _factor(description: Description, kind: str) -> Factor:
+    for factor in singularities(description).factors:
+        if factor.kind == kind:
+            return factor
+    known = ", ".join(map(repr, singularities(description).kinds))
+    raise ValueError(f"kind is {kind!r}; {description.name} has {known}")
+
+
+def _ranges(description: Description) -> tuple[Array, Array]:
+    numbers = description.numbers
+    room = _room(description)
+    lower = np.where(np.isfinite(numbers.lower), numbers.lower, -room)
+    return lower, np.where(np.isfinite(numbers.upper), numbers.upper, room)
+
+
+def _room(description: Description) -> Array:
+    """Return how far joints without limits are moved to both sides, shape (n,): a slide to where any turntable ends."""
+    return np.where(description.numbers.prismatic, 2 * (description.reach or 1.0), np.pi)
+
+
+# How the families' parameters (closed_form) make up factors. A task is given in the axes x, u, v of the arm's plane.
+
+Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
+WHOLE, VELOCITY, TURNING_TOO = np.eye(6), np.eye(6)[:3], np.eye(6)[[0, 1, 2, 5]]
+
+
+def _elbow_wrist(fit: Fit) -> Parts:
+    p = _parameters(fit)
+    return (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", WHOLE
+
+
+def _slide_wrist(fit: Fit) -> Parts:
+    p = _parameters(fit)
+    boom, length = complex(*p["boom"]), complex(p["start"], p["lift"])
+    side = _side(p, (Link(boom, slide=2), Link(boom * length)))
+    return (side, _slide(p, 2), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", WHOLE
+
+
+def _three_parallel(fit: Fit) -> Parts:
+    p = _parameters(fit)
+    factors = _side(p, (*_links(p), _lever(p))), _elbow(p), _wrist(p, "axis 6 is parallel to axes 2, 3 and 4")
+    return factors, "the point where axes 5 and 6 meet", WHOLE
+
+
+def _yaw_two(fit: Fit) -> Parts:
+    p = _parameters(fit)
+    return (_side(p, _links(p)), _elbow(p)), "the tool", VELOCITY
+
+
+def _yaw_three(fit: Fit) -> Parts:
+    p = _parameters(fit)
+    return (_side(p, (*_links(p), _lever(p))), _elbow(p)), "the tool", TURNING_TOO
+
+
+def _parallel_chain(fit: Fit) -> Parts:
+    p, kinds = _parameters(fit), fit.structure
+    second = [i for i, letter in enumerate(kinds) if letter == "R"][1]
+    rows = [0, 1, *([2] if "P" in kinds else []), *([5] if kinds.count("R") == 3 else [])]
+    return (_elbow(p, second, float(p["senses"][second])),), "the tool", np.eye(6)[rows]
+
+
+def _polar(fit: Fit) -> Parts:
+    return (_slide(_parameters(fit), 1),), "the tool", np.eye(6)[:2]
+
+
+BUILDERS: Mapping[str, Callable[[Fit], Parts]] = {
+    "elbow_wrist": _elbow_wrist,
+    "slide_wrist": _slide_wrist,
+    "three_parallel": _three_parallel,
+    "yaw_two": _yaw_two,
+    "yaw_three": _yaw_three,
+    "parallel_chain": _parallel_chain,
+    "polar": _polar,
+}
+"""By the family's name."""
+
+
+def _parameters(fit: Fit) -> dict[str, Array]:
+    return {name: np.asarray(value, dtype=float) for name, value in fit.parameters.items()}
+
+
+def _links(p: Mapping[str, Array]) -> tuple[Link, Link]:
+    upper, bend = complex(*p["upper"]), complex(*p["bend"])
+    return Link(float(p["L2"]) * upper), Link(float(p["L3"]) * upper * bend, (float(p["sense3"]),))
+
+
+def _lever(p: Mapping[str, Array]) -> Link:
+    return Link(complex(*p["lever"]), (float(p["sense3"]), float(p["sense4"])))
+
+
+def _side(p: Mapping[str, Array], links: tuple[Link, ...]) -> Side:
+    return Side(float(p["a1"]), links, float(p["offset"]), float(p["reach"]))
+
+
+def _elbow(p: Mapping[str, Array], joint: int = 2, sense: float | None = None) -> Turn:
+    sense = float(p["sense3"]) if sense is None else sense
+    size = float(p["L2"] * p["L3"])
+    return Turn("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, STRETCHED)
+
+
+def _wrist(p: Mapping[str, Array], words: str) -> Turn:
+    return Turn("wrist", 4, 1.0, float(np.angle(complex(*p["wrist"]))), 1.0, (words, words))
+
+
+def _slide(p: Mapping[str, Array], joint: int) -> Slide:
+    return Slide(joint, float(p["start"]), abs(float(p["lift"])), float(p["reach"]))
