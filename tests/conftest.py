@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 import acceptance
 from acceptance import pytest_collection_modifyitems  # noqa: F401 - a pytest hook
@@ -23,6 +23,8 @@ settings.register_profile(
     derandomize=not acceptance.ACCEPTING,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
     print_blob=True,
+    # Without "explain": its tracing makes compiling kernels ten times slower.
+    phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.target, Phase.shrink),
 )
 settings.load_profile("dhkit")
 

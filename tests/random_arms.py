@@ -68,6 +68,86 @@ def random_drive(rng: np.random.Generator) -> Drive:
     return Drive(exact(float(rng.uniform(-70, 70)) or 1.0), exact(float(rng.uniform(0, 2e-4))))
 
 
+# Arms whose inverse kinematics have a closed form.
+
+signed = st.sampled_from([-1, 1])
+link = st.one_of(st.floats(0.05, 1.0), st.just(0.3)).map(lambda x: round(x, 6))
+shift = st.one_of(st.just(0.0), st.floats(-0.5, 0.5).map(lambda x: round(x, 6)))
+turn = st.one_of(st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi]), st.floats(-3.1, 3.1))
+
+
+@st.composite
+def placed(draw, arm):
+    for change in (with_base, with_tool):
+        if draw(st.booleans()):
+            xyz = [draw(shift) for _ in range(3)]
+            arm = change(arm, pose(xyz, euler=[draw(turn) for _ in range(3)]))
+    return arm
+
+
+@st.composite
+def elbow_arms(draw):
+    """Draw an arm of the PUMA's family: twists of any signs, offsets, either convention."""
+    right = [draw(signed) * np.pi / 2 for _ in range(4)]
+    a1, a3, d1, d2, d3, d6 = (draw(shift) for _ in range(6))
+    a2, d4 = draw(signed) * draw(link), draw(signed) * draw(link)
+    theta = [draw(turn) for _ in range(6)]
+    flat = draw(st.sampled_from([0.0, np.pi]))
+    last = draw(turn)
+    if draw(st.booleans()):
+        alpha, a, d = [right[0], flat, *right[1:], last], [a1, a2, a3, 0, 0, draw(shift)], [d1, d2, d3, d4, 0, d6]
+        arm = from_dh(list(zip(theta, d, a, alpha, strict=True)))
+    else:
+        alpha, a, d = [0, right[0], flat, *right[1:]], [0, a1, a2, a3, 0, 0], [d1, d2, d3, d4, 0, d6]
+        arm = from_dh(list(zip(theta, d, a, alpha, strict=True)), convention="modified")
+    return draw(placed(arm))
+
+
+@st.composite
+def three_parallel_arms(draw):
+    """Draw an arm of the UR's family."""
+    right = [draw(signed) * np.pi / 2 for _ in range(3)]
+    flat = [draw(st.sampled_from([0.0, np.pi])) for _ in range(2)]
+    a1, d1, d2, d3, d4, d5, d6 = (draw(shift) for _ in range(7))
+    a = [a1, draw(signed) * draw(link), draw(signed) * draw(link), 0, 0, draw(shift)]
+    theta = [draw(turn) for _ in range(6)]
+    alpha = [right[0], *flat, right[1], right[2], draw(turn)]
+    return draw(placed(from_dh(list(zip(theta, [d1, d2, d3, d4, d5, d6], a, alpha, strict=True)))))
+
+
+@st.composite
+def slide_arms(draw):
+    """Draw an arm of the Stanford's family."""
+    right = [draw(signed) * np.pi / 2 for _ in range(4)]
+    a = [draw(shift), draw(shift), draw(shift), 0, 0, draw(shift)]
+    d = [draw(shift), draw(shift), 0, draw(shift), 0, draw(shift)]
+    theta = [draw(turn) for _ in range(6)]
+    alpha = [right[0], right[1], draw(st.sampled_from([0.0, np.pi])), right[2], right[3], draw(turn)]
+    return draw(placed(from_dh(list(zip(theta, d, a, alpha, strict=True)), kinds="RRPRRR")))
+
+
+@st.composite
+def few_joint_arms(draw):
+    """Draw a planar arm, a SCARA, a turret, or one with a slide."""
+    kinds = draw(st.sampled_from(["RR", "RRR", "RRPR", "RRRP", "PRRR", "turret2", "turret3", "pan", "RP", "PR"]))
+    flats = [draw(st.sampled_from([0.0, np.pi])) for _ in range(4)]
+    right = draw(signed) * np.pi / 2
+    lengths = [draw(signed) * draw(link) for _ in range(4)]
+    theta, d = [draw(turn) for _ in range(4)], [draw(shift) for _ in range(4)]
+    if kinds in ("turret2", "turret3", "pan"):
+        n = {"turret2": 3, "turret3": 4, "pan": 2}[kinds]
+        rows = [
+            (theta[i], d[i], draw(shift) if i == 0 else lengths[i], right if i == 0 else flats[i]) for i in range(n)
+        ]
+        return draw(placed(from_dh(rows)))
+    if kinds in ("RP", "PR"):
+        rows = [(theta[0], d[0], 0.0 if kinds == "RP" else draw(shift), right), (theta[1], d[1], lengths[1], flats[0])]
+        return draw(placed(from_dh(rows, kinds=kinds)))
+    # A slide's length keeps the axes around it apart, or there would be two coincident ones.
+    rows = [(theta[i], d[i], lengths[i], flats[i]) for i in range(len(kinds))]
+    return draw(placed(from_dh(rows, kinds=kinds)))
+
+
 def states(arm: Description, count: int, seed: int = 0) -> np.ndarray:
     """Return joint values, shape (count, n)."""
     return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, arm.n))

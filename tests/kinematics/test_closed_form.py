@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from hypothesis import assume, given
-from hypothesis import strategies as st
-from ik_checks import FAMILY_A, FEW_JOINTS, SIX_JOINTS, closure, gaps, measures
 
-from dhkit.description import from_dh, library_robot, pose, with_base, with_tool, world_to_tool
+from dhkit.description import library_robot, world_to_tool
 from dhkit.kinematics import IKFlag, classify, forward_kinematics, inverse_kinematics
 from dhkit.kinematics.closed_form.classify import FAMILIES
+from dhkit.kinematics.singularities import singular_configurations
 from dhkit.verification import random_states
+from ik_checks import FAMILY_A, FAMILY_B, FEW_JOINTS, SIX_JOINTS, closure, gaps, measures
+from random_arms import elbow_arms, few_joint_arms, slide_arms, three_parallel_arms
 
 CLOSES = 1e-12
 """Of family a, lengths over the reach."""
@@ -74,6 +75,50 @@ def test_the_original_is_among_the_branches_of_arms_of_few_joints(name, law):
     law.holds("the original among the branches", float(nearest.max()), FOUND, name)
 
 
+NEAR = 1e-7
+"""rad, or m over the reach: how near to a singularity."""
+UNSOLVED = 1e-4
+"""Share of poses of a UR at two singularities at once, of which rounding puts some out of reach."""
+
+
+@pytest.mark.parametrize("kind", ["shoulder", "elbow", "wrist"])
+@pytest.mark.parametrize("name", SIX_JOINTS)
+def test_every_branch_closes_at_singularities_and_is_flagged(name, kind, law):
+    arm = library_robot(name)
+    total = law.samples(100_000)
+    rng = np.random.default_rng(7)
+    for start in range(0, total, CHUNK):
+        count = min(CHUNK, total - start)
+        q = singular_configurations(arm, kind, count, seed=start)
+        for size in (0.0, NEAR / 6):  # six joints together then miss the singularity by at most NEAR
+            near = q + size * rng.uniform(-1, 1, q.shape)
+            if kind != "shoulder":
+                assert measures(arm, near)[kind].max() < 2 * NEAR
+            T = forward_kinematics(arm, near)
+            for seed in (None, near):
+                solutions = inverse_kinematics(arm, T, seed=seed)
+                law.holds("closure at a singularity", closure(arm, solutions, T), required(name), (name, kind))
+                flagged = (solutions.valid & (solutions.flags & IKFlag[kind] > 0)).any(axis=-1)
+                unsolved = ~solutions.valid.any(axis=-1)
+                allowed = UNSOLVED if name in FAMILY_B else 0.0
+                law.holds("share not solved at a singularity", unsolved.mean(), allowed, (name, kind))
+                law.holds("share not flagged at a singularity", (~flagged).mean(), 2 * allowed, (name, kind))
+
+
+@pytest.mark.parametrize("name", SIX_JOINTS)
+def test_the_free_joint_of_a_straight_wrist_comes_from_the_seed_or_is_zero(name):
+    arm = library_robot(name)
+    free = classify(arm).fit.free
+    q = singular_configurations(arm, "wrist", 500, seed=3)
+    q = q[np.min([value for key, value in measures(arm, q).items() if key != "wrist"], axis=0) > 0.05]
+    T = forward_kinematics(arm, q)
+    with_seed = inverse_kinematics(arm, T, seed=q)
+    assert np.nanmin(gaps(arm, with_seed.q, q[:, None]), axis=-1).max() < 1e-9
+    angles = np.abs(inverse_kinematics(arm, T).q[..., free])
+    if name not in FAMILY_B:  # there the angle decides what is in reach
+        assert (np.nanmin(np.minimum(angles, np.abs(angles - np.pi)), axis=-1) < 1e-12).all()
+
+
 @pytest.mark.parametrize("name", FEW_JOINTS)
 def test_what_is_met_is_met(name):
     """Position always (a direction for pan and tilt), yaw or pitch where a fourth joint allows it."""
@@ -105,84 +150,6 @@ def test_pan_and_tilt_aim_at_points_at_any_distance():
     far = near.copy()
     far[:3, 3] = np.array([0, 0, 0.08]) + 30 * (near[:3, 3] - [0, 0, 0.08])
     assert gaps(arm, inverse_kinematics(arm, far).q, np.array([0.7, -0.4])).min() < 1e-12
-
-
-# Families from random geometry. Kernels are parametric: no compilation per example.
-
-signed = st.sampled_from([-1, 1])
-length = st.one_of(st.floats(0.05, 1.0), st.just(0.3)).map(lambda x: round(x, 6))
-offset = st.one_of(st.just(0.0), st.floats(-0.5, 0.5).map(lambda x: round(x, 6)))
-turn = st.one_of(st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi]), st.floats(-3.1, 3.1))
-
-
-@st.composite
-def placed(draw, arm):
-    for change in (with_base, with_tool):
-        if draw(st.booleans()):
-            xyz = [draw(offset) for _ in range(3)]
-            arm = change(arm, pose(xyz, euler=[draw(turn) for _ in range(3)]))
-    return arm
-
-
-@st.composite
-def elbow_arms(draw):
-    """Draw an arm of the PUMA's family: twists of any signs, offsets, either convention."""
-    right = [draw(signed) * np.pi / 2 for _ in range(4)]
-    a1, a3, d1, d2, d3, d6 = (draw(offset) for _ in range(6))
-    a2, d4 = draw(signed) * draw(length), draw(signed) * draw(length)
-    theta = [draw(turn) for _ in range(6)]
-    flat = draw(st.sampled_from([0.0, np.pi]))
-    last = draw(turn)
-    if draw(st.booleans()):
-        alpha, a, d = [right[0], flat, *right[1:], last], [a1, a2, a3, 0, 0, draw(offset)], [d1, d2, d3, d4, 0, d6]
-        arm = from_dh(list(zip(theta, d, a, alpha, strict=True)))
-    else:
-        alpha, a, d = [0, right[0], flat, *right[1:]], [0, a1, a2, a3, 0, 0], [d1, d2, d3, d4, 0, d6]
-        arm = from_dh(list(zip(theta, d, a, alpha, strict=True)), convention="modified")
-    return draw(placed(arm))
-
-
-@st.composite
-def three_parallel_arms(draw):
-    """Draw an arm of the UR's family."""
-    right = [draw(signed) * np.pi / 2 for _ in range(3)]
-    flat = [draw(st.sampled_from([0.0, np.pi])) for _ in range(2)]
-    a1, d1, d2, d3, d4, d5, d6 = (draw(offset) for _ in range(7))
-    a = [a1, draw(signed) * draw(length), draw(signed) * draw(length), 0, 0, draw(offset)]
-    theta = [draw(turn) for _ in range(6)]
-    alpha = [right[0], *flat, right[1], right[2], draw(turn)]
-    return draw(placed(from_dh(list(zip(theta, [d1, d2, d3, d4, d5, d6], a, alpha, strict=True)))))
-
-
-@st.composite
-def slide_arms(draw):
-    """Draw an arm of the Stanford's family."""
-    right = [draw(signed) * np.pi / 2 for _ in range(4)]
-    a = [draw(offset), draw(offset), draw(offset), 0, 0, draw(offset)]
-    d = [draw(offset), draw(offset), 0, draw(offset), 0, draw(offset)]
-    theta = [draw(turn) for _ in range(6)]
-    alpha = [right[0], right[1], draw(st.sampled_from([0.0, np.pi])), right[2], right[3], draw(turn)]
-    return draw(placed(from_dh(list(zip(theta, d, a, alpha, strict=True)), kinds="RRPRRR")))
-
-
-@st.composite
-def few_joint_arms(draw):
-    """Draw a planar arm, a SCARA, a turret, or one with a slide."""
-    kinds = draw(st.sampled_from(["RR", "RRR", "RRPR", "RRRP", "PRRR", "turret2", "turret3", "pan", "RP", "PR"]))
-    flats = [draw(st.sampled_from([0.0, np.pi])) for _ in range(4)]
-    right = draw(signed) * np.pi / 2
-    lengths = [draw(signed) * draw(length) for _ in range(4)]
-    theta, d = [draw(turn) for _ in range(4)], [draw(offset) for _ in range(4)]
-    if kinds in ("turret2", "turret3", "pan"):
-        n = {"turret2": 3, "turret3": 4, "pan": 2}[kinds]
-        rows = [(theta[i], d[i], draw(offset) if i == 0 else lengths[i], right if i == 0 else flats[i]) for i in range(n)]
-        return draw(placed(from_dh(rows)))
-    if kinds in ("RP", "PR"):
-        rows = [(theta[0], d[0], 0.0 if kinds == "RP" else draw(offset), right), (theta[1], d[1], lengths[1], flats[0])]
-        return draw(placed(from_dh(rows, kinds=kinds)))
-    # A slide's length keeps the axes around it apart, or there would be two coincident ones.
-    rows = [(theta[i], d[i], lengths[i], flats[i]) for i in range(len(kinds))]
-    return draw(placed(from_dh(rows, kinds=kinds)))
 
 
 def check_family(law, arm, names, tolerance):

@@ -1,4 +1,4 @@
-"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, and what is said where it fails."""
+"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, what is said of failures."""
 
 import time
 
@@ -93,9 +93,10 @@ def test_it_is_one_of_the_closed_form_s_branches(name):
 
 
 @settings(max_examples=acceptance.sample_size(400))
-@given(tables(least=1, most=8))
-def test_any_arm_without_limits_is_solved_from_near_by(arm):
+@given(arm=tables(least=1, most=8))
+def test_any_arm_without_limits_is_solved_from_near_by(arm, monkeypatch):
     """Prismatic joints, few joints and many, any table: the pose is met, angles are in (-pi, pi]."""
+    monkeypatch.setenv("DHKIT_KERNELS", "off")  # compiling would take a second an arm
     q = states(arm, 3)
     T = forward_kinematics(arm, q)
     found = solve_numerically(arm, T, q + 1e-3, tolerance=1e-10, restarts=7)
@@ -107,7 +108,7 @@ def test_any_arm_without_limits_is_solved_from_near_by(arm):
     assert np.all((angles > -np.pi) & (angles <= np.pi))
 
 
-@pytest.mark.parametrize("name", ["puma560", "panda", "al5d", "ax12_arm", "planar3r", "jaco"])
+@pytest.mark.parametrize("name", ["puma560", "jaco", "al5d"])
 def test_position_only(name):
     arm = library_robot(name)
     _, T = inside(arm, 200, seed=5)

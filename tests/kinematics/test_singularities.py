@@ -18,8 +18,7 @@ from dhkit.kinematics.manipulability import freedoms, manipulability
 from dhkit.kinematics.singularities import determinant, measures, singular_configurations, singularities
 from dhkit.model import pinocchio_model
 from dhkit.verification import random_states
-from kinematics.test_closed_form import elbow_arms, few_joint_arms, slide_arms, three_parallel_arms
-from random_arms import states
+from random_arms import elbow_arms, few_joint_arms, slide_arms, states, three_parallel_arms
 
 PRODUCT = 1e-12  # of the determinant, as a share of its factors' sizes
 SINGULAR = 1e-12  # of a singular configuration's smallest singular value, as a share of the largest

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
+from dhkit.cli.arguments import joint_values
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.description import Array, Description, Joint, pose_parts, robots
-from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import parse
+from dhkit.kinematics import classify
 
 __all__ = ["forward", "list_robots", "show"]
 
@@ -48,7 +48,8 @@ def show(arm: Arm, json: bool) -> None:
     rows = [_joint_row(i, joint, description) for i, joint in enumerate(description.joints)]
     print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "assumed"), rows)
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
-    say(f"\ntotal mass {np.nansum(numbers.mass):.4g} kg{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
+    say(f"\ninverse kinematics: {arm.family}")
+    say(f"total mass {np.nansum(numbers.mass):.4g} kg{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
     for what, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
         if not np.array_equal(T, np.eye(4)):
             xyz, angles = pose_parts(T, degrees=True)
@@ -64,7 +65,7 @@ def show(arm: Arm, json: bool) -> None:
 
 def forward(arm: Arm, q: Sequence[str], *, degrees: bool, with_frames: bool, json: bool) -> None:
     """Print the tool's pose."""
-    values = _joint_values(arm, q, degrees)
+    values = joint_values(arm, q, degrees)
     T, frames = arm.fk(values), arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
@@ -79,24 +80,6 @@ def forward(arm: Arm, q: Sequence[str], *, degrees: bool, with_frames: bool, jso
         rows.append((name, *(f"{x:.6f}" for x in (*xyz + 0.0, *angles + 0.0))))
     print_table(("", "x [m]", "y [m]", "z [m]", *(f"{axis} [{unit}]" for axis in ("X", "Y'", "Z''"))), rows)
     say(f"\n{np.array2string(T + 0.0, precision=6, suppress_small=True)}")
-
-
-def _joint_values(arm: Arm, q: Sequence[str], degrees: bool) -> Array:
-    if len(q) == 1 and q[0] in arm.configurations:
-        return arm.configurations[q[0]]
-    words = [word for part in q for word in part.replace(",", " ").split()]
-    if len(words) == 1 and not words[0][:1].isdigit() and words[0][:1] not in "+-.(":
-        names = ", ".join(arm.configurations)
-        raise DescriptionError(f"{arm.name} has no configuration {words[0]!r}; it has {names or 'none'}")
-    if typo := next((word for word in words if word.startswith("--")), None):
-        raise DescriptionError(f"no such option: {typo}")
-    if len(words) != arm.n:
-        raise DescriptionError(f"{len(words)} joint values; expected {arm.n} for {arm.name}")
-    try:
-        values = np.array([float(parse(word)) for word in words])
-    except ExpressionError as error:
-        raise DescriptionError(f"joint values: {error}") from None
-    return np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
 
 
 def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...]:
@@ -128,6 +111,7 @@ def _first(source: str) -> str:
 
 def _facts(arm: Arm) -> dict[str, Any]:
     description, numbers = arm.description, arm.description.numbers
+    fit = classify(description).fit
     columns = ("theta", "d", "a", "alpha", "lower", "upper", "velocity", "effort", "mass", "armature")
     joints = [
         {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
@@ -140,6 +124,8 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "kinds": kinds(description),
         "convention": description.convention.value,
         "reach": description.reach,
+        "inverse_kinematics": arm.family,
+        "branches": [] if fit is None else list(fit.branches),
         "gravity": numbers.gravity.tolist(),
         "parameters": numbers.values,
         "joints": joints,

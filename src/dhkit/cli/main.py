@@ -14,7 +14,9 @@ from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli import demo as demo_command
 from dhkit.cli import info as info_command
+from dhkit.cli import inverse as inverse_command
 from dhkit.cli import workspace as workspace_command
+from dhkit.cli.arguments import gathering, joint_values, target
 from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError, DhkitError
 
@@ -117,6 +119,39 @@ def fk(
 ) -> None:
     """Print where the tool is for given joint values (rad and m)."""
     info_command.forward(Arm.load(robot), q, degrees=degrees, with_frames=frames, json=json)
+
+
+@app.command(cls=gathering({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
+def ik(
+    robot: Robot,
+    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
+    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    matrix: Annotated[
+        str | None, typer.Option(metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them.")
+    ] = None,
+    like: Annotated[str | None, typer.Option(metavar="Q ...", help="Where these joint values put the tool.")] = None,
+    near: Annotated[str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these values.")] = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Only branches inside the joint limits.")] = False,
+    numeric: Annotated[bool, typer.Option("--numeric", help="One solution, by iteration, for any arm.")] = False,
+    json: Json = False,
+) -> int:
+    """Print every way to put the tool at a pose, given by --xyz, --matrix or --like; exit status 1 where there is none.
+
+    Numbers may be expressions such as 17*inch or pi/2; joint values may be the name of a configuration.
+    """
+    arm = Arm.load(robot)
+    return inverse_command.run(
+        arm,
+        target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees),
+        near=None if near is None else joint_values(arm, [near], degrees, "values of --near"),
+        order=order,
+        degrees=degrees,
+        limits=limits,
+        numeric=numeric,
+        json=json,
+    )
 
 
 @app.command()

@@ -44,7 +44,7 @@ Pair: TypeAlias = tuple[SX, SX]
 
 ROUNDING = 2e-14
 """Share of the lengths at hand by which a pose may lie beyond the boundary and still counts as on it."""
-SINGULAR = 1e-6
+SINGULAR = 1e-5
 """A branch is flagged where the sine, or the distance over the reach, that vanishes at a singularity is below this."""
 NOTHING = 1e-13
 """Below this share a direction is noise, and any direction serves: the pose closes to about this."""

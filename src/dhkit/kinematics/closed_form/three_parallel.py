@@ -28,20 +28,29 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
+    absolute,
     angle,
+    both,
     chosen,
     either,
     half_turn,
     hypot,
+    larger,
+    positive,
     rotated,
     sign,
+    sqrt,
     times,
     two_link,
     unit,
+    where,
     wrapped,
 )
 
 __all__ = ["three_parallel_fit", "three_parallel_formulas"]
+
+FREE = 1e-12
+"""By how much the tool's rotation may miss the pose where that brings a pose near the wrist's singularity in reach."""
 
 
 def three_parallel_fit(axes: Axes) -> Fit | None:
@@ -113,17 +122,40 @@ def _wrists(
     # rho is how far links 2 to 4 have turned in all. Where axis 6 is parallel to them only rho and joint 6 together
     # are determined: joint 6 is then free, and rho is read off axis 5 with joint 6 undone.
     c6, s6 = pose.free
-    rho = unit(a[0], a[1], otherwise=unit(c6 * n[1] - s6 * m[1], s6 * m[0] - c6 * n[0]))
+    seen = turned_back(T.position, shoulder.q1)
+    free = unit(c6 * n[1] - s6 * m[1], s6 * m[0] - c6 * n[0])
+    rho = _within_reach(p, seen, unit(a[0], a[1], otherwise=free), swing)
     bend = unit(rho[0] * a[0] + rho[1] * a[1], a[2])
     q5 = angle(times((bend[1], bend[0]), p["wrist"], -1.0))
     q6 = angle(unit(rho[0] * n[1] - rho[1] * n[0], rho[1] * m[0] - rho[0] * m[1]))
-    seen = turned_back(T.position, shoulder.q1)
     singular = swing < SINGULAR
     flipped = wrapped(-q5 - p["straight"]), half_turn(q6)
     return (
         _elbows(p, seen, shoulder, rho, (q5, q6), singular, pose.scale),
         _elbows(p, seen, shoulder, (-rho[0], -rho[1]), flipped, singular, pose.scale),
     )
+
+
+def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX) -> Pair:
+    """Return rho, or where axis 4 would then be out of the two links' reach, the next one that is within it.
+
+    Near the wrist's singularity rho is ill determined, and turning it costs the tool only ``swing`` times as much.
+    """
+    lever = p["lever"]
+    x, u = position[0] - p["a1"], position[1]
+    far, arm = hypot(x, u), hypot(lever[0], lever[1])
+    distance = hypot(x - (rho[0] * lever[0] - rho[1] * lever[1]), u - (rho[1] * lever[0] + rho[0] * lever[1]))
+    reach, gap = p["L2"] + p["L3"], absolute(p["L2"] - p["L3"])
+    wanted = where(distance > reach, reach, larger(distance, gap))
+    # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
+    area = 2.0 * far * arm
+    cosine = (far * far + arm * arm - wanted * wanted) / where(area > 0, area, 1.0)
+    to_end, to_lever = unit(x, u), unit(lever[0], lever[1])
+    side = sign(times(times(rho, to_lever), to_end, -1.0)[1])
+    corner = unit(cosine, side * sqrt(positive(1.0 - cosine * cosine)))
+    turned = times(times(to_end, corner), to_lever, -1.0)
+    cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
+    return chosen(both(wanted != distance, cost < FREE), turned, rho)
 
 
 def _elbows(
