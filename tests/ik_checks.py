@@ -1,4 +1,4 @@
-"""What the tests of inverse kinematics share: closure, singularity measures read off the frames, differences of angles."""
+"""What the tests of inverse kinematics share: closure, measures read off the frames, differences of angles."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def aim(arm: Description, q: np.ndarray, targets: np.ndarray) -> float:
 
 
 def gaps(arm: Description, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the largest joint difference of joint vectors (..., n), angles modulo whole turns, slides over the reach."""
+    """Return the largest difference of joint vectors (..., n), angles modulo whole turns, slides over the reach."""
     difference = np.abs(a - b)
     turned = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
     return np.where(arm.numbers.prismatic, difference / (arm.reach or 1.0), turned).max(axis=-1)

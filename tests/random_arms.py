@@ -136,9 +136,8 @@ def few_joint_arms(draw):
     theta, d = [draw(turn) for _ in range(4)], [draw(shift) for _ in range(4)]
     if kinds in ("turret2", "turret3", "pan"):
         n = {"turret2": 3, "turret3": 4, "pan": 2}[kinds]
-        rows = [
-            (theta[i], d[i], draw(shift) if i == 0 else lengths[i], right if i == 0 else flats[i]) for i in range(n)
-        ]
+        a, alpha = [draw(shift), *lengths[1:]], [right, *flats[1:]]
+        rows = [(theta[i], d[i], a[i], alpha[i]) for i in range(n)]
         return draw(placed(from_dh(rows)))
     if kinds in ("RP", "PR"):
         rows = [(theta[0], d[0], 0.0 if kinds == "RP" else draw(shift), right), (theta[1], d[1], lengths[1], flats[0])]

@@ -18,6 +18,7 @@ from dhkit.errors import (
 if TYPE_CHECKING:
     from dhkit.arm import Arm
     from dhkit.description import Description, pose, pose_parts, robots
+    from dhkit.kinematics import IKFlag, IKSolutions, IKStatus
     from dhkit.viewer import plot
 
 __version__ = "0.1.0"
@@ -29,6 +30,9 @@ __all__ = [
     "DescriptionError",
     "DhkitError",
     "ExpressionError",
+    "IKFlag",
+    "IKSolutions",
+    "IKStatus",
     "ModelError",
     "PlanningError",
     "UnreachableError",
@@ -42,6 +46,9 @@ __all__ = [
 _HOMES = {
     "Arm": "dhkit.arm",
     "Description": "dhkit.description",
+    "IKFlag": "dhkit.kinematics",
+    "IKSolutions": "dhkit.kinematics",
+    "IKStatus": "dhkit.kinematics",
     "plot": "dhkit.viewer",
     "pose": "dhkit.description",
     "pose_parts": "dhkit.description",

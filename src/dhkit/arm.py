@@ -15,7 +15,7 @@ from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
     from dhkit.description.table import Quantity
-    from dhkit.kinematics import IKPath, IKSolutions, ReferenceAxes
+    from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
@@ -203,6 +203,24 @@ class Arm:
         from dhkit.kinematics import classify
 
         return classify(self._description).words
+
+    def manipulability(self, q: ArrayLike, motion: Motion = "translational") -> Array:
+        """Return how well the tool can move at q, shape (...); see :func:`dhkit.kinematics.manipulability`."""
+        from dhkit.kinematics import manipulability
+
+        return manipulability(self._description, q, motion)
+
+    def workspace(self, samples: int = 100_000, seed: int = 0, **options: Any) -> Workspace:
+        """Return where the tool can be, by random states; see :func:`dhkit.kinematics.workspace`."""
+        from dhkit.kinematics import workspace
+
+        return workspace(self._description, samples, seed, **options)
+
+    def singularities(self) -> Singularities:
+        """Return where the arm is singular, in closed form; see :func:`dhkit.kinematics.singularities`."""
+        from dhkit.kinematics import singularities
+
+        return singularities(self._description)
 
     def export_c(self, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
         """Write the kinematics as C99 source and header; see :func:`dhkit.kinematics.export_kinematics`."""

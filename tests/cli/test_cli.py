@@ -40,8 +40,11 @@ def test_info_shows_what_the_robot_is(dhkit, name):
     assert "[kg]" in out
     for warning in arm.description.warnings:
         assert warning in out
+    assert f"inverse kinematics: {arm.family}" in out
     facts = json.loads(dhkit("info", name, "--json")[1])
     assert facts["n"] == arm.n
+    assert facts["inverse_kinematics"] == arm.family
+    assert bool(facts["branches"]) == ("no closed form" not in arm.family)
     assert facts["joints"][0]["alpha"] == arm.description.numbers.alpha[0]
 
 
@@ -60,6 +63,11 @@ def test_fk_takes_configurations_expressions_and_degrees(dhkit):
     status, out, _ = dhkit("fk", "puma560", "ready", "--frames")
     assert "frame 6" in out
     assert "1.535430" in out
+
+
+def test_info_names_the_branches(dhkit):
+    facts = json.loads(dhkit("info", "puma560", "--json")[1])
+    assert facts["branches"] == list(Arm.load("puma560").ik(np.eye(4)).branches)
 
 
 def test_build_writes_a_urdf_with_its_meshes(dhkit, tmp_path):

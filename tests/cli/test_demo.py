@@ -1,6 +1,7 @@
 """`dhkit demo`: what it writes, for any robot; the page shows the arm without a network."""
 
 import json
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,7 +10,18 @@ from PIL import Image
 
 from dhkit import Arm, robots
 from dhkit.cli import main
-from dhkit.cli.demo import RATE, tour
+from dhkit.cli.straight import branches, straight_line
+from dhkit.cli.tour import RATE, tour
+
+
+CLOSES = 1e-12
+"""m: rounding of solutions found by iteration included."""
+
+
+@pytest.fixture(scope="module", params=robots())
+def line_of(request):
+    """A robot's name and its line."""
+    return request.param, straight_line(Arm.load(request.param))
 
 
 def run(*arguments):
@@ -24,6 +36,7 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "agrees with Pinocchio" in out
     assert "2 shoulder" in out
+    assert "8 branches of one pose close FK to" in out
     assert sorted(path.name for path in folder.iterdir()) == ["index.html", "meshes", "puma560.png", "puma560.urdf"]
     assert ElementTree.parse(folder / "puma560.urdf").getroot().get("name") == "puma560"
     with Image.open(folder / "puma560.png") as picture:
@@ -60,7 +73,11 @@ def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["ok"]
-    assert [stage["stage"] for stage in report["stages"]] == ["build", "verify", "figure", "page"]
+    assert [stage["stage"] for stage in report["stages"]] == ["build", "verify", "figure", "ik", "page"]
+    assert re.fullmatch(
+        r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches",
+        report["stages"][3]["result"],
+    )
 
 
 def test_the_demo_works_for_a_robot_of_ones_own(tmp_path, monkeypatch, capsys):
@@ -81,14 +98,70 @@ def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
     assert (tmp_path / "taken").read_text() == "keep me"
 
 
-@pytest.mark.parametrize("name", robots())
-def test_the_tour_keeps_the_limits_and_the_speeds(name):
+@pytest.mark.parametrize("name", ["puma560", "planar2r", "panda"])
+def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, tmp_path, capsys, chromium):
+    assert run("demo", "--robot", name, "--quick", "--output", str(tmp_path)) == 0
+    page = chromium.page()
+    try:
+        page.open(f"file://{tmp_path}/index.html")
+        page.press(" ")  # pause
+        page.press("Home")
+        with_ghosts = page.screenshot()
+        page.press("o")
+        without = page.screenshot()
+        assert page.evaluate("document.getElementById('overlays').getAttribute('aria-pressed')") == "false"
+        assert np.any(np.abs(with_ghosts - without) > 20, axis=-1).sum() > 1000
+        assert page.errors == []
+    finally:
+        page.close()
+
+
+def test_the_tour_keeps_limits_and_speeds_and_begins_with_a_line(line_of):
+    name, line = line_of
     arm = Arm.load(name)
-    times, q = tour(arm)
+    times, q = tour(arm, line.q if line else None)
     numbers = arm.description.numbers
     assert np.all(np.diff(times) > 0)
     assert np.ptp(q, axis=0).max() > 0.05
-    assert np.all(q >= numbers.lower - 1e-12)
-    assert np.all(q <= numbers.upper + 1e-12)
+    assert np.all(q >= numbers.lower - 1e-9)
+    assert np.all(q <= numbers.upper + 1e-9)
     assert np.all(np.abs(np.diff(q, axis=0)) * RATE <= numbers.velocity)
     assert np.array_equal(q[0], q[-1])
+    assert np.array_equal(q[0], line.q[0])
+
+
+def test_a_straight_line_is_found_and_followed_by_every_robot(line_of):
+    name, line = line_of
+    arm = Arm.load(name)
+    assert line.length > 0.05 * arm.description.reach
+    assert line.switches == 0
+    assert np.abs(np.diff(line.q, axis=0)).max() < 0.2
+    placed = arm.fk(line.q)[:, :3, 3]
+    if name == "pan_tilt":  # it only aims
+        return
+    assert np.abs(placed - line.T[:, :3, 3]).max() < CLOSES
+    # What lies between the poses is on the line too, as far as one sees.
+    halfway = arm.fk((line.q[1:] + line.q[:-1]) / 2)[:, :3, 3]
+    assert np.abs(halfway - (placed[1:] + placed[:-1]) / 2).max() < 1e-3 * line.length
+
+
+def test_every_way_to_reach_the_lines_first_pose_closes(line_of):
+    name, line = line_of
+    arm = Arm.load(name)
+    ways = branches(arm, line.q[0])
+    assert len(ways.q) >= 2
+    assert ways.closed_form == ("no closed form" not in arm.family)
+    assert (ways.error is None) == (name == "pan_tilt")
+    assert (ways.error or 0.0) < CLOSES
+    # The arm stands in one of them.
+    assert np.abs(np.exp(1j * ways.q) - np.exp(1j * line.q[0])).max(axis=1).min() < 1e-6
+
+
+def test_without_a_line_the_tour_goes_through_the_configurations():
+    arm = Arm.load("puma560")
+    times, q = tour(arm)
+    assert len(times) == len(q)
+    assert np.array_equal(q[0], arm.configurations["zero"])
+    assert np.array_equal(q[0], q[-1])
+    for stop in arm.configurations.values():
+        assert np.abs(q - stop).max(axis=1).min() == 0

@@ -7,6 +7,7 @@ from hypothesis import assume, given
 from dhkit.description import library_robot, world_to_tool
 from dhkit.kinematics import IKFlag, classify, forward_kinematics, inverse_kinematics
 from dhkit.kinematics.closed_form.classify import FAMILIES
+from dhkit.kinematics.singularities import measures as singularity_measures
 from dhkit.kinematics.singularities import singular_configurations
 from dhkit.verification import random_states
 from ik_checks import FAMILY_A, FAMILY_B, FEW_JOINTS, SIX_JOINTS, closure, gaps, measures
@@ -77,8 +78,8 @@ def test_the_original_is_among_the_branches_of_arms_of_few_joints(name, law):
 
 NEAR = 1e-7
 """rad, or m over the reach: how near to a singularity."""
-UNSOLVED = 1e-4
-"""Share of poses of a UR at two singularities at once, of which rounding puts some out of reach."""
+UNSOLVED, UNFLAGGED = 1e-4, 1e-3
+"""Shares of a UR's poses at two singularities at once: rounding puts some out of reach, and some past a threshold."""
 
 
 @pytest.mark.parametrize("kind", ["shoulder", "elbow", "wrist"])
@@ -100,9 +101,9 @@ def test_every_branch_closes_at_singularities_and_is_flagged(name, kind, law):
                 law.holds("closure at a singularity", closure(arm, solutions, T), required(name), (name, kind))
                 flagged = (solutions.valid & (solutions.flags & IKFlag[kind] > 0)).any(axis=-1)
                 unsolved = ~solutions.valid.any(axis=-1)
-                allowed = UNSOLVED if name in FAMILY_B else 0.0
-                law.holds("share not solved at a singularity", unsolved.mean(), allowed, (name, kind))
-                law.holds("share not flagged at a singularity", (~flagged).mean(), 2 * allowed, (name, kind))
+                ur = name in FAMILY_B
+                law.holds("share not solved at a singularity", unsolved.mean(), UNSOLVED if ur else 0.0, (name, kind))
+                law.holds("share not flagged", (~flagged).mean(), UNFLAGGED if ur else 0.0, (name, kind))
 
 
 @pytest.mark.parametrize("name", SIX_JOINTS)
@@ -110,7 +111,8 @@ def test_the_free_joint_of_a_straight_wrist_comes_from_the_seed_or_is_zero(name)
     arm = library_robot(name)
     free = classify(arm).fit.free
     q = singular_configurations(arm, "wrist", 500, seed=3)
-    q = q[np.min([value for key, value in measures(arm, q).items() if key != "wrist"], axis=0) > 0.05]
+    others = [value for key, value in singularity_measures(arm, q).items() if key != "wrist"]
+    q = q[np.min(others, axis=0) > 0.05]
     T = forward_kinematics(arm, q)
     with_seed = inverse_kinematics(arm, T, seed=q)
     assert np.nanmin(gaps(arm, with_seed.q, q[:, None]), axis=-1).max() < 1e-9

@@ -110,7 +110,9 @@ def _gathered(args: Sequence[str], counts: Mapping[str, int | None]) -> list[str
         count = counts[word]
         while rest and not rest[0].startswith("--") and (count is None or len(_split(values)) < count):
             values.append(rest.pop(0))
-        gathered += [" ".join(values)] if values else []
+        if not values:
+            raise DescriptionError(f"{word}: no values; expected {'some' if count is None else count} after it")
+        gathered.append(" ".join(values))
     return gathered
 
 

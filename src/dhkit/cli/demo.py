@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -13,20 +14,24 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, say
+from dhkit.cli.straight import Branches, Line, branches, straight_line
+from dhkit.cli.tour import tour
 from dhkit.description import Array, write_atomically
 from dhkit.errors import DescriptionError
 from dhkit.verification import VerificationReport
 
-__all__ = ["run", "tour"]
+__all__ = ["run"]
 
-RATE = 50.0
-"""Hz: how densely the animated motion is sampled."""
-PAUSE = 0.4
-"""s: rest at each configuration of the tour."""
-GENTLE = 0.6
-"""Share of the joints' speeds that the tour uses."""
-DEFAULT_SPEED = 1.5
-"""rad/s or m/s, of joints without a speed limit."""
+OWN = 1e-6
+"""Share of the reach: an arm whose frames are all nearer to another's than this looks the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the page shows of inverse kinematics."""
+
+    ways: Branches
+    line: Line | None
 
 
 def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
@@ -53,7 +58,9 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
     reports: list[VerificationReport] = []
     stage("verify", lambda: _verify(arm, 100 if quick else 1000, reports))
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
-    stage("page", lambda: _page(arm, folder / "index.html"))
+    shown: list[Shown] = []
+    stage("ik", lambda: _inverse(arm, shown))
+    stage("page", lambda: _page(arm, shown[0], folder / "index.html"))
     ok = all(report.ok for report in reports)
     if json:
         print_json({"robot": arm.name, "folder": str(folder), "ok": ok, "stages": stages})
@@ -62,40 +69,6 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
             say(f"\n{report}")
         say(f"\nOpen {folder / 'index.html'} in a browser; it needs no network.")
     return 0 if ok else 1
-
-
-def tour(arm: Arm) -> tuple[Array, Array]:
-    """Return times (N,), s, and joint values (N, n) of a smooth motion through the arm's configurations and back."""
-    stops = _stops(arm)
-    numbers = arm.description.numbers
-    speed = GENTLE * np.where(np.isfinite(numbers.velocity), numbers.velocity, DEFAULT_SPEED)
-    pieces, at = [stops[0][None]], stops[0]
-    for stop in [*stops[1:], stops[0]]:
-        # A quintic blend is fastest in its middle, at 15/8 of its mean speed.
-        duration = max(0.8, float(np.max(15 / 8 * np.abs(stop - at) / speed)))
-        s = np.linspace(0.0, 1.0, max(2, round(duration * RATE)))[1:, None]
-        blend = s**3 * (10 - 15 * s + 6 * s**2)
-        pieces += [at + (stop - at) * blend, np.repeat(stop[None], round(PAUSE * RATE), axis=0)]
-        at = stop
-    q = np.concatenate(pieces)
-    return np.arange(len(q)) / RATE, q
-
-
-def _stops(arm: Arm) -> list[Array]:
-    """Return the named configurations in the limits, each once; single joints moved where there is only one."""
-    numbers = arm.description.numbers
-    inside = [q for q in arm.configurations.values() if np.all((q >= numbers.lower) & (q <= numbers.upper))]
-    stops: list[Array] = []
-    for q in inside or [np.clip(np.zeros(arm.n), numbers.lower, numbers.upper)]:
-        if not any(np.array_equal(q, stop) for stop in stops):
-            stops.append(q)
-    first = stops[0]
-    for i in range(arm.n):
-        moved = first.copy()
-        room = 0.7 if not numbers.prismatic[i] else 0.3 * max(arm.description.reach, 0.1)
-        moved[i] = moved[i] + room if moved[i] + room <= numbers.upper[i] else max(moved[i] - room, numbers.lower[i])
-        stops += [moved] if len(stops) < 4 else []
-    return stops
 
 
 def _build(arm: Arm, path: Path) -> str:
@@ -127,9 +100,46 @@ def _figure(arm: Arm, path: Path) -> str:
     return str(path)
 
 
-def _page(arm: Arm, path: Path) -> str:
-    times, q = tour(arm)
+def _inverse(arm: Arm, shown: list[Shown]) -> str:
+    from dhkit.viewer.scene import first_configuration
+
+    line = straight_line(arm)
+    ways = branches(arm, first_configuration(arm.description) if line is None else line.q[0])
+    shown.append(Shown(ways, line))
+    return f"{_ways(ways)}; {_followed(line)}"
+
+
+def _ways(ways: Branches) -> str:
+    count = len(ways.q)
+    if ways.closed_form:
+        what = f"{count} branch{'es' if count > 1 else ''} of one pose"
+    else:
+        what = f"no closed form: {count} solution{'s' if count > 1 else ''} of one pose, by iteration,"
+    if ways.error is None:
+        return f"{what} aim at one point"
+    return f"{what} close FK to {ways.error:.0e}" if ways.error else f"{what} close FK exactly"
+
+
+def _followed(line: Line | None) -> str:
+    if line is None:
+        return "no straight line found that it follows without a jump"
+    return f"a line of {line.length:.2g} m in {len(line.q)} poses: {line.switches} switches"
+
+
+def _page(arm: Arm, shown: Shown, path: Path) -> str:
+    """Write a page with the arm's motion and, at the pose where that begins, its other branches as ghosts."""
+    line = shown.line
+    times, q = tour(arm, None if line is None else line.q)
     with arm.view() as view:
+        view.ghosts(_apart(arm, shown.ways.q, q[0]))
+        view.trace(None if line is None else line.T[:, :3, 3])
         view.play((times, q))
         view.save_html(path)
     return f"{path}, {times[-1]:.1f} s of motion"
+
+
+def _apart(arm: Arm, q: Array, own: Array) -> Array:
+    """Return the states (k, n) of which something is seen beside the arm in its own: others would only tint it."""
+    gaps = np.abs(arm.frames(q) - arm.frames(own))[..., :3, 3].max(axis=(1, 2))
+    seen: Array = q[gaps > OWN * arm.description.reach]
+    return seen

@@ -12,6 +12,7 @@ from dhkit.cli.output import print_json, print_table, say
 from dhkit.description import Array, pose_parts
 from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
+from dhkit.kinematics.solutions import LIMIT_SLACK
 
 __all__ = ["run"]
 
@@ -22,6 +23,7 @@ FLAG_WORDS = {
     IKFlag.clamped: "on the boundary",
 }
 MARK = "→"
+TURN = 2 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,15 +88,13 @@ def run(
     """Print all solutions of fk(q) = T; return 0, or 1 where there is none."""
     found, method, note = _solved(arm, T, near, limits=limits, numeric=numeric)
     counts = found.within if limits else found.valid
-    # With the flag taken off every branch gets the whole turns that bring its joints into their limits, if any do.
-    everywhere = replace(found, flags=found.flags & ~np.uint8(IKFlag.out_of_limits))
     answer = Answer(
         arm=arm,
         T=T,
         found=found,
         method=method,
         note=note,
-        q=everywhere.within_limits(near),
+        q=_wound(found, near),
         shown=tuple(int(k) for k in np.flatnonzero(counts)),
         near=near,
         order=order,
@@ -107,9 +107,7 @@ def run(
     return 0 if answer.shown else 1
 
 
-def _solved(
-    arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool
-) -> tuple[IKSolutions, str, str]:
+def _solved(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool) -> tuple[IKSolutions, str, str]:
     """Return solutions, how they were found, and why that way if it needs saying."""
     note = ""
     if not numeric:
@@ -117,7 +115,20 @@ def _solved(
             return arm.ik(T, seed=near), "closed form" if classify(arm.description).fit else "ssik", ""
         except ModelError as error:
             note = f"one solution by iteration: {error}"
-    return arm.ik_numeric(T, near, limits=limits), "numeric", note
+    found = arm.ik_numeric(T, near)
+    if not limits and not found.valid.any():
+        found = arm.ik_numeric(T, near, limits=False)
+    return found, "numeric", note
+
+
+def _wound(found: IKSolutions, near: Array | None) -> Array:
+    """Return all branches, each joint with the whole turns that bring it inside its limits, near the values given."""
+    # With the flag taken off no branch is left out for being outside.
+    everywhere = replace(found, flags=found.flags & ~np.uint8(IKFlag.out_of_limits))
+    q = everywhere.within_limits(near)
+    turns = np.where(found.prismatic | (near is None), 0.0, np.rint(((0.0 if near is None else near) - found.q) / TURN))
+    outside = (q < found.lower - LIMIT_SLACK) | (q > found.upper + LIMIT_SLACK)
+    return np.where(outside, found.q + TURN * turns, q)
 
 
 def _print(answer: Answer) -> None:
@@ -151,19 +162,19 @@ def _limits(answer: Answer, k: int) -> str:
     if answer.found.within[k]:
         return "inside"
     numbers, q = answer.arm.description.numbers, answer.q[k]
-    outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper))
+    outside = np.flatnonzero((q < numbers.lower - LIMIT_SLACK) | (q > numbers.upper + LIMIT_SLACK))
     return f"outside: {', '.join(f'q{i + 1}' for i in outside)}"
 
 
 def _summary(answer: Answer) -> str:
-    total, shown = len(answer.found), len(answer.shown)
-    inside = int(np.sum(answer.found.within))
-    ways = "the branch reaches" if total == 1 else f"{int(np.sum(answer.found.valid))} of {total} branches reach"
-    if answer.method != "closed form":
-        ways = f"{shown} solution{'s' if shown > 1 else ''} found"
-    counted = f"{ways} the pose, {inside} inside the limits" if "reach" in ways else f"{ways}, {inside} inside the limits"
-    nearest = answer.nearest
-    return counted if nearest is None else f"{counted}; {MARK} nearest: {answer.found.branches[nearest]}"
+    found, nearest = answer.found, answer.nearest
+    reach, inside = int(np.sum(found.valid)), int(np.sum(found.within))
+    if answer.method == "closed form":
+        text = f"{reach} of {len(found)} branches reach the pose, {inside} inside the limits"
+    else:
+        by = "iteration" if answer.method == "numeric" else answer.method
+        text = f"{reach} solution{'s' if reach > 1 else ''} found by {by}, {inside} inside the limits"
+    return text if nearest is None else f"{text}; {MARK} nearest: {found.branches[nearest]}"
 
 
 def _facts(answer: Answer) -> dict[str, Any]:

@@ -68,7 +68,13 @@ class Kernel:
                 self.function(parameters, *(array[start : start + ARRAY_BLOCK] for array in arrays))
 
 
-def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)) -> Kernel:
+def kernel(
+    name: str,
+    pattern: str,
+    derive: Callable[[], Graph],
+    types: Sequence[str] = ("float64",),
+    written_in: str | None = None,
+) -> Kernel:
     """Return the kernel of a program: from this process, from the disk, or derived and compiled now.
 
     Parameters
@@ -79,22 +85,25 @@ def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence
         Returns the program; its first input holds the parameters.
     types
         Of each output: float64, or uint8 for small whole numbers.
+    written_in
+        The file or folder that decides what is derived: the kernel is made anew when it changes. The file of
+        ``derive`` unless given.
     """
     key = (name, pattern, compiling())
     found = _kernels.get(key)
     if found is None:
         with _lock:
-            found = _kernels.get(key) or _made(name, pattern, derive, types)
+            found = _kernels.get(key) or _made(name, pattern, derive, types, written_in)
             _kernels[key] = found
     return found
 
 
-def _made(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str]) -> Kernel:
+def _made(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str], written_in: str | None) -> Kernel:
     if not compiling():
         space: dict[str, Any] = {}
         exec(compile(array_source(derive(), types), f"<{name}>", "exec"), space)  # noqa: S102 - text of our own making
         return Kernel(name, space["kernel"], compiled=False)
-    key = store.digest(name, pattern, derive.__code__.co_filename)
+    key = store.digest(name, pattern, written_in or derive.__code__.co_filename)
     module = store.load(name, key, lambda cache: loop_source(derive(), types, cache=cache))
     return Kernel(name, module.kernel, compiled=True)
 

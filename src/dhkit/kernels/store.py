@@ -49,7 +49,7 @@ def digest(name: str, pattern: str, derivation: str) -> str:
     name, pattern
         What the kernel computes, and for which arms.
     derivation
-        Path of the file that derives it; its folder counts.
+        Path of the file, or of the folder of files, that derives it.
     """
     return hashlib.sha256("\0".join((name, pattern, _sources(derivation), _machine())).encode()).hexdigest()[:32]
 
@@ -96,11 +96,11 @@ def _from_file(path: Path) -> types.ModuleType:
 
 @cache
 def _sources(derivation: str) -> str:
-    here = Path(__file__).parent
-    folders = {here, here.parent / "symbolic", Path(derivation).parent}
+    here, own = Path(__file__).parent, Path(derivation)
     total = hashlib.sha256()
-    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
-        total.update(path.read_bytes())
+    for folder in (here, here.parent / "symbolic", own):
+        for path in sorted(folder.glob("*.py")) if folder.is_dir() else [folder]:
+            total.update(path.read_bytes())
     return total.hexdigest()
 
 

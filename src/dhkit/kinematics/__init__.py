@@ -1,28 +1,68 @@
 """Where an arm is, how it moves and how it gets there: forward and inverse kinematics, Jacobians, workspace."""
 
+from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
+from dhkit.kinematics.manipulability import (
+    Ellipsoid,
+    Motion,
+    condition_number,
+    force_ellipsoid,
+    freedoms,
+    isotropy,
+    manipulability,
+    singular_values,
+    velocity_ellipsoid,
+)
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
+from dhkit.kinematics.singularities import (
+    Singularities,
+    determinant,
+    measures,
+    singular_configurations,
+    singularities,
+)
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
+from dhkit.kinematics.workspace import Estimate, Grid, Workspace, workspace
 
 __all__ = [
+    "Boundary",
     "Classification",
+    "Ellipsoid",
+    "Estimate",
+    "Grid",
     "IKFlag",
     "IKPath",
     "IKSolutions",
     "IKStatus",
+    "Motion",
     "ReferenceAxes",
+    "Singularities",
+    "Workspace",
+    "boundaries",
     "classify",
+    "condition_number",
+    "determinant",
     "export_kinematics",
     "follow_path",
+    "force_ellipsoid",
     "forward_kinematics",
     "frames",
+    "freedoms",
     "inverse_kinematics",
+    "isotropy",
     "jacobian",
     "jacobian_dot",
+    "manipulability",
+    "measures",
+    "singular_configurations",
+    "singular_values",
+    "singularities",
     "solve_numerically",
+    "velocity_ellipsoid",
+    "workspace",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.kernels import kernel
+from dhkit.kinematics import closed_form
 from dhkit.kinematics.batches import check_threads, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
@@ -69,7 +70,7 @@ def inverse_kinematics(
     status = np.empty(batch, dtype=np.uint8)
     count = poses.size // 16
     if count:
-        run = kernel(solver.name, fit.structure, solver.program, OUTPUT_TYPES)
+        run = kernel(solver.name, fit.structure, solver.program, OUTPUT_TYPES, closed_form.__path__[0])
         free = _free_angles(description, fit, seed, batch)
         rows = [
             q.reshape(count, B * n),
@@ -105,7 +106,10 @@ def pose_rows(T: ArrayLike) -> Array:
         Not numbers.
     """
     try:
-        poses = np.ascontiguousarray(T, dtype=float)
+        poses = np.asarray(T)
+        if poses.dtype.kind not in "fiu" and poses.size:
+            raise TypeError
+        poses = np.ascontiguousarray(poses, dtype=float)
     except (TypeError, ValueError):
         raise TypeError(f"T: found {type(T).__name__} of other things; expected numbers, shape (..., 4, 4)") from None
     if poses.shape[-2:] != (4, 4):

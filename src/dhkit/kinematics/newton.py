@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from dhkit.kinematics.jacobian import jacobian
 from dhkit.symbolic import Graph
 
 __all__ = ["Newton"]
+
+PROGRAMS = str(Path(__file__).with_name("newton_program.py"))
 
 TURN = 2 * np.pi
 
@@ -92,7 +95,7 @@ class Newton:
         """
         T = forward_kinematics(self.description, q, threads=self.threads).reshape(-1, 16)
         error = np.empty((len(q), self.size))
-        run = kernel("pose_error", f"{self.size}", lambda: _error_program(self.size))
+        run = kernel("pose_error", f"{self.size}", lambda: _error_program(self.size), written_in=PROGRAMS)
         run(np.array([self.length]), [T, goals], [error], self.threads)
         return error
 
@@ -111,7 +114,7 @@ class Newton:
         n = self.description.n
         J = jacobian(self.description, q, threads=self.threads).reshape(-1, 6 * n)
         new = np.empty_like(q)
-        run = kernel("newton_step", f"{n} {self.size}", lambda: _step_program(n, self.size))
+        run = kernel("newton_step", f"{n} {self.size}", lambda: _step_program(n, self.size), written_in=PROGRAMS)
         parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
         run(parameters, [q, error, J, damping[:, None]], [new], self.threads)
         return new

@@ -142,8 +142,7 @@ class IKSolutions:
         ValueError
             ``near`` does not fit.
         """
-        middle = np.where(np.isfinite(self.lower + self.upper), (self.lower + self.upper) / 2, 0.0)
-        at = self._near(middle if near is None else near)[..., None, :]
+        at = self._near(near)[..., None, :]
         with np.errstate(invalid="ignore"):
             # Windings inside the limits are q + 2 pi k for k from `first` to `last`.
             first = np.ceil((self.lower - LIMIT_SLACK - self.q) / TURN)
@@ -176,8 +175,7 @@ class IKSolutions:
         UnreachableError
             Some pose has none: says which, and why.
         """
-        middle = np.where(np.isfinite(self.lower + self.upper), (self.lower + self.upper) / 2, 0.0)
-        at = self._near(middle if near is None else near)
+        at = self._near(near)
         chosen = self._closest(self.within_limits(at), at, self.within)
         missing = np.argwhere(np.isnan(chosen).any(axis=-1))
         if len(missing):
@@ -192,7 +190,11 @@ class IKSolutions:
         shown = ", ".join(count for count in counts if not count.startswith("0 "))
         return f"<IKSolutions of {self.distance.size} poses, {len(self)} branches: {shown}>"
 
-    def _near(self, q: ArrayLike) -> Array:
+    def _near(self, q: ArrayLike | None) -> Array:
+        """Return joint values of shape (..., n): given ones, or the middle of the limits, 0 where there are none."""
+        if q is None:
+            limited = np.isfinite(self.lower) & np.isfinite(self.upper)
+            q = (np.where(limited, self.lower, 0.0) + np.where(limited, self.upper, 0.0)) / 2
         near = np.asarray(q, dtype=float)
         n = self.q.shape[-1]
         if near.shape[-1:] != (n,):
@@ -226,5 +228,6 @@ class IKSolutions:
         if status is IKStatus.not_a_pose:
             return f"{where}{others} is no pose: NaN, or a rotation that is not orthonormal"
         if status is IKStatus.out_of_reach:
-            return f"{where}{others} is out of reach by {float(self.distance[place]):.4g} m"
+            distance = float(self.distance[place])
+            return f"{where}{others} is out of reach" + (f" by {distance:.4g} m" if distance > 0 else "")
         return f"{where}{others} is reached only outside the joint limits"

@@ -1,0 +1,204 @@
+"""`dhkit ik`: the same solutions as in Python, however the pose is given; bad input in one line."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from dhkit import Arm, pose, robots
+from dhkit.cli import main
+
+CLOSES = 1e-12
+
+
+@pytest.fixture
+def ik(capsys):
+    """Run `dhkit ik`; return its status, stdout and stderr."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as exit:
+            main(("ik", *arguments))
+        out, err = capsys.readouterr()
+        return exit.value.code, out, err
+
+    return run
+
+
+@pytest.fixture
+def facts(ik):
+    """Run `dhkit ik --json`; return its status and what it says."""
+
+    def run(*arguments):
+        status, out, err = ik(*arguments, "--json")
+        assert err == ""
+        return status, json.loads(out)
+
+    return run
+
+
+def joints(said):
+    return np.array([branch["q"] for branch in said["branches"]])
+
+
+@pytest.mark.parametrize("name", [name for name in robots() if name not in ("jaco", "panda")])
+def test_every_branch_of_every_robot_closes(facts, name):
+    arm = Arm.load(name)
+    q = arm.configurations["ready"] + 0.1
+    status, said = facts(name, "--like", " ".join(f"{x:.17g}" for x in q))
+    expected = arm.ik(arm.fk(q))
+    assert status == 0
+    assert said["inverse_kinematics"] == arm.family
+    assert said["method"] == "closed form"
+    assert [branch["name"] for branch in said["branches"]] == [
+        name for name, valid in zip(expected.branches, expected.valid, strict=True) if valid
+    ]
+    numbers = arm.description.numbers
+    for branch in said["branches"]:
+        values = np.array(branch["q"])
+        if "x" in said["met"]:
+            assert np.abs(arm.fk(values)[:3, 3] - arm.fk(q)[:3, 3]).max() < CLOSES
+        if len(said["met"]) == 6:
+            assert np.abs(arm.fk(values) - arm.fk(q)).max() < CLOSES
+        inside = np.all((values >= numbers.lower - 1e-9) & (values <= numbers.upper + 1e-9))
+        assert inside == branch["within_limits"]
+
+
+def test_all_ways_to_give_a_pose_agree(facts, tmp_path):
+    T = pose((0.4318, -0.1, 0.2), euler=(0, 90, -45), degrees=True)
+    numbers = [f"{x:.17g}" for x in T.ravel()]
+    np.savetxt(tmp_path / "pose.txt", T)
+    (tmp_path / "rows.txt").write_text(repr(T[:3].tolist()))
+    answers = [
+        facts("puma560", "--xyz", "17*inch", "-0.1", "0.2", "--euler", "0", "pi/2", "-pi/4"),
+        facts("puma560", "--euler", "0", "90", "-45", "--degrees", "--xyz", "0.4318", "-100*mm", "0.2"),
+        facts("puma560", "--xyz=0.4318,-0.1,0.2", "--euler=0,90,-45", "--degrees"),
+        facts("--xyz", "0.4318", "-.1", "0.2", "--euler", "-45", "90", "0", "--order", "zyx", "--degrees", "puma560"),
+        facts("puma560", "--matrix", *numbers),
+        facts("puma560", "--matrix", *numbers[:12]),
+        facts("puma560", "--matrix", str(tmp_path / "pose.txt")),
+        facts("puma560", "--matrix", str(tmp_path / "rows.txt")),
+        facts("puma560", "--like", *(f"{x:.17g}" for x in Arm.load("puma560").ik(T).branch("right up no-flip"))),
+    ]
+    for status, said in answers:
+        assert status == 0
+        assert np.abs(np.array(said["T"]) - T).max() < 1e-14
+        assert len(said["branches"]) == 8
+        assert np.abs(np.exp(1j * joints(said)) - np.exp(1j * joints(answers[0][1]))).max() < 1e-9
+
+
+def test_people_see_the_family_the_pose_and_every_branch(ik):
+    arm = Arm.load("puma560")
+    status, out, err = ik("puma560", "--like", "nominal", "--degrees", "--near", "0", "45", "180", "0", "45", "0")
+    assert (status, err) == (0, "")
+    assert arm.family in out
+    assert "pose: x y z 0.596303 -0.15005 0.657476 m, XYZ 0 90 0 °" in out
+    assert all(branch in out for branch in arm.ik(np.eye(4)).branches)
+    assert "outside: q2, q4" in out
+    assert "8 of 8 branches reach the pose, 3 inside the limits; → nearest: right up no-flip" in out.replace(
+        "right down flip", "right up no-flip"
+    )
+    (marked,) = [line for line in out.splitlines() if line.startswith("→")]
+    assert "right" in marked
+
+
+def test_near_chooses_windings_and_the_free_joint_and_marks_the_nearest(facts):
+    arm = Arm.load("ur5")
+    near = [*np.degrees(arm.configurations["nominal"])[:5], 350]
+    words = [str(x) for x in near]
+    status, said = facts("ur5", "--like", "nominal", "--near", *words, "--degrees")
+    chosen = next(branch for branch in said["branches"] if branch["name"] == said["nearest"])
+    assert status == 0
+    assert np.degrees(chosen["q"])[5] == pytest.approx(360)
+    assert np.degrees(chosen["q"])[:5] == pytest.approx(near[:5], abs=1e-6)
+    # The wrist is straight at zero: joint 4 is free and takes the value asked for.
+    status, said = facts("puma560", "--like", "zero", "--near", "0 0 0 0.3 0 0")
+    chosen = next(branch for branch in said["branches"] if branch["name"] == said["nearest"])
+    assert chosen["flags"] == ["wrist"]
+    assert np.allclose(chosen["q"], [0, 0, 0, 0.3, 0, -0.3], atol=1e-9)
+    assert "wrist singular" in str(said) or said["status"] == "singular"
+
+
+def test_only_branches_inside_the_limits_are_shown_on_request(facts, ik):
+    arm = Arm.load("puma560")
+    within = arm.ik(arm.fk(arm.configurations["nominal"])).within
+    status, said = facts("puma560", "--like", "nominal", "--limits")
+    assert status == 0
+    assert len(said["branches"]) == within.sum() == 3
+    assert all(branch["within_limits"] for branch in said["branches"])
+    # A pose that is reached outside the limits alone.
+    arguments = ("puma560", "--xyz", "0.4", "0", "-0.1")
+    assert facts(*arguments)[0] == 0
+    status, out, err = ik(*arguments, "--limits")
+    assert (status, err) == (1, "")
+    assert "reached, but by no branch inside the joint limits" in out
+
+
+def test_out_of_reach_says_by_how_much(ik, facts):
+    status, out, err = ik("planar2r", "--xyz", "1", "0", "0")  # links of 0.5 m and 0.4 m
+    assert (status, err) == (1, "")
+    assert "out of reach by 0.1 m" in out
+    status, said = facts("planar2r", "--xyz", "1", "0", "0")
+    assert (status, said["branches"], said["status"]) == (1, [], "out_of_reach")
+    assert said["distance"] == pytest.approx(0.1)
+
+
+def test_iteration_finds_one_solution_for_any_arm(facts, ik):
+    arm = Arm.load("panda")
+    status, said = facts("panda", "--like", "ready", "--numeric", "--near", "ready")
+    assert (status, said["method"], len(said["branches"])) == (0, "numeric", 1)
+    assert said["branches"][0]["within_limits"]
+    assert np.abs(arm.fk(joints(said)[0]) - np.array(said["T"])).max() < 1e-11
+    status, out, _ = ik("panda", "--xyz", "5", "0", "0", "--numeric")
+    assert status == 1
+    assert "no solution found by iteration: the best try misses the position by 4." in out
+
+
+def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):
+    from dhkit.kinematics import external
+
+    external._solver.cache_clear()
+    monkeypatch.setitem(sys.modules, "ssik", None)
+    status, said = facts("panda", "--like", "ready")
+    assert (status, said["method"]) == (0, "numeric")
+    assert "pip install dhkit[ik]" in said["note"]
+    status, out, _ = ik("panda", "--like", "ready")
+    assert status == 0
+    assert "note: one solution by iteration: panda is 7R: no closed form known" in out
+    assert "1 solution found by iteration" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["puma560"], "expected one of --xyz, --matrix and --like"),
+        (["puma560", "--xyz", "1", "0", "0", "--like", "ready"], "expected one of --xyz, --matrix and --like"),
+        (["puma560", "--xyz", "1", "2"], "--xyz: 2 values; expected 3"),
+        (["puma560", "--xyz", "1", "2", "three"], "--xyz: unknown name 'three'"),
+        (["puma560", "--xyz", "1", "2", "3", "4"], "unexpected extra argument"),
+        (["puma560", "--xyz"], "--xyz: no values"),
+        (["puma560", "--xyz", "1", "2", "3", "--euler", "1", "2"], "--euler: 2 values; expected 3"),
+        (["puma560", "--xyz", "1", "2", "3", "--order", "XXY"], "order is 'XXY'"),
+        (["puma560", "--xzy", "1", "2", "3"], "No such option: --xzy"),
+        (["puma560", "--like", "raedy"], "no configuration 'raedy'; it has zero, ready, nominal, stretched"),
+        (["puma560", "--like", "1", "2"], "2 values of --like; expected 6"),
+        (["puma560", "--like", "ready", "--near", "1", "2"], "2 values of --near; expected 6"),
+        (["puma560", "--matrix", "1", "2", "3"], "--matrix: 3 values; expected 16 or 12"),
+        (["puma560", "--matrix", "1 0 0 0 0 1 0 0 0 0 2 0"], "rotation must be orthonormal"),
+        (["puma560", "--matrix", "none.txt"], "found 'none.txt'; expected 16 or 12 numbers"),
+        (["puma560", "--matrix", "huge.txt"], "more than 10000 bytes"),
+        (["puma560", "--matrix", "binary.txt"], "not text"),
+        (["puma560", "--matrix", "short.txt"], "--matrix: 2 values; expected 16 or 12"),
+        (["pume560", "--like", "ready"], "did you mean 'puma560'?"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(ik, arguments, complaint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "huge.txt").write_text("1 " * 6000)
+    (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "short.txt").write_text("1 2")
+    status, out, err = ik(*arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("dhkit: ")
+    assert err.count("\n") == 1
+    assert complaint in err

@@ -1,0 +1,137 @@
+"""A path of poses is followed on one branch, through whole turns, and what stands in the way is reported."""
+
+import numpy as np
+import pytest
+
+from dhkit import Arm, pose
+from dhkit.errors import ModelError, UnreachableError
+
+
+def line(T, to, count=200):
+    """Return poses along a straight line, the rotation kept."""
+    poses = np.repeat(np.asarray(T)[None], count, axis=0)
+    poses[:, :3, 3] += np.linspace(0, 1, count)[:, None] * to
+    return poses
+
+
+def smooth(q):
+    return np.abs(np.diff(q, axis=0)).max() < 0.2
+
+
+def test_a_line_is_followed_on_one_branch():
+    arm = Arm.load("puma560")
+    q0 = arm.configurations["nominal"]
+    T = line(arm.fk(q0), [0, 0.5, -0.2])
+    path = arm.ik_path(T, q0)
+    assert path.ok
+    assert set(path.branch) == {"right up no-flip"}
+    assert np.abs(path.q[0] - q0).max() < 1e-9
+    assert smooth(path.q)
+    assert np.abs(arm.fk(path.require()) - T).max() < 1e-12
+
+
+def test_other_branches_are_followed_from_other_starts():
+    arm = Arm.load("puma560")
+    solutions = arm.ik(arm.fk(arm.configurations["nominal"]))
+    T = line(arm.fk(arm.configurations["nominal"]), [0, 0.2, 0.1])
+    for name in ("right up flip", "left down flip", "left down no-flip"):
+        path = arm.ik_path(T, solutions.branch(name), limits=False)
+        assert path.ok
+        assert set(path.branch) == {name}
+
+
+def test_joints_go_on_through_whole_turns():
+    arm = Arm.load("ur5")
+    q0 = np.array([0.0, -1.2, 1.5, -0.8, 1.0, 0.4])
+    turns = np.linspace(0, 3 * 2 * np.pi, 600)
+    q = np.repeat(q0[None], len(turns), axis=0)
+    q[:, 0], q[:, 5] = q0[0] + turns, q0[5] - turns
+    path = arm.ik_path(arm.fk(q), q0, limits=False)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-9
+
+
+def test_the_wrist_keeps_its_angle_through_a_straight_wrist():
+    arm = Arm.load("irb140")
+    q = np.repeat([[0.2, 0.3, 0.1, 0.7, 0.0, -0.4]], 101, axis=0)
+    q[:, 4] = np.linspace(-0.5, 0.5, 101)
+    q[50, 4] = 0.0
+    path = arm.ik_path(arm.fk(q), q[0], limits=False)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-6
+    assert 50 in path.near_singular
+    assert len(set(path.branch[:50])) == 1
+    assert path.branch[0].replace(" flip", " no-flip") == path.branch[-1]
+
+
+def test_poses_out_of_reach_are_lost_and_the_rest_is_followed():
+    arm = Arm.load("puma560")
+    q0 = arm.configurations["nominal"]
+    T = line(arm.fk(q0), [0.8, 0, 0], 100)
+    path = arm.ik_path(T, q0)
+    assert path.lost
+    assert path.lost == tuple(range(path.lost[0], 100))
+    assert np.isnan(path.q[path.lost[0] :]).all()
+    assert path.branch[-1] == ""
+    assert not path.ok
+    with pytest.raises(UnreachableError, match=f"pose {path.lost[0]}"):
+        path.require()
+    assert path.near_singular  # it stretches before it is lost
+
+
+def test_a_limit_in_the_way_makes_the_arm_switch_and_that_is_said():
+    arm = Arm.load("puma560")
+    q0 = np.radians([150, 45, 180, 0, 45, 0])
+    q0[2] -= 2 * np.pi
+    turn = np.linspace(0, np.radians(40), 80)
+    q = np.repeat(q0[None], 80, axis=0)
+    q[:, 0] += turn  # past the waist's 160 degrees
+    free = arm.ik_path(arm.fk(q), q0, limits=False)
+    assert free.ok
+    assert np.abs(free.q - q).max() < 1e-9
+    path = arm.ik_path(arm.fk(q), q0)
+    assert not path.ok
+    assert path.switches or path.lost
+    numbers = arm.description.numbers
+    reached = path.q[~np.isnan(path.q).any(axis=1)]
+    assert ((reached >= numbers.lower - 1e-8) & (reached <= numbers.upper + 1e-8)).all()
+    if path.switches:
+        with pytest.raises(UnreachableError, match="has to switch branches"):
+            path.require()
+
+
+@pytest.mark.parametrize("name", ["planar2r", "cobra600", "al5d", "stanford"])
+def test_any_arm_with_a_closed_form_follows(name):
+    arm = Arm.load(name)
+    numbers = arm.description.numbers
+    middle = np.where(np.isfinite(numbers.lower + numbers.upper), (numbers.lower + numbers.upper) / 2, 0.0)
+    q0 = middle + np.where(numbers.prismatic, 0.0, 0.2)
+    q = q0 + np.linspace(0, 0.3, 50)[:, None] * np.where(numbers.prismatic, 0.1, 1.0)
+    path = arm.ik_path(arm.fk(q), q0, limits=False)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-6
+    assert "50 poses: 0 switches" in repr(path)
+
+
+def test_what_is_refused():
+    arm = Arm.load("puma560")
+    with pytest.raises(ValueError, match=r"expected \(N, 4, 4\)"):
+        arm.ik_path(np.eye(4), np.zeros(6))
+    with pytest.raises(ValueError, match="expected"):
+        arm.ik_path(np.eye(4)[None], np.zeros(5))
+    with pytest.raises(ValueError, match="finite"):
+        arm.ik_path(np.eye(4)[None], np.full(6, np.nan))
+    with pytest.raises(ModelError, match="ik_numeric"):
+        Arm.from_dh([(0, 0.1, 0.2, 0.3), (0, 0.1, 0.2, 0.4)]).ik_path(np.eye(4)[None], np.zeros(2))
+
+
+def test_a_circle_with_turning_tool_is_followed_and_closes():
+    arm = Arm.load("kr5")
+    q0 = np.radians([0, -60, 60, 0, -50, 0])
+    phi = np.linspace(0, 2 * np.pi, 300)
+    T = np.repeat(arm.fk(q0)[None], len(phi), axis=0)
+    T[:, :3, 3] += 0.15 * np.stack([0 * phi, np.sin(phi), 1 - np.cos(phi)], axis=1)
+    T = T @ pose((0, 0, 0), euler=np.stack([0.3 * np.sin(phi), 0 * phi, 0 * phi], axis=1))
+    path = arm.ik_path(T, q0)
+    assert path.ok, path
+    assert np.abs(path.q[0] - path.q[-1]).max() < 1e-9
