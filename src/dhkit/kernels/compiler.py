@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
+from numba.extending import intrinsic
+from numba.types import boolean, float64
 
 from dhkit.kernels import elementary
 
@@ -33,10 +35,36 @@ def compiled(
     return numba.njit(signature, cache=cache, boundscheck=False, **SETTINGS)  # type: ignore[no-any-return]
 
 
-@numba.njit(**SETTINGS)  # type: ignore[untyped-decorator]
-def select(condition: Any, true: Any, false: Any) -> Any:
-    """Return one of two values: of two numbers at hand LLVM makes a choice without a branch."""
-    return true if condition else false
+# What is one instruction of the machine is given to LLVM as such: a jitted function would be compiled on its own.
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def select(context: Any, condition: Any, true: Any, false: Any) -> Any:
+    """Return one of two values without a branch."""
+    signature = float64(boolean, float64, float64)
+    return signature, lambda context, builder, signature, values: builder.select(*values)
+
+
+def _unary(instruction: str) -> Any:
+    """Return a function of one number that LLVM knows."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def function(context: Any, x: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            return builder.call(builder.module.declare_intrinsic(f"llvm.{instruction}", [values[0].type]), values)
+
+        return float64(float64), code
+
+    return function
+
+
+absolute, sqrt, floor = _unary("fabs"), _unary("sqrt"), _unary("floor")
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def logical_not(context: Any, x: Any) -> Any:
+    """Return the opposite of a condition."""
+    return boolean(boolean), lambda context, builder, signature, values: builder.not_(values[0])
 
 
 def _twin(function: Any) -> Callable[..., Any]:
@@ -45,10 +73,6 @@ def _twin(function: Any) -> Callable[..., Any]:
     return numba.njit(types.FunctionType(function.__code__, names), **SETTINGS)  # type: ignore[no-any-return]
 
 
-absolute = _twin(elementary.absolute)
-floor = _twin(elementary.floor)
-sqrt = _twin(elementary.sqrt)
-logical_not = _twin(elementary.logical_not)
 minimum = _twin(elementary.minimum)
 maximum = _twin(elementary.maximum)
 sincos = _twin(elementary.sincos)
