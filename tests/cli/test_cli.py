@@ -92,8 +92,8 @@ def test_verify_says_how_well_and_fails_where_it_does_not(dhkit, monkeypatch):
     # Our frames off by a nanometre: the check must see it.
     import dhkit.verification.kinematics as kinematics
 
-    right = kinematics.world_to_tool
-    monkeypatch.setattr(kinematics, "world_to_tool", lambda arm, q: right(arm, q) + 1e-9)
+    right = kinematics.forward_kinematics
+    monkeypatch.setattr(kinematics, "forward_kinematics", lambda arm, q: right(arm, q) + 1e-9)
     status, out, _ = dhkit("verify", "ur5", "--samples", "10")
     assert status == 1
     assert "DISAGREES at q" in out

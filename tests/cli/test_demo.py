@@ -13,7 +13,6 @@ from dhkit.cli import main
 from dhkit.cli.straight import branches, straight_line
 from dhkit.cli.tour import RATE, tour
 
-
 CLOSES = 1e-12
 """m: rounding of solutions found by iteration included."""
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ik_checks import FAMILY_A, FAMILY_B, gaps, measures
 
 from dhkit import Arm
 from dhkit.bench.contenders import Workload
@@ -12,6 +11,7 @@ from dhkit.bench.peers import eaik
 from dhkit.description import library_robot
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, solve_numerically
 from dhkit.kinematics.external import solve_externally
+from ik_checks import FAMILY_A, FAMILY_B, gaps, measures
 from random_arms import states
 
 SAME = 1e-6

@@ -111,13 +111,15 @@ def _inverse(arm: Arm, shown: list[Shown]) -> str:
 
 def _ways(ways: Branches) -> str:
     count = len(ways.q)
+    one = count == 1
     if ways.closed_form:
-        what = f"{count} branch{'es' if count > 1 else ''} of one pose"
+        what = f"{count} branch{'' if one else 'es'} of one pose"
     else:
-        what = f"no closed form: {count} solution{'s' if count > 1 else ''} of one pose, by iteration,"
+        what = f"no closed form: {count} solution{'' if one else 's'} of one pose, by iteration,"
     if ways.error is None:
-        return f"{what} aim at one point"
-    return f"{what} close FK to {ways.error:.0e}" if ways.error else f"{what} close FK exactly"
+        return f"{what} aim{'s' * one} at one point"
+    to = f"to {ways.error:.0e}" if ways.error else "exactly"
+    return f"{what} close{'s' * one} FK {to}"
 
 
 def _followed(line: Line | None) -> str:

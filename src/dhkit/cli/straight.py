@@ -112,7 +112,7 @@ def _starts(arm: Arm) -> Iterator[Array]:
 def _lines(arm: Arm, q: Array) -> Iterator[Array]:
     """Yield poses (N, 4, 4) along lines through the tool at q, orientation kept."""
     middle = arm.fk(q)
-    for share in SHARES:
+    for share in SHARES if arm.description.reach else ():
         length = float(f"{share * arm.description.reach:.1g}")
         for way in WAYS:
             T = np.repeat(middle[None], POSES, axis=0)

@@ -21,6 +21,7 @@ __all__ = [
     "angle",
     "both",
     "chosen",
+    "combined",
     "either",
     "half_turn",
     "hypot",
@@ -124,6 +125,12 @@ def hypot(a: SX, b: SX) -> SX:
 def rotated(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
     """Return a vector times a 3 x 3 matrix."""
     x, y, z = (sum(R[i, k] * vector[k] for k in range(3)) for i in range(3))
+    return x, y, z
+
+
+def combined(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
+    """Return a sum of vectors, each times its weight."""
+    x, y, z = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
     return x, y, z
 
 

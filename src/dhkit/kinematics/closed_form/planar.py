@@ -14,7 +14,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.arm_plane import Vector, as_pair
+from dhkit.kinematics.closed_form.arm_plane import as_pair
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
@@ -25,6 +25,7 @@ from dhkit.kinematics.closed_form.formulas import (
     absolute,
     angle,
     both,
+    combined,
     hypot,
     no,
     positive,
@@ -95,7 +96,7 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], IDENTITY)
     kinds = pose.structure
     turning = kinds.count("R") == 3
-    wanted = _combined(p["axis"], T.rotation)
+    wanted = combined(p["axis"], T.rotation)
     rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
     lever = p["lever"]
     x, u, v = T.position
@@ -228,8 +229,3 @@ def _off_plane(rise: SX, scale: SX) -> SX:
 def _either(upright: SX, both: tuple[tuple[SX, SX], tuple[SX, SX]], side: int) -> tuple[SX, SX]:
     one, other = both[side], both[1 - side]
     return where(upright, one[0], other[0]), where(upright, one[1], other[1])
-
-
-def _combined(weights: tuple[SX, ...], vectors: tuple[Vector, Vector, Vector]) -> Vector:
-    x, u, v = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
-    return x, u, v

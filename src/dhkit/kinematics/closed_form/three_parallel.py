@@ -9,20 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from dhkit.kinematics.axes import Axes, inverse_pose
+from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.arm_plane import (
     FLIPS,
     ArmPlane,
     Shoulder,
     Vector,
-    as_pair,
     branch_names,
     ordered_shoulders,
     turned_back,
 )
-from dhkit.kinematics.closed_form.family import ALL, Fit, PoseSymbols, Seen
+from dhkit.kinematics.closed_form.family import ALL, Fit, Parameter, PoseSymbols, Seen
 from dhkit.kinematics.closed_form.formulas import (
     SINGULAR,
     SX,
@@ -33,19 +30,17 @@ from dhkit.kinematics.closed_form.formulas import (
     both,
     chosen,
     either,
-    half_turn,
     hypot,
     larger,
     positive,
-    rotated,
     sign,
     sqrt,
     times,
-    two_link,
     unit,
     where,
-    wrapped,
 )
+from dhkit.kinematics.closed_form.links import ELBOWS, Elbow, elbows, link_parameters
+from dhkit.kinematics.closed_form.wrist import joints_5_and_6, turned, wrist_parameters
 
 __all__ = ["three_parallel_fit", "three_parallel_formulas"]
 
@@ -63,39 +58,19 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
     if meeting is None:
         return None
     plane = ArmPlane.of(axes)
-    second, third, fourth, end = (
-        plane.coordinates(point) for point in (axes.point(2), axes.point(3), axes.point(4), meeting)
-    )
-    upper, fore = third[:2] - second[:2], fourth[:2] - third[:2]
-    if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
+    links = link_parameters(axes, plane, axes.point(4))
+    if links is None:
         return None
-    v, z5, z6 = axes.direction(2), axes.direction(5), axes.direction(6)
-    T_world_wrist = np.eye(4)
-    T_world_wrist[:3, :3] = np.stack([z6, z5, np.cross(z6, z5)], axis=1)
-    T_world_wrist[:3, 3] = meeting
-    upper_pair, fore_pair, wrist = as_pair(*upper), as_pair(*fore), as_pair(v @ z6, z5 @ np.cross(v, z6))
-    offset = axes.snapped(end[2])
+    fourth, end = plane.coordinates(axes.point(4)), plane.coordinates(meeting)
+    own: dict[str, Parameter] = {
+        "offset": axes.snapped(end[2]),
+        "lever": end[:2] - fourth[:2],
+        "sense4": axes.sense(2, 4),
+    }
     return Fit(
         words="axes 2, 3 and 4 parallel, 5 and 6 meet",
-        parameters={
-            "T_plane_world": plane.T[:3],
-            "T_tool_wrist": (inverse_pose(axes.T_world_tool) @ T_world_wrist)[:3],
-            "F": np.stack([np.cross(z5, v), z5, v]) @ plane.R.T + 0.0,
-            "wrist": wrist,
-            "straight": np.angle(complex(*wrist) ** 2),
-            "lever": end[:2] - fourth[:2],
-            "a1": second[0],
-            "offset": offset,
-            "L2": np.linalg.norm(upper),
-            "L3": np.linalg.norm(fore),
-            "upper": upper_pair,
-            "bend": times(fore_pair, upper_pair, -1.0),
-            "sense3": axes.sense(2, 3),
-            "sense4": axes.sense(2, 4),
-            "up": plane.up,
-            "reach": axes.scale,
-        },
-        branches=branch_names(offset, ("up", "down"), FLIPS),
+        parameters=wrist_parameters(axes, plane, axes.direction(2), meeting) | links | own,
+        branches=branch_names(own["offset"], ELBOWS, FLIPS),
         met=ALL,
         free=5,
     )
@@ -104,11 +79,10 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
 def three_parallel_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches: shoulder, then elbow, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
-    branches = []
+    branches: list[Branch] = []
     for shoulder in ordered_shoulders(p, T.position, pose.scale):
-        unflipped, flipped = _wrists(p, T, shoulder, pose)
-        for raised in (True, False):
-            branches += [wrist[0 if raised else 1] for wrist in (unflipped, flipped)]
+        for pair in zip(*_wrists(p, T, shoulder, pose), strict=True):
+            branches += pair
     return branches
 
 
@@ -116,23 +90,19 @@ def _wrists(
     p: Mapping[str, SX], T: Seen, shoulder: Shoulder, pose: PoseSymbols
 ) -> tuple[tuple[Branch, Branch], tuple[Branch, Branch]]:
     """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it."""
-    F = p["F"]
-    a, n, m = (rotated(F, turned_back(vector, shoulder.q1)) for vector in T.rotation)
-    swing = hypot(a[0], a[1])
+    wrist = turned(p, (turned_back(axis, shoulder.q1) for axis in T.rotation))
+    position = turned_back(T.position, shoulder.q1)
     # rho is how far links 2 to 4 have turned in all. Where axis 6 is parallel to them only rho and joint 6 together
     # are determined: joint 6 is then free, and rho is read off axis 5 with joint 6 undone.
     c6, s6 = pose.free
-    seen = turned_back(T.position, shoulder.q1)
-    free = unit(c6 * n[1] - s6 * m[1], s6 * m[0] - c6 * n[0])
-    rho = _within_reach(p, seen, unit(a[0], a[1], otherwise=free), swing)
-    bend = unit(rho[0] * a[0] + rho[1] * a[1], a[2])
-    q5 = angle(times((bend[1], bend[0]), p["wrist"], -1.0))
-    q6 = angle(unit(rho[0] * n[1] - rho[1] * n[0], rho[1] * m[0] - rho[0] * m[1]))
+    swing = hypot(wrist.a[0], wrist.a[1])
+    free = unit(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
+    rho = _within_reach(p, position, unit(wrist.a[0], wrist.a[1], otherwise=free), swing)
+    unflipped, flipped = joints_5_and_6(p, wrist, rho)
     singular = swing < SINGULAR
-    flipped = wrapped(-q5 - p["straight"]), half_turn(q6)
     return (
-        _elbows(p, seen, shoulder, rho, (q5, q6), singular, pose.scale),
-        _elbows(p, seen, shoulder, (-rho[0], -rho[1]), flipped, singular, pose.scale),
+        _elbows(p, position, shoulder, rho, unflipped, singular, pose.scale),
+        _elbows(p, position, shoulder, (-rho[0], -rho[1]), flipped, singular, pose.scale),
     )
 
 
@@ -170,22 +140,18 @@ def _elbows(
     lever = p["lever"]
     x = position[0] - p["a1"] - (rho[0] * lever[0] - rho[1] * lever[1])
     u = position[1] - (rho[1] * lever[0] + rho[0] * lever[1])
-    arm = two_link(x, u, p["L2"], p["L3"], scale)
-    # The left elbow of the line to axis 4 is the upper one where axis 4 is in front of axis 2.
-    front = sign(p["up"] * x)
 
-    def branch(raised: SX) -> Branch:
-        q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
-        bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
-        rest = times(times(rho, q2, -1.0), bent, -1.0)
-        q3, q4 = (bent[0], p["sense3"] * bent[1]), (rest[0], p["sense4"] * rest[1])
+    def branch(elbow: Elbow) -> Branch:
+        rest = times(rho, elbow.turned, -1.0)
+        q4 = angle((rest[0], p["sense4"] * rest[1]))
         return Branch(
-            (angle(shoulder.q1), angle(q2), angle(q3), angle(q4), *wrist),
-            miss=hypot(shoulder.miss, arm.miss),
+            (angle(shoulder.q1), *elbow.joints, q4, *wrist),
+            miss=hypot(shoulder.miss, elbow.miss),
             shoulder=shoulder.singular,
-            elbow=arm.straight,
+            elbow=elbow.singular,
             wrist=singular,
-            clamped=either(shoulder.clamped, arm.clamped),
+            clamped=either(shoulder.clamped, elbow.clamped),
         )
 
-    return branch(front), branch(-front)
+    upper, lower = elbows(p, x, u, scale)
+    return branch(upper), branch(lower)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.arm_plane import (
     ArmPlane,
@@ -18,20 +17,18 @@ from dhkit.kinematics.closed_form.arm_plane import (
 )
 from dhkit.kinematics.closed_form.family import Fit, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
-    NOTHING,
     SINGULAR,
     SX,
     Branch,
     Pair,
     angle,
-    chosen,
+    combined,
     either,
     hypot,
-    sign,
     times,
-    two_link,
     unit,
 )
+from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
 __all__ = [
     "pan_tilt_fit",
@@ -42,7 +39,6 @@ __all__ = [
     "yaw_two_formulas",
 ]
 
-ELBOWS = ("up", "down")
 IDENTITY = np.eye(4)[:3]
 
 
@@ -87,7 +83,7 @@ def yaw_two_fit(axes: Axes) -> Fit | None:
     if axes.kinds != "RRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3)):
         return None
     plane = ArmPlane.of(axes)
-    links = _links(axes, plane, axes.T_world_tool[:3, 3])
+    links = link_parameters(axes, plane, axes.T_world_tool[:3, 3])
     if links is None:
         return None
     return Fit(
@@ -103,7 +99,7 @@ def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     position = pose.seen(p["T_plane_world"], IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose.scale):
-        branches += _elbows(p, shoulder, shoulder.x - p["a1"], position[1], pose.scale, None, 0.0)
+        branches += _branches(p, shoulder, shoulder.x - p["a1"], position[1], pose.scale, None, 0.0)
     return branches
 
 
@@ -112,7 +108,7 @@ def yaw_three_fit(axes: Axes) -> Fit | None:
     if axes.kinds != "RRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
         return None
     plane = ArmPlane.of(axes)
-    links = _links(axes, plane, axes.point(4))
+    links = link_parameters(axes, plane, axes.point(4))
     tool = plane.coordinates(axes.T_world_tool[:3, 3])
     if links is None:
         return None
@@ -139,37 +135,33 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], IDENTITY)
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose.scale):
-        wanted = turned_back(_combined(p["axis"], T.rotation), shoulder.q1)
+        wanted = turned_back(combined(p["axis"], T.rotation), shoulder.q1)
         rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
         lever = p["lever"]
         x = shoulder.x - p["a1"] - (rho[0] * lever[0] - rho[1] * lever[1])
         u = T.position[1] - (rho[1] * lever[0] + rho[0] * lever[1])
         sideways = hypot(wanted[0], wanted[1]) < SINGULAR
-        branches += _elbows(p, shoulder, x, u, pose.scale, rho, sideways)
+        branches += _branches(p, shoulder, x, u, pose.scale, rho, sideways)
     return branches
 
 
-def _elbows(
+def _branches(
     p: Mapping[str, SX], shoulder: Shoulder, x: SX, u: SX, scale: SX, rho: Pair | None, sideways: SX
 ) -> list[Branch]:
-    arm = two_link(x, u, p["L2"], p["L3"], scale)
-    front = sign(p["up"] * x)
     branches = []
-    for raised in (front, -front):
-        q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
-        bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
-        joints = [angle(shoulder.q1), angle(q2), angle((bent[0], p["sense3"] * bent[1]))]
+    for elbow in elbows(p, x, u, scale):
+        joints = [angle(shoulder.q1), *elbow.joints]
         if rho is not None:
-            rest = times(times(rho, q2, -1.0), bent, -1.0)
+            rest = times(rho, elbow.turned, -1.0)
             joints.append(angle((rest[0], p["sense4"] * rest[1])))
         branches.append(
             Branch(
                 tuple(joints),
-                miss=hypot(shoulder.miss, arm.miss),
+                miss=hypot(shoulder.miss, elbow.miss),
                 shoulder=shoulder.singular,
-                elbow=arm.straight,
+                elbow=elbow.singular,
                 wrist=sideways,
-                clamped=either(shoulder.clamped, arm.clamped),
+                clamped=either(shoulder.clamped, elbow.clamped),
             )
         )
     return branches
@@ -177,26 +169,3 @@ def _elbows(
 
 def _common(axes: Axes, plane: ArmPlane) -> dict[str, Parameter]:
     return {"T_plane_world": plane.T[:3], "up": plane.up, "reach": axes.scale}
-
-
-def _links(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parameter] | None:
-    """Return the two links from axis 2 to axis 3 to a point; None where one has no length."""
-    second, third, last = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), end))
-    upper, fore = third[:2] - second[:2], last[:2] - third[:2]
-    if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= NOTHING * axes.scale:
-        return None
-    upper_pair, fore_pair = as_pair(*upper), as_pair(*fore)
-    return {
-        "a1": second[0],
-        "offset": axes.snapped(last[2]),
-        "L2": np.linalg.norm(upper),
-        "L3": np.linalg.norm(fore),
-        "upper": upper_pair,
-        "bend": times(fore_pair, upper_pair, -1.0),
-        "sense3": axes.sense(2, 3),
-    }
-
-
-def _combined(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
-    x, u, v = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
-    return x, u, v
