@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dhkit.description import Convention, Description
-from dhkit.kinematics import IKSolutions, forward_kinematics, frames
+from dhkit.description import Convention, Description, world_to_frames, world_to_tool
+from dhkit.kinematics import IKSolutions, forward_kinematics
 
 FAMILY_A = (
     "puma560",
@@ -22,13 +22,16 @@ SIX_JOINTS = (*FAMILY_A, *FAMILY_B, "stanford")
 FEW_JOINTS = ("cobra600", "planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "ax12_arm", "al5d")
 
 
-def closure(arm: Description, solutions: IKSolutions, T: np.ndarray) -> float:
-    """Return the worst error of forward kinematics of all returned branches, lengths over the reach."""
+def closure(arm: Description, solutions: IKSolutions, T: np.ndarray, fk=forward_kinematics) -> float:
+    """Return the worst error of forward kinematics of all returned branches, lengths over the reach.
+
+    For one arm of many take ``fk=world_to_tool``: it needs no kernel of the arm's own.
+    """
     count = solutions.valid.sum()
     if not count:
         return 0.0
     poses = np.broadcast_to(T[..., None, :, :], (*solutions.valid.shape, 4, 4))[solutions.valid]
-    error = np.abs(forward_kinematics(arm, solutions.q[solutions.valid]) - poses)[:, :3]
+    error = np.abs(fk(arm, solutions.q[solutions.valid]) - poses)[:, :3]
     error[..., 3] /= arm.reach or 1.0
     if solutions.met[0] == "azimuth":
         return aim(arm, solutions.q[solutions.valid], poses[:, :3, 3])
@@ -38,7 +41,7 @@ def closure(arm: Description, solutions: IKSolutions, T: np.ndarray) -> float:
 def aim(arm: Description, q: np.ndarray, targets: np.ndarray) -> float:
     """Return the worst angle by which a pan and tilt misses targets, seen from the foot of its tool on axis 2."""
     z, p, _ = axes_of(arm, q)
-    axis, point, tool = z[:, 1], p[:, 1], forward_kinematics(arm, q)[:, :3, 3]
+    axis, point, tool = z[:, 1], p[:, 1], world_to_tool(arm, q)[:, :3, 3]
 
     def across(x: np.ndarray) -> np.ndarray:
         v = x - point - np.sum((x - point) * axis, axis=-1, keepdims=True) * axis
@@ -56,7 +59,7 @@ def gaps(arm: Description, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def axes_of(arm: Description, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return directions (N, n, 3) and points (N, n, 3) of the axes, and the frames' origins (N, n + 1, 3)."""
-    T = frames(arm, q)
+    T = world_to_frames(arm, q)
     shift = 0 if arm.convention is Convention.STANDARD else 1
     carrying = T[:, shift : shift + arm.n]
     return carrying[..., :3, 2], carrying[..., :3, 3], T[..., :3, 3]
@@ -91,3 +94,10 @@ def measures(arm: Description, q: np.ndarray) -> dict[str, np.ndarray]:
         elbow = bend(z[:, 1], p[:, 1], p[:, 2], end)
     radial = sine_between(z[:, 0], centre - p[:, 0]) / arm.reach
     return {"wrist": wrist, "elbow": elbow, "shoulder": radial}
+
+
+def along_plane(arm: Description, q: np.ndarray) -> np.ndarray:
+    """Return how far the wrist is from axis 1 along the arm's plane, over the reach: 0 where both shoulders are one."""
+    z, p, origins = axes_of(arm, q)
+    lever = (origins[:, 5] if arm.name in FAMILY_B else origins[:, 4]) - p[:, 0]
+    return np.abs(np.sum(np.cross(z[:, 0], z[:, 1]) * lever, axis=-1)) / arm.reach
