@@ -169,7 +169,9 @@ def check_family(law, arm, names, tolerance):
     # Rounding of the pose itself: a tool or a base far away turns it into lengths.
     reach = arm.reach or 1.0
     scale = reach + np.abs(T[:, :3, 3]).max()
-    law.holds("closure of every branch", closure(arm, solutions, T, fk=world_to_tool) * reach / scale, tolerance, found.words)
+    law.holds(
+        "closure of every branch", closure(arm, solutions, T, fk=world_to_tool) * reach / scale, tolerance, found.words
+    )
     singular = (solutions.flags & (IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist)).any(axis=-1)
     nearest = np.where(singular, 0.0, np.nanmin(gaps(arm, solutions.q, q[:, None]), axis=-1, initial=np.inf))
     law.holds("the original among the branches", float(nearest.max()), 1e-4, found.words)

@@ -104,8 +104,8 @@ def _made(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[
         exec(compile(array_source(derive(), types), f"<{name}>", "exec"), space)  # noqa: S102 - text of our own making
         return Kernel(name, space["kernel"], compiled=False)
     key = store.digest(name, pattern, written_in or derive.__code__.co_filename)
-    module = store.load(name, key, lambda cache: loop_source(derive(), types, cache=cache))
-    return Kernel(name, module.kernel, compiled=True)
+    function = store.load(name, key, lambda cache: loop_source(derive(), types, cache=cache))
+    return Kernel(name, function, compiled=True)
 
 
 _kernels: dict[tuple[str, str, bool], Kernel] = {}
@@ -121,6 +121,12 @@ def _workers(count: int) -> ThreadPoolExecutor:
         return _pools[count]
 
 
-# Threads do not survive a fork: the child makes its own.
+def _after_fork() -> None:
+    """Threads do not survive a fork, nor does whoever held the lock: the child makes its own."""
+    global _lock
+    _lock = threading.RLock()
+    _pools.clear()
+
+
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pools.clear)
+    os.register_at_fork(after_in_child=_after_fork)

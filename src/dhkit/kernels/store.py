@@ -21,6 +21,9 @@ __all__ = ["cache_folder", "digest", "load"]
 
 log = logging.getLogger(__name__)
 
+END = "# end of kernel\n"
+"""The last line of a kernel's file."""
+
 
 def cache_folder() -> Path | None:
     """Return the user's own folder of kernels, made if missing: ``DHKIT_CACHE_DIR`` or the platform's cache folder.
@@ -54,19 +57,19 @@ def digest(name: str, pattern: str, derivation: str) -> str:
     return hashlib.sha256("\0".join((name, pattern, _sources(derivation), _machine())).encode()).hexdigest()[:32]
 
 
-def load(name: str, key: str, text: Callable[[bool], str]) -> types.ModuleType:
-    """Return a kernel's module from the disk, or from new text; ``text(cached)`` derives it."""
+def load(name: str, key: str, text: Callable[[bool], str]) -> Callable[..., None]:
+    """Return a kernel from the disk, or from new text; ``text(cached)`` derives it."""
     folder = cache_folder()
     if folder is None:
         return _in_memory(name, text)
     path = folder / f"{name}_{key}.py"
-    known = path.exists()
+    known = _is_whole(path)
     if not (known and any((folder / "__pycache__").glob(f"{path.stem}.kernel-*.nbc"))):
         log.info("compiling %s for the first time; later processes load it from %s", name, folder)
     new = "" if known else text(True)
     try:
         if not known:
-            write_atomically(path, new)
+            write_atomically(path, new + END)
         return _from_file(path)
     except Exception as error:
         # A damaged or vanished cache must never stop a computation.
@@ -76,14 +79,23 @@ def load(name: str, key: str, text: Callable[[bool], str]) -> types.ModuleType:
         return _in_memory(name, text)
 
 
-def _in_memory(name: str, text: Callable[[bool], str]) -> types.ModuleType:
+def _is_whole(path: Path) -> bool:
+    """Return whether a kernel's text was written to its end: a full disk or a power cut may have left part of it."""
+    try:
+        return path.read_text(encoding="utf-8").endswith(END)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _in_memory(name: str, text: Callable[[bool], str]) -> Callable[..., None]:
     log.info("compiling %s", name)
     module = types.ModuleType(f"dhkit_kernel_{name}")
     exec(compile(text(False), f"<{module.__name__}>", "exec"), vars(module))  # noqa: S102 - text of our own making
-    return module
+    function: Callable[..., None] = module.kernel
+    return function
 
 
-def _from_file(path: Path) -> types.ModuleType:
+def _from_file(path: Path) -> Callable[..., None]:
     name = f"dhkit_kernel_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -91,7 +103,8 @@ def _from_file(path: Path) -> types.ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # Numba looks there for the module of what it unpickles
     spec.loader.exec_module(module)
-    return module
+    function: Callable[..., None] = module.kernel
+    return function
 
 
 @cache

@@ -52,16 +52,16 @@ def fill(
     return out
 
 
-def check_threads(threads: int) -> None:
+def check_threads(threads: object) -> None:
     """Refuse less than one thread.
 
     Raises
     ------
     ValueError
-        ``threads`` is below 1.
+        ``threads`` is no whole number, or below 1.
     """
-    if threads < 1:
-        raise ValueError(f"threads is {threads!r}; expected 1 or more")
+    if not isinstance(threads, int | np.integer) or threads < 1:
+        raise ValueError(f"threads is {threads!r}; expected a whole number, 1 or more")
 
 
 def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
@@ -77,8 +77,10 @@ def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
     if not isinstance(out, np.ndarray):
         raise ValueError(f"out is {type(out).__name__}; expected an array of shape {shape}, float64")
     if out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
+        layout = "C" if out.flags.c_contiguous else "Fortran" if out.flags.f_contiguous else "strided"
         raise ValueError(
-            f"out has shape {out.shape} and type {out.dtype}; expected {shape}, float64, contiguous and writeable"
+            f"out has shape {out.shape}, type {out.dtype} and layout {layout}; expected {shape}, float64, C-contiguous"
+            " and writeable"
         )
     return out
 

@@ -28,8 +28,8 @@ def export_kinematics(description: Description, folder: str | Path, name: str | 
     -------
     tuple[Path, Path]
         Source and header: self-contained C99; link with ``-lm``. Functions take and fill arrays of doubles, row by row,
-        SI and radians; the header says of what shape. ``free`` is the angle of the joint that is free at a wrist
-        singularity; branches are in the order of ``Arm.ik``'s.
+        SI and radians; the header says of what shape. ``free`` holds the angles of joint 1 where the wrist is on its
+        axis, and of the joint that is free at a wrist singularity; branches are in the order of ``Arm.ik``'s.
 
     Raises
     ------

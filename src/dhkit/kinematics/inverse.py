@@ -65,6 +65,8 @@ def inverse_kinematics(
     batch = poses.shape[:-2]
     B, n = len(fit.branches), description.n
     q = result_array((*batch, B, n), out)
+    if out is not None and np.may_share_memory(out, poses):
+        poses = poses.copy()
     distance = np.empty(batch)
     valid, flags = np.empty((2, *batch, B), dtype=np.uint8)
     status = np.empty(batch, dtype=np.uint8)
@@ -79,7 +81,7 @@ def inverse_kinematics(
             flags.reshape(count, B),
             status.reshape(count, 1),
         ]
-        run(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 1)], rows, threads)
+        run(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
     numbers = description.numbers
     return IKSolutions(
         q=q,
@@ -127,13 +129,15 @@ def _solved_externally(description: Description, T: Array, out: Array | None, th
 
 
 def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
-    if seed is None or fit.free is None:
-        return np.zeros(batch)
+    """Return the angles of joint 1 and of the wrist's free joint where they are not determined, shape (..., 2)."""
+    if seed is None:
+        return np.zeros((*batch, 2))
     try:
-        angles = np.broadcast_to(joint_array(description, seed, "seed")[..., fit.free], batch)
+        joints = joint_array(description, seed, "seed")[..., [0, fit.free or 0]]
+        angles = np.broadcast_to(joints, (*batch, 2))
     except ValueError:
         raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None
-    return np.where(np.isfinite(angles), angles, 0.0)
+    return np.ascontiguousarray(np.where(np.isfinite(angles), angles, 0.0))
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ class IKPath:
     """Places (of the pose after) where a joint jumps: the branch followed so far ended, or left its limits."""
     lost: tuple[int, ...]
     """Places of poses that no branch reaches inside the limits."""
+    start: float
+    """The largest difference between ``q0`` and the joint values at the first pose reached, rad or m."""
     near_singular: tuple[int, ...]
     """Places of poses at which a singular value of the Jacobian that is not always 0, lengths over the reach, is
     below 0.02: there joints may have to turn fifty times as fast as the tool."""
@@ -111,23 +113,25 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     switches, lost, at = [], [], q0
     for k in range(len(poses)):
         candidates, allowed = solutions.q[k], usable[k]
-        if np.any(solutions.flags[k] & IKFlag.wrist):
-            # Where the wrist is straight one joint is free: it keeps its angle.
+        if np.any(solutions.flags[k] & (IKFlag.wrist | IKFlag.shoulder)):
+            # Where the wrist is straight, or its centre on axis 1, one joint is free: it keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
             candidates, allowed = here.q, here.within if limits else here.valid
         chosen = _next(candidates, allowed, at, solutions, limits)
         if chosen is None:
             lost.append(k)
             continue
-        q[k], places[k] = candidates[chosen[0]] + chosen[1], chosen[0]
+        places[k], q[k] = chosen
         if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
             switches.append(k)
         at = q[k]
+    reached = q[places >= 0]
     return IKPath(
         q=q,
         branch=tuple(solutions.branches[place] if place >= 0 else "" for place in places),
         switches=tuple(switches),
         lost=tuple(lost),
+        start=float(np.abs(reached[0] - q0).max()) if len(reached) else float("nan"),
         near_singular=_near_singular(description, q, "whole" if len(solutions.met) == 6 else "translational"),
     )
 
@@ -135,18 +139,13 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
 def _next(
     candidates: Array, allowed: NDArray[np.bool_], at: Array, solutions: IKSolutions, limits: bool
 ) -> tuple[int, Array] | None:
-    """Return the branch nearest to the last joint values and the whole turns to add, or None where there is none."""
+    """Return the branch nearest to the last joint values, and its own with whole turns added, or None."""
     if not allowed.any():
         return None
-    turn = np.where(solutions.prismatic, 0.0, 2 * np.pi)
-    turns = turn * np.rint((at - candidates) / (2 * np.pi))
-    if limits:
-        # Where the nearest winding is outside the limits, take the one next to it that is inside.
-        turns += turn * ((candidates + turns < solutions.lower - 1e-9).astype(float))
-        turns -= turn * ((candidates + turns > solutions.upper + 1e-9).astype(float))
-    gaps = np.where(allowed, np.sum((candidates + turns - at) ** 2, axis=-1), np.inf)
+    wound = solutions.wound(candidates, at, limits=limits)
+    gaps = np.where(allowed, np.sum((wound - at) ** 2, axis=-1), np.inf)
     best = int(np.argmin(np.where(np.isnan(gaps), np.inf, gaps)))
-    return best, turns[best]
+    return best, wound[best]
 
 
 def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from itertools import product
@@ -20,7 +21,7 @@ TURN = 2 * np.pi
 
 
 class IKStatus(IntEnum):
-    """What became of a pose, from best to worst; compares equal to its name in ``IKSolutions.status``."""
+    """What became of a pose, from best to worst: the numbers of ``IKSolutions.status_code``."""
 
     ok = 0
     singular = 1
@@ -97,6 +98,8 @@ class IKSolutions:
         ValueError
             No branch, or more than one, has all these words.
         """
+        if not isinstance(name, str):
+            raise TypeError(f"branch {name!r}; expected words of one of {', '.join(map(repr, self.branches))}")
         words = name.lower().replace("no flip", "no-flip").replace("noflip", "no-flip").replace(",", " ").split()
         chosen = [k for k, branch in enumerate(self.branches) if set(words) <= set(branch.split())]
         if len(chosen) != 1:
@@ -125,8 +128,7 @@ class IKSolutions:
             ``q`` does not fit.
         """
         near = self._near(q)
-        wound = self._wound(near)
-        return self._closest(wound, near, self.valid)
+        return self._closest(self.wound(self.q, near[..., None, :], limits=False), near, self.valid)
 
     def within_limits(self, near: ArrayLike | None = None) -> Array:
         """Return all branches inside the joint limits, shape (..., B, n), the others NaN.
@@ -143,13 +145,20 @@ class IKSolutions:
             ``near`` does not fit.
         """
         at = self._near(near)[..., None, :]
+        return np.where(self.within[..., None], self.wound(self.q, at, limits=True), np.nan)
+
+    def wound(self, q: Array, near: Array, *, limits: bool) -> Array:
+        """Return joint values (..., n) with the whole turns added that bring each angle nearest to ``near``.
+
+        With limits, as near as they allow; angles that no winding brings inside them stay outside.
+        """
         with np.errstate(invalid="ignore"):
-            # Windings inside the limits are q + 2 pi k for k from `first` to `last`.
-            first = np.ceil((self.lower - LIMIT_SLACK - self.q) / TURN)
-            last = np.floor((self.upper + LIMIT_SLACK - self.q) / TURN)
-            turns = np.where(self.prismatic, 0.0, np.clip(np.rint((at - self.q) / TURN), first, last))
-        wound = self.q + TURN * np.where(np.isfinite(turns), turns, 0.0)
-        return np.where(self.within[..., None], wound, np.nan)
+            turns = np.rint((near - q) / TURN)
+            if limits:
+                first = np.ceil((self.lower - LIMIT_SLACK - q) / TURN)
+                last = np.floor((self.upper + LIMIT_SLACK - q) / TURN)
+                turns = np.clip(turns, first, last)
+        return q + TURN * np.where(self.prismatic | ~np.isfinite(turns), 0.0, turns)
 
     def windings(self, branch: str) -> list[Array]:
         """Return every joint vector inside the limits that puts one pose's branch there, whole turns added.
@@ -196,14 +205,11 @@ class IKSolutions:
             limited = np.isfinite(self.lower) & np.isfinite(self.upper)
             q = (np.where(limited, self.lower, 0.0) + np.where(limited, self.upper, 0.0)) / 2
         near = np.asarray(q, dtype=float)
-        n = self.q.shape[-1]
-        if near.shape[-1:] != (n,):
-            raise ValueError(f"joint values have shape {near.shape}; expected ({n},) or {(*self.distance.shape, n)}")
-        return np.broadcast_to(near, (*self.distance.shape, n))
-
-    def _wound(self, near: Array) -> Array:
-        turns = np.where(self.prismatic, 0.0, np.rint((near[..., None, :] - self.q) / TURN))
-        return self.q + TURN * turns
+        expected = (*self.distance.shape, self.q.shape[-1])
+        if near.shape[-1:] == expected[-1:] and near.ndim <= len(expected):
+            with contextlib.suppress(ValueError):
+                return np.broadcast_to(near, expected)
+        raise ValueError(f"joint values have shape {near.shape}; expected {expected[-1:]} or {expected}")
 
     def _closest(self, q: Array, near: Array, usable: NDArray[np.bool_]) -> Array:
         gaps = np.where(usable, np.sum((q - near[..., None, :]) ** 2, axis=-1), np.inf)

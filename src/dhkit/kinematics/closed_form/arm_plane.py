@@ -7,7 +7,7 @@ at zero joint values, with the origin on axis 1 at the height of axis 2, and tur
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form.family import PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
     SINGULAR,
@@ -25,6 +26,7 @@ from dhkit.kinematics.closed_form.formulas import (
     chosen,
     hypot,
     no,
+    sign,
     sqrt,
     times,
     unit,
@@ -34,6 +36,8 @@ from dhkit.kinematics.closed_form.formulas import (
 __all__ = ["FLIPS", "ArmPlane", "Shoulder", "Vector", "as_pair", "branch_names", "ordered_shoulders", "turned_back"]
 
 FLIPS = ("no-flip", "flip")
+UPRIGHT = 1e-9
+"""Sine of the angle by which axis 1 may miss being upright or level."""
 
 Vector: TypeAlias = tuple[SX, SX, SX]
 """Coordinates along x, u and v."""
@@ -47,15 +51,18 @@ class ArmPlane:
     """Shape (3, 3): rows x, u, v in the world."""
     origin: Array
     """Shape (3,), m, in the world."""
-    up: float
-    """+1 where u points up (or is level), -1 where down."""
+    up: tuple[float, float, float]
+    """The world's vertical in this frame."""
 
     @classmethod
     def of(cls, axes: Axes) -> ArmPlane:
         """Return the frame of axes 1 and 2."""
         u, v = axes.direction(1), axes.direction(2)
         height = u @ (axes.point(2) - axes.point(1))
-        return cls(np.stack([np.cross(u, v), u, v]) + 0.0, axes.point(1) + height * u, 1.0 if u[2] >= 0 else -1.0)
+        R = np.stack([np.cross(u, v), u, v]) + 0.0
+        # A base that is upright but for rounding is upright.
+        x, along, across = (0.0 if abs(entry) <= UPRIGHT else float(entry) for entry in R[:, 2])
+        return cls(R, axes.point(1) + height * u, (x, along, across))
 
     def coordinates(self, point: Array) -> Array:
         """Return a point's coordinates (x, u, v), m."""
@@ -78,11 +85,17 @@ class Shoulder:
     x: SX
     """The point's distance from axis 1 along the plane, m, with its sign."""
     miss: SX
+    r: SX
+    """The point's distance from axis 1, m."""
     singular: SX
     clamped: SX
 
+    def shortfall(self, offset: SX, x: SX, rise: SX) -> SX:
+        """Return how far the point is from one at x along the plane and ``rise`` higher, m, joint 1 turning freely."""
+        return hypot(self.r - hypot(x, offset), rise)
 
-def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder, Shoulder]:
+
+def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
     """Turn joint 1 so that a point has the coordinate ``offset`` across the plane; the point in front, then behind.
 
     Parameters
@@ -93,6 +106,8 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
         How far across the plane it must be, m.
     scale, reach
         What rounding and nearness to the singularity are measured by, m.
+    free
+        The angle of joint 1 where the point is on its axis.
     """
     x, _, v = point
     r = hypot(x, v)
@@ -104,9 +119,10 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
     def side(along: SX) -> Shoulder:
         # The plane's point (along, offset) seen in the fixed frame is (x, v): their angle is that of joint 1.
         return Shoulder(
-            q1=times(unit(along, offset, scale), unit(x, v, scale), -1.0),
+            q1=times(unit(along, offset, scale), unit(x, v, scale, (free[0], -free[1])), -1.0),
             x=along,
             miss=where(beyond, short, 0.0),
+            r=r,
             singular=front < SINGULAR * reach,
             clamped=both(square < 0, no(beyond)),
         )
@@ -114,16 +130,16 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX) -> tuple[Shoulder
     return side(front), side(-front)
 
 
-def ordered_shoulders(p: Mapping[str, SX], position: Vector, scale: SX) -> tuple[Shoulder, Shoulder]:
+def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) -> tuple[Shoulder, Shoulder]:
     """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
 
     An arm without lateral offset has no left and right: there the shoulder in front comes first.
     """
-    front, back = shoulders(position, p["offset"], scale, p["reach"])
-    swap = p["up"] * p["offset"] > 0
+    front, back = shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
+    swap = sign(p["up"][1]) * p["offset"] > 0
 
     def either(a: Shoulder, b: Shoulder) -> Shoulder:
-        return Shoulder(chosen(swap, a.q1, b.q1), where(swap, a.x, b.x), a.miss, a.singular, a.clamped)
+        return replace(a, q1=chosen(swap, a.q1, b.q1), x=where(swap, a.x, b.x))
 
     return either(back, front), either(front, back)
 

@@ -126,6 +126,10 @@ class PoseSymbols:
     """That of the fit."""
     free: Pair = (1.0, 0.0)
     """The angle that the free joint takes at a wrist singularity."""
+    free_1: Pair = (1.0, 0.0)
+    """The angle that joint 1 takes where the point that it turns is on its axis."""
+    noise: SX = 0.0
+    """By how much the rotation misses being orthonormal: how exactly the pose is known."""
 
     def seen(self, left: SX, right: SX) -> Seen:
         """Return left T right, all 3 x 4 with a last row 0 0 0 1."""

@@ -21,6 +21,7 @@ __all__ = [
     "angle",
     "both",
     "chosen",
+    "clamped_between",
     "combined",
     "either",
     "half_turn",
@@ -58,11 +59,13 @@ class Branch:
     q: tuple[SX, ...]
     """rad and m."""
     miss: SX
-    """How far the pose is out of this branch's reach, m; the branch holds where it is 0."""
+    """How far the pose is out of this branch's reach, m, in the arm's plane; the branch holds where it is 0."""
     shoulder: SX = 0.0
     elbow: SX = 0.0
     wrist: SX = 0.0
     clamped: SX = 0.0
+    distance: SX | None = None
+    """How far the pose is from the nearest point reached, m; ``miss`` unless given."""
 
 
 def _casadi() -> Any:
@@ -85,6 +88,11 @@ def absolute(x: SX) -> SX:
 def larger(a: SX, b: SX) -> SX:
     """Return the greater of two numbers."""
     return _casadi().fmax(a, b)
+
+
+def clamped_between(x: SX, low: SX, high: SX) -> SX:
+    """Return x, or the bound that it is beyond."""
+    return where(x > high, high, larger(x, low))
 
 
 def both(a: SX, b: SX) -> SX:

@@ -9,9 +9,21 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.arm_plane import ArmPlane, as_pair
+from dhkit.kinematics.closed_form.arm_plane import ArmPlane, as_pair, turned_back
 from dhkit.kinematics.closed_form.family import Parameter
-from dhkit.kinematics.closed_form.formulas import SX, Pair, angle, chosen, sign, times, two_link
+from dhkit.kinematics.closed_form.formulas import (
+    SX,
+    Pair,
+    absolute,
+    angle,
+    chosen,
+    clamped_between,
+    hypot,
+    sign,
+    times,
+    two_link,
+    where,
+)
 
 __all__ = ["ELBOWS", "Elbow", "elbows", "link_parameters"]
 
@@ -45,6 +57,8 @@ class Elbow:
     """How far link 3 has turned against link 2 about v since zero joint values."""
     q3: SX
     miss: SX
+    nearest: tuple[SX, SX]
+    """The point nearest to the one asked for that the two links reach, from axis 2, m."""
     singular: SX
     clamped: SX
 
@@ -59,15 +73,29 @@ class Elbow:
         return times(self.q2, self.bent)
 
 
-def elbows(p: Mapping[str, SX], x: SX, u: SX, scale: SX) -> tuple[Elbow, Elbow]:
-    """Return the upper elbow, then the lower one, for a point at (x, u) from axis 2."""
+def elbows(p: Mapping[str, SX], x: SX, u: SX, q1: Pair, scale: SX) -> tuple[Elbow, Elbow]:
+    """Return the upper elbow, then the lower one, for a point at (x, u) from axis 2, as joint 1 holds the plane.
+
+    The upper one is higher in the world; where they are level, the one on the left of the line to the point is.
+    """
     arm = two_link(x, u, p["L2"], p["L3"], scale)
-    # The elbow on the left of the line to the point is the upper one where the point is in front of axis 2.
-    front = sign(p["up"] * x)
+    # The elbow on the left of the line to the point is off it in the direction (-u, x).
+    vertical = turned_back(p["up"], q1)
+    left_is_up = sign(vertical[1] * x - vertical[0] * u)
+    R = hypot(x, u)
+    share = clamped_between(R, absolute(p["L2"] - p["L3"]), p["L2"] + p["L3"]) / where(R > 0, R, 1.0)
 
     def elbow(raised: SX) -> Elbow:
         q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
         bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
-        return Elbow(q2, bent, angle((bent[0], p["sense3"] * bent[1])), arm.miss, arm.straight, arm.clamped)
+        return Elbow(
+            q2=q2,
+            bent=bent,
+            q3=angle((bent[0], p["sense3"] * bent[1])),
+            miss=arm.miss,
+            nearest=(share * x, share * u),
+            singular=arm.straight,
+            clamped=arm.clamped,
+        )
 
-    return elbow(front), elbow(-front)
+    return elbow(left_is_up), elbow(-left_is_up)

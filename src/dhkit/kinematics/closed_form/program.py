@@ -22,7 +22,7 @@ ORTHONORMAL = 1e-6
 
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
-    """Return the program of a family: T (4 x 4) and the free joint's angle to q, distance, valid, flags and status.
+    """Return the program of a family: T (4 x 4) and the free joints' angles to q, distance, valid, flags and status.
 
     Its parameters are ``fit.vector()`` and then ``limit_parameters``.
     """
@@ -45,10 +45,18 @@ def _graph(
     parameters: Mapping[str, ca.SX],
 ) -> Graph:
     T = ca.SX.sym("T", 4, 4)
-    free = ca.SX.sym("free")
+    free = ca.SX.sym("free", 2)
     is_pose = _is_pose(T)
     scale = named["reach"] + ca.norm_1(T[:3, 3])
-    branches = family.formulas(named, PoseSymbols(T[:3, :], scale, fit.structure, (ca.cos(free), ca.sin(free))))
+    pose = PoseSymbols(
+        T=T[:3, :],
+        scale=scale,
+        structure=fit.structure,
+        free_1=(ca.cos(free[0]), ca.sin(free[0])),
+        free=(ca.cos(free[1]), ca.sin(free[1])),
+        noise=reduce(ca.fmax, map(ca.fabs, _defects(T))),
+    )
+    branches = family.formulas(named, pose)
     if len(branches) != len(fit.branches):
         raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
 
@@ -57,7 +65,7 @@ def _graph(
     flags = [where(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
     some = reduce(ca.logic_or, valid)
     special = reduce(ca.logic_or, (ca.logic_and(ok, _singular(b)) for ok, b in zip(valid, branches, strict=True)))
-    miss = reduce(ca.fmin, (branch.miss for branch in branches))
+    miss = reduce(ca.fmin, (b.miss if b.distance is None else b.distance for b in branches))
     reached = where(special, float(IKStatus.singular), float(IKStatus.ok))
     found = where(some, reached, float(IKStatus.out_of_reach))
     return Graph.of(
@@ -75,13 +83,17 @@ def _graph(
 
 def _is_pose(T: ca.SX) -> Any:
     R = T[:3, :3]
-    defect = R.T @ R - ca.SX.eye(3)
-    entries = [defect[i, j] for i in range(3) for j in range(i + 1)]
-    entries += [T[3, 0], T[3, 1], T[3, 2], T[3, 3] - 1.0]
+    entries = [*_defects(T), T[3, 0], T[3, 1], T[3, 2], T[3, 3] - 1.0]
     rigid = reduce(ca.logic_and, (ca.fabs(entry) <= ORTHONORMAL for entry in entries))
     proper = ca.dot(ca.cross(R[:, 0], R[:, 1]), R[:, 2]) > 0
     finite = ca.norm_1(T[:3, 3]) < 1e300
     return ca.logic_and(ca.logic_and(rigid, proper), finite)
+
+
+def _defects(T: ca.SX) -> list[Any]:
+    """Return the entries of R^T R - 1."""
+    defect = T[:3, :3].T @ T[:3, :3] - ca.SX.eye(3)
+    return [defect[i, j] for i in range(3) for j in range(i + 1)]
 
 
 def _singular(branch: Branch) -> Any:

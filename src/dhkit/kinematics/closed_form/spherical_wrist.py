@@ -43,7 +43,7 @@ from dhkit.kinematics.closed_form.formulas import (
     where,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
-from dhkit.kinematics.closed_form.wrist import joints_5_and_6, turned, wrist_parameters
+from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, turned, wrist_parameters
 
 __all__ = ["elbow_fit", "elbow_formulas", "slide_fit", "slide_formulas"]
 
@@ -59,6 +59,7 @@ class Region:
     miss: SX
     elbow: SX
     clamped: SX
+    distance: SX | None = None
 
 
 def elbow_fit(axes: Axes) -> Fit | None:
@@ -85,8 +86,8 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches: shoulder, then elbow, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
-    for shoulder in ordered_shoulders(p, T.position, pose.scale):
-        for elbow in elbows(p, shoulder.x - p["a1"], T.position[1], pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose):
+        for elbow in elbows(p, shoulder.x - p["a1"], T.position[1], shoulder.q1, pose.scale):
             region = Region(
                 q=(angle(shoulder.q1), *elbow.joints),
                 rho=elbow.turned,
@@ -94,8 +95,9 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 miss=hypot(shoulder.miss, elbow.miss),
                 elbow=elbow.singular,
                 clamped=either(shoulder.clamped, elbow.clamped),
+                distance=shoulder.shortfall(p["offset"], p["a1"] + elbow.nearest[0], T.position[1] - elbow.nearest[1]),
             )
-            branches += _with_wrist(p, T.rotation, region, pose.free)
+            branches += _with_wrist(p, T.rotation, region, pose)
     return branches
 
 
@@ -130,7 +132,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches: shoulder, then boom, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
-    for shoulder in ordered_shoulders(p, T.position, pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose):
         x, u = shoulder.x - p["a1"], T.position[1]
         R, lift = hypot(x, u), absolute(p["lift"])
         short = lift - R
@@ -148,7 +150,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 elbow=length < SINGULAR * p["reach"],
                 clamped=either(shoulder.clamped, both(square < 0, no(beyond))),
             )
-            branches += _with_wrist(p, T.rotation, region, pose.free)
+            branches += _with_wrist(p, T.rotation, region, pose)
     return branches
 
 
@@ -161,15 +163,15 @@ def _wrist_centre(axes: Axes) -> Array | None:
 
 
 def _with_wrist(
-    p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region, free: Pair
+    p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region, pose: PoseSymbols
 ) -> list[Branch]:
     """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip.
 
-    Where axes 4 and 6 coincide, q4 is ``free``.
+    Where axes 4 and 6 coincide, as exactly as the pose is known, q4 is the free joint's angle.
     """
     q1, rho = region.shoulder.q1, region.rho
     wrist = turned(p, (turned_back(axis, q1, rho) for axis in rotation))
-    q4 = unit(wrist.a[0], wrist.a[1], otherwise=free)
+    q4 = unit(wrist.a[0], wrist.a[1], ill_determined(pose), pose.free)
     roll = angle(q4)
     unflipped, flipped = joints_5_and_6(p, wrist, q4)
     flags = {
@@ -178,6 +180,7 @@ def _with_wrist(
         "elbow": region.elbow,
         "wrist": hypot(wrist.a[0], wrist.a[1]) < SINGULAR,
         "clamped": region.clamped,
+        "distance": region.distance,
     }
     return [
         Branch((*region.q, roll, *unflipped), **flags),

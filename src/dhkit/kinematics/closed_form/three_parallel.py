@@ -40,7 +40,7 @@ from dhkit.kinematics.closed_form.formulas import (
     where,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, Elbow, elbows, link_parameters
-from dhkit.kinematics.closed_form.wrist import joints_5_and_6, turned, wrist_parameters
+from dhkit.kinematics.closed_form.wrist import UNSEEN, ill_determined, joints_5_and_6, turned, wrist_parameters
 
 __all__ = ["three_parallel_fit", "three_parallel_formulas"]
 
@@ -80,7 +80,7 @@ def three_parallel_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Bran
     """Return the eight branches: shoulder, then elbow, then wrist."""
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches: list[Branch] = []
-    for shoulder in ordered_shoulders(p, T.position, pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose):
         for pair in zip(*_wrists(p, T, shoulder, pose), strict=True):
             branches += pair
     return branches
@@ -97,7 +97,7 @@ def _wrists(
     c6, s6 = pose.free
     swing = hypot(wrist.a[0], wrist.a[1])
     free = unit(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
-    rho = _within_reach(p, position, unit(wrist.a[0], wrist.a[1], otherwise=free), swing)
+    rho = _within_reach(p, position, unit(wrist.a[0], wrist.a[1], ill_determined(pose), free), swing, pose.noise)
     unflipped, flipped = joints_5_and_6(p, wrist, rho)
     singular = swing < SINGULAR
     return (
@@ -106,7 +106,7 @@ def _wrists(
     )
 
 
-def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX) -> Pair:
+def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, noise: SX) -> Pair:
     """Return rho, or where axis 4 would then be out of the two links' reach, the next one that is within it.
 
     Near the wrist's singularity rho is ill determined, and turning it costs the tool only ``swing`` times as much.
@@ -125,7 +125,7 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX) -
     corner = unit(cosine, side * sqrt(positive(1.0 - cosine * cosine)))
     turned = times(times(to_end, corner), to_lever, -1.0)
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
-    return chosen(both(wanted != distance, cost < FREE), turned, rho)
+    return chosen(both(wanted != distance, cost < FREE + UNSEEN * noise), turned, rho)
 
 
 def _elbows(
@@ -153,5 +153,5 @@ def _elbows(
             clamped=either(shoulder.clamped, elbow.clamped),
         )
 
-    upper, lower = elbows(p, x, u, scale)
+    upper, lower = elbows(p, x, u, shoulder.q1, scale)
     return branch(upper), branch(lower)

@@ -63,7 +63,7 @@ def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Aim: put the tool in the direction of the pose's origin, whatever its distance."""
     position = pose.seen(p["T_plane_world"], IDENTITY).position
     branches = []
-    for shoulder in ordered_shoulders(p, position, pose.scale):
+    for shoulder in ordered_shoulders(p, position, pose):
         x, u = shoulder.x - p["a1"], position[1]
         tilt = times(unit(x, u, pose.scale), p["lever"], -1.0)
         branches.append(
@@ -98,7 +98,7 @@ def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the four branches that put the tool's origin in place: shoulder, then elbow."""
     position = pose.seen(p["T_plane_world"], IDENTITY).position
     branches = []
-    for shoulder in ordered_shoulders(p, position, pose.scale):
+    for shoulder in ordered_shoulders(p, position, pose):
         branches += _branches(p, shoulder, shoulder.x - p["a1"], position[1], pose.scale, None, 0.0)
     return branches
 
@@ -134,7 +134,7 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the four branches that put the tool's origin in place and point it: shoulder, then elbow."""
     T = pose.seen(p["T_plane_world"], IDENTITY)
     branches = []
-    for shoulder in ordered_shoulders(p, T.position, pose.scale):
+    for shoulder in ordered_shoulders(p, T.position, pose):
         wanted = turned_back(combined(p["axis"], T.rotation), shoulder.q1)
         rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
         lever = p["lever"]
@@ -149,7 +149,7 @@ def _branches(
     p: Mapping[str, SX], shoulder: Shoulder, x: SX, u: SX, scale: SX, rho: Pair | None, sideways: SX
 ) -> list[Branch]:
     branches = []
-    for elbow in elbows(p, x, u, scale):
+    for elbow in elbows(p, x, u, shoulder.q1, scale):
         joints = [angle(shoulder.q1), *elbow.joints]
         if rho is not None:
             rest = times(rho, elbow.turned, -1.0)

@@ -10,10 +10,10 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes, inverse_pose
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Vector, as_pair
-from dhkit.kinematics.closed_form.family import Parameter
-from dhkit.kinematics.closed_form.formulas import SX, Pair, angle, half_turn, rotated, times, unit, wrapped
+from dhkit.kinematics.closed_form.family import Parameter, PoseSymbols
+from dhkit.kinematics.closed_form.formulas import NOTHING, SX, Pair, angle, half_turn, rotated, times, unit, wrapped
 
-__all__ = ["Wrist", "joints_5_and_6", "turned", "wrist_parameters"]
+__all__ = ["UNSEEN", "Wrist", "ill_determined", "joints_5_and_6", "turned", "wrist_parameters"]
 
 
 def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -> dict[str, Parameter]:
@@ -42,6 +42,11 @@ def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -
     }
 
 
+UNSEEN = 10.0
+"""How many times as far as it shows in its columns a rotation may be wrong: that they are orthonormal leaves three of
+nine errors unseen, and the others may be small by chance."""
+
+
 @dataclass(frozen=True)
 class Wrist:
     """Where axis 6, axis 5 at zero and their product have gone, in the axes of the wrist at zero joint values."""
@@ -55,6 +60,11 @@ def turned(p: Mapping[str, SX], axes: Iterable[Vector]) -> Wrist:
     """Return the tool's axes as the wrist sees them, from those that the arm sees."""
     a, n, m = (rotated(p["F"], axis) for axis in axes)
     return Wrist(a, n, m)
+
+
+def ill_determined(pose: PoseSymbols) -> SX:
+    """Return the scale at which the first joint's direction is noise: rounding, or what the pose is wrong by."""
+    return 1.0 + UNSEEN / NOTHING * pose.noise
 
 
 def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
