@@ -86,7 +86,7 @@ class Recorder:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows:
             return
-        packages = ("numpy", "pin", "yourdfpy", "hypothesis")
+        packages = ("numpy", "numba", "casadi", "pin", "yourdfpy", "eaik", "ssik", "hypothesis")
         RESULTS.parent.mkdir(parents=True, exist_ok=True)
         RESULTS.write_text(
             json.dumps(

@@ -151,3 +151,42 @@ def test_arms_of_one_pattern_share_a_kernel(caplog):
     longer = Arm.from_dh([(0, 0.5, 0.1, "pi/2"), (0, 0, 0.7, 0)])
     assert np.abs(longer.fk([0.1, 0.2]) - world_to_tool(longer.description, [0.1, 0.2])).max() < 1e-15
     assert "compiling" not in caplog.text
+
+
+@pytest.mark.parametrize("left", ["", "half"])
+def test_a_kernel_that_was_not_written_to_its_end_is_written_again(tmp_path, left):
+    in_new_process(CALL, tmp_path)
+    (path,) = (tmp_path / "kernels").glob("forward_kinematics_*.py")
+    whole = path.read_text()
+    path.write_text(whole[: len(whole) // 2] if left else "")
+    in_new_process(CALL, tmp_path)
+    assert path.read_text() == whole
+
+
+FORK = """
+import multiprocessing, threading, time
+import numpy as np
+from dhkit import Arm
+from dhkit.kernels import kernel as kernels
+def child():
+    T = Arm.load("planar2r").fk([0.1, 0.2])
+    raise SystemExit(0 if np.isfinite(T).all() else 3)
+module = __import__("sys").modules["dhkit.kernels.kernel"]
+held = threading.Event()
+def hold():
+    with module._lock:
+        held.set()
+        time.sleep(30)
+threading.Thread(target=hold, daemon=True).start()
+held.wait()
+process = multiprocessing.get_context("fork").Process(target=child)
+process.start()
+process.join(60)
+print(process.exitcode)
+__import__("os")._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork of POSIX")
+def test_a_fork_while_another_thread_compiles_does_not_hang(tmp_path):
+    assert in_new_process(FORK, tmp_path).stdout.strip() == "0"

@@ -5,6 +5,7 @@ import pytest
 
 from dhkit import Arm, pose
 from dhkit.errors import ModelError, UnreachableError
+from dhkit.kinematics import singular_configurations
 
 
 def line(T, to, count=200):
@@ -135,3 +136,37 @@ def test_a_circle_with_turning_tool_is_followed_and_closes():
     path = arm.ik_path(T, q0)
     assert path.ok, path
     assert np.abs(path.q[0] - path.q[-1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("digits", [7, 9, 12, "float32"])
+def test_poses_known_to_a_few_digits_do_not_spin_a_straight_wrist(digits):
+    """Only joint 1 moves; the wrist is straight all along, so that rounding decides where q4 seems to be."""
+    arm = Arm.load("puma560")
+    q = np.repeat([[0.1, 0.7, -2.5, 0.9, 0, 0.4]], 100, axis=0)
+    q[:, 0] += np.linspace(0, 0.5, 100)
+    T = arm.fk(q).astype(np.float32) if digits == "float32" else arm.fk(q).round(digits)
+    path = arm.ik_path(T, q[0], limits=False)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-4
+
+
+def test_joint_1_keeps_its_angle_where_the_wrist_passes_axis_1():
+    arm = Arm.load("irb140")
+    q0 = singular_configurations(arm.description, "shoulder", 1)[0]
+    q0[0] = 1.0
+    q = np.repeat(q0[None], 41, axis=0)
+    q[:, 1] += np.linspace(-0.2, 0.2, 41)
+    q[20] = q0
+    path = arm.ik_path(arm.fk(q), q[0], limits=False)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-6
+
+
+def test_a_start_some_turns_away_ends_inside_the_limits_and_is_said():
+    arm = Arm.load("puma560")
+    q0 = arm.configurations["nominal"]
+    path = arm.ik_path(arm.fk(q0)[None], q0 + 4 * np.pi * np.eye(6)[0])
+    numbers = arm.description.numbers
+    assert ((path.q >= numbers.lower) & (path.q <= numbers.upper)).all()
+    assert path.start > 2 * np.pi
+    assert arm.ik_path(arm.fk(q0)[None], q0).start < 1e-9

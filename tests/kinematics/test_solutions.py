@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from dhkit import Arm
+from dhkit import Arm, pose
 from dhkit.description import library_robot
 from dhkit.errors import ModelError, UnreachableError
 from dhkit.kinematics import IKFlag, IKStatus, forward_kinematics, inverse_kinematics
@@ -279,3 +279,56 @@ def test_batches_threads_and_out():
     again = pickle.loads(pickle.dumps(solutions))
     assert np.array_equal(again.valid, solutions.valid)
     assert "9000 poses, 8 branches" in repr(solutions)
+
+
+def test_a_result_may_be_written_over_the_poses():
+    arm = Arm.load("puma560")
+    T = arm.fk(states(arm.description, 5000))
+    expected = arm.ik(T)
+    memory = np.empty(5000 * 48)
+    poses = memory[: 5000 * 16].reshape(5000, 4, 4)
+    poses[:] = T
+    solutions = arm.ik(poses, out=memory.reshape(5000, 8, 6))
+    assert np.array_equal(solutions.q, expected.q, equal_nan=True)
+
+
+def test_poses_in_single_precision_are_reached_at_a_urs_singularity():
+    arm = Arm.load("ur5")
+    q = states(arm.description, 500)
+    q[:, 4] = 0.0
+    T = arm.fk(q).astype(np.float32)
+    for seed in (None, q):
+        solutions = arm.ik(T, seed=seed)
+        assert solutions.valid.any(axis=-1).mean() > 0.995
+        assert np.nanmax(np.abs(arm.fk(solutions.q) - T[:, None])) < 1e-5
+
+
+@pytest.mark.parametrize("tilt", [0, 45, 80, 135, 180])
+def test_up_is_higher_however_the_base_is_mounted(tilt):
+    arm = Arm.load("kr5").with_base(pose((1, 2, 3), euler=(tilt, 20, 10), degrees=True)).description
+    solutions = inverse_kinematics(arm, forward_kinematics(arm, states(arm, 400)))
+    for i, label in enumerate(solutions.branches):
+        if " up " in label:
+            j = solutions.branches.index(label.replace(" up ", " down "))
+            both = solutions.valid[:, i] & solutions.valid[:, j]
+            elbow, lower = (axes_of(arm, solutions.q[both, k])[1][:, 2] for k in (i, j))
+            assert (elbow[:, 2] >= lower[:, 2] - 1e-9).all()
+
+
+def test_distance_is_that_to_the_nearest_point_reached():
+    """An arm with an offset at full stretch: the way to the wrist's reach is shorter in space than in its plane."""
+    rows = [
+        (0, 0.5, 0, "pi/2"),
+        (0, 0.3, 0.6, 0),
+        (0, 0, 0, "-pi/2"),
+        (0, 0.3, 0, "pi/2"),
+        (0, 0, 0, "-pi/2"),
+        (0,) * 4,
+    ]
+    arm = Arm.from_dh(rows)
+    T = arm.fk([0, 0.3, 0, 0, 0.4, 0])
+    T[:3, 3] = [0.32, 0, 0.5]
+    distance = float(arm.ik(T).distance)
+    for step, status in ((0.999, "out_of_reach"), (1.001, "ok")):
+        T[0, 3] = 0.32 + step * distance
+        assert arm.ik(T).status == status or (step > 1 and arm.ik(T).status == "singular")
