@@ -41,6 +41,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit with its status."""
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
+    logging.getLogger("dhkit").setLevel(logging.INFO)  # says what takes seconds, such as compiling
     try:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
     except (DhkitError, ValueError) as error:

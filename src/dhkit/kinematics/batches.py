@@ -9,7 +9,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.kernels import Kernel
 
-__all__ = ["check_threads", "fill", "result_array"]
+__all__ = ["check_whole", "fill", "result_array"]
 
 
 def fill(
@@ -40,7 +40,7 @@ def fill(
     ValueError
         ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
-    check_threads(threads)
+    check_whole("threads", threads, 1)
     batch = states[0].shape[:-1] if len(states) == 1 else np.broadcast_shapes(*(state.shape[:-1] for state in states))
     out = result_array((*batch, *tail), out)
     if not out.size:
@@ -52,16 +52,16 @@ def fill(
     return out
 
 
-def check_threads(threads: object) -> None:
-    """Refuse less than one thread.
+def check_whole(name: str, value: object, least: int) -> None:
+    """Refuse what is no whole number, or too small.
 
     Raises
     ------
     ValueError
-        ``threads`` is no whole number, or below 1.
+        Says the name, what was found and what is expected.
     """
-    if not isinstance(threads, int | np.integer) or threads < 1:
-        raise ValueError(f"threads is {threads!r}; expected a whole number, 1 or more")
+    if not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{name} is {value!r}; expected a whole number, {least} or more")
 
 
 def result_array(shape: tuple[int, ...], out: Array | None) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.batches import check_threads
+from dhkit.kinematics.batches import check_whole
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL
@@ -66,7 +66,7 @@ def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -
     ValueError, TypeError
         T has not shape (..., 4, 4), ``threads`` is below 1.
     """
-    check_threads(threads)
+    check_whole("threads", threads, 1)
     poses = pose_rows(T)
     solver = _solver(description)
     posed = are_poses(poses)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description, joint_array
 from dhkit.kernels import kernel
 from dhkit.kinematics import closed_form
-from dhkit.kinematics.batches import check_threads, result_array
+from dhkit.kinematics.batches import check_whole, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
@@ -56,7 +56,7 @@ def inverse_kinematics(
     ValueError, TypeError
         T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
     """
-    check_threads(threads)
+    check_whole("threads", threads, 1)
     poses = pose_rows(T)
     solver = _solver(description)
     if solver is None:

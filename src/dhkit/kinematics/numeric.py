@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kinematics.batches import check_threads
+from dhkit.kinematics.batches import check_whole
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
 from dhkit.kinematics.forward import forward_kinematics
@@ -113,9 +113,9 @@ def solve_numerically(
     >>> str(found.status), bool(abs(found.q[0] - q).max() < 0.1)
     ('ok', True)
     """
-    check_threads(threads)
-    if restarts < 0:
-        raise ValueError(f"restarts is {restarts}; expected 0 or more")
+    check_whole("threads", threads, 1)
+    check_whole("restarts", restarts, 0)
+    check_whole("seed", seed, 0)
     if not tolerance > 0:
         raise ValueError(f"tolerance is {tolerance}; expected a positive number")
     poses = pose_rows(T)

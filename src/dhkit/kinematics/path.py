@@ -78,7 +78,8 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     Parameters
     ----------
     description
-        The robot; one whose inverse kinematics have a closed form.
+        The robot; one whose inverse kinematics have a closed form. Through ssik others are followed as well, but the
+        path of a redundant arm may jump: its solutions are samples.
     T
         Poses of the tool in the world, shape (N, 4, 4), near enough to each other for joints to move less than 45
         degrees (or an eighth of the reach) between them.
@@ -97,7 +98,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     ValueError
         T has not shape (N, 4, 4), or q0 not (n,) or not finite.
     ModelError
-        The arm has no closed form.
+        The arm has no closed form, and ssik is not installed or does not take it.
     """
     poses = pose_rows(T)
     q0 = joint_array(description, q0, "q0")

@@ -73,7 +73,7 @@ class Grid:
         return Estimate(cell * (outer + inner) / 2, cell * (outer - inner) / 2, self.counts.ndim)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Workspace:
     """What random joint values reach; equal arguments of :func:`workspace` give equal arrays."""
 
@@ -97,6 +97,10 @@ class Workspace:
     """In how many directions the tool can move: 3, and 2, 1 or 0 where it keeps to a surface, a curve or a point."""
     grid: Grid | None
     """Of space, or of the plane or line that the tool keeps to; None for a point."""
+
+    def __repr__(self) -> str:
+        estimate = "" if self.estimate is None else f", {self.estimate}"
+        return f"<Workspace of {self.description.name}: {self.samples} samples{estimate}>"
 
     @property
     def samples(self) -> int:
