@@ -283,7 +283,7 @@ def test_the_error_of_a_rotation_is_its_rotation_vector(angle):
         ({"T": "pose"}, TypeError, "expected numbers"),
         ({"q0": np.zeros(5)}, ValueError, r"q0 has shape \(5,\); expected \(\.\.\., 6\)"),
         ({"q0": np.zeros((3, 6))}, ValueError, r"q0 has shape \(3, 6\); expected \(6,\) or \(2, 6\)"),
-        ({"restarts": -1}, ValueError, "restarts is -1; expected 0 or more"),
+        ({"restarts": -1}, ValueError, "restarts is -1; expected a whole number, 0 or more"),
         ({"tolerance": 0.0}, ValueError, "tolerance is 0.0; expected a positive number"),
         ({"tolerance": np.nan}, ValueError, "tolerance is nan"),
         ({"threads": 0}, ValueError, "threads is 0"),

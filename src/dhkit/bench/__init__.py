@@ -4,8 +4,7 @@ from dhkit.bench.agreement import Verdict
 from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, UnavailableError, Workload
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
-from dhkit.bench.report import BenchReport, Missing, Row
-from dhkit.bench.required import Requirement
+from dhkit.bench.report import BenchReport, Missing, Requirement, Row
 from dhkit.bench.runner import run
 
 __all__ = [

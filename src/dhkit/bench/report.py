@@ -10,9 +10,11 @@ from dhkit.bench.agreement import Verdict
 from dhkit.bench.contenders import Mode
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
-from dhkit.bench.required import Requirement
 
-__all__ = ["BenchReport", "Missing", "Row"]
+__all__ = ["BATCH", "BenchReport", "Missing", "Requirement", "Row"]
+
+BATCH = 100_000
+"""Items of the batch that the figures are asked at."""
 
 Table: TypeAlias = tuple[str, Sequence[str], list[list[str]]]
 RATIO_MEANING = (
@@ -63,6 +65,59 @@ class Missing:
     quantity: str
     name: str
     reason: str
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A figure that dhkit must reach.
+
+    Attributes
+    ----------
+    quantity, what
+        What is compared.
+    required, target
+        The least (or most) that is asked, and what is hoped for.
+    at_most
+        Whether ``required`` is the most.
+    measured
+        What was seen; None where something did not take part.
+    judged
+        Whether it was measured under the conditions that it is asked under.
+    """
+
+    quantity: str
+    what: str
+    required: float
+    at_most: bool
+    measured: float | None
+    judged: bool = True
+    target: float | None = None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether it is reached; None where that cannot be told."""
+        if self.measured is None or not self.judged:
+            return None
+        return self.measured <= self.required if self.at_most else self.measured >= self.required
+
+    @property
+    def derived(self) -> dict[str, Any]:
+        """What JSON carries beyond the fields."""
+        return {"met": self.met}
+
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """What, required, measured, verdict."""
+        target = f" (target {self.target:g})" if self.target else ""
+        bound = f"at {'most' if self.at_most else 'least'} {self.required:g}{target}"
+        measured = "not measured" if self.measured is None else f"{self.measured:.3g}"
+        unjudged = "" if self.measured is None else f"asked at batches of {BATCH}, one thread"
+        return (
+            f"{self.quantity}: {self.what}",
+            bound,
+            measured,
+            {True: "met", False: "MISSED", None: unjudged}[self.met],
+        )
 
 
 @dataclass(frozen=True)

@@ -4,73 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 from dhkit.bench.peers import eaik, pinocchio
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
+from dhkit.bench.report import Requirement, Row
 
-if TYPE_CHECKING:
-    from dhkit.bench.report import Row
+__all__ = ["requirements"]
 
-__all__ = ["BATCH", "Requirement", "requirements"]
-
-BATCH = 100_000
-"""Items of the batch that the figures are asked at."""
 PIN_CALL = 0.25
 """µs of a pin.forwardKinematics call on the machine that a single call's figure is asked on."""
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """A figure that dhkit must reach.
-
-    Attributes
-    ----------
-    quantity, what
-        What is compared.
-    required, target
-        The least (or most) that is asked, and what is hoped for.
-    at_most
-        Whether ``required`` is the most.
-    measured
-        What was seen; None where something did not take part.
-    judged
-        Whether it was measured under the conditions that it is asked under.
-    """
-
-    quantity: str
-    what: str
-    required: float
-    at_most: bool
-    measured: float | None
-    judged: bool = True
-    target: float | None = None
-
-    @property
-    def met(self) -> bool | None:
-        """Whether it is reached; None where that cannot be told."""
-        if self.measured is None or not self.judged:
-            return None
-        return self.measured <= self.required if self.at_most else self.measured >= self.required
-
-    @property
-    def derived(self) -> dict[str, Any]:
-        """What JSON carries beyond the fields."""
-        return {"met": self.met}
-
-    @property
-    def cells(self) -> tuple[str, str, str, str]:
-        """What, required, measured, verdict."""
-        target = f" (target {self.target:g})" if self.target else ""
-        bound = f"at {'most' if self.at_most else 'least'} {self.required:g}{target}"
-        measured = "not measured" if self.measured is None else f"{self.measured:.3g}"
-        unjudged = "" if self.measured is None else f"asked at batches of {BATCH}, one thread"
-        return (
-            f"{self.quantity}: {self.what}",
-            bound,
-            measured,
-            {True: "met", False: "MISSED", None: unjudged}[self.met],
-        )
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, Unavailabl
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
-from dhkit.bench.report import BenchReport, Missing, Row
-from dhkit.bench.required import BATCH, requirements
+from dhkit.bench.report import BATCH, BenchReport, Missing, Row
+from dhkit.bench.required import requirements
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.description import Array
 from dhkit.kernels import Kernel
 
-__all__ = ["check_whole", "fill", "result_array"]
+__all__ = ["check_whole", "fill", "pose_rows", "result_array"]
 
 
 def fill(
@@ -62,6 +63,28 @@ def check_whole(name: str, value: object, least: int) -> None:
     """
     if not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} is {value!r}; expected a whole number, {least} or more")
+
+
+def pose_rows(T: ArrayLike) -> Array:
+    """Return T as a C-contiguous float64 array (..., 4, 4).
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    TypeError
+        Not numbers.
+    """
+    try:
+        poses = np.asarray(T)
+        if poses.dtype.kind not in "fiu" and poses.size:
+            raise TypeError
+        poses = np.ascontiguousarray(poses, dtype=float)
+    except (TypeError, ValueError):
+        raise TypeError(f"T: found {type(T).__name__} of other things; expected numbers, shape (..., 4, 4)") from None
+    if poses.shape[-2:] != (4, 4):
+        raise ValueError(f"T has shape {poses.shape}; expected (..., 4, 4)")
+    return poses
 
 
 def result_array(shape: tuple[int, ...], out: Array | None) -> Array:

@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.batches import check_whole
+from dhkit.kinematics.batches import check_whole, pose_rows
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL
-from dhkit.kinematics.inverse import pose_rows
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.numeric import closes, descend
 from dhkit.kinematics.solutions import IKSolutions

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description, joint_array
 from dhkit.kernels import kernel
 from dhkit.kinematics import closed_form
-from dhkit.kinematics.batches import check_whole, result_array
+from dhkit.kinematics.batches import check_whole, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
@@ -95,28 +95,6 @@ def inverse_kinematics(
         upper=numbers.upper,
         prismatic=numbers.prismatic,
     )
-
-
-def pose_rows(T: ArrayLike) -> Array:
-    """Return T as a C-contiguous float64 array (..., 4, 4).
-
-    Raises
-    ------
-    ValueError
-        Another shape.
-    TypeError
-        Not numbers.
-    """
-    try:
-        poses = np.asarray(T)
-        if poses.dtype.kind not in "fiu" and poses.size:
-            raise TypeError
-        poses = np.ascontiguousarray(poses, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"T: found {type(T).__name__} of other things; expected numbers, shape (..., 4, 4)") from None
-    if poses.shape[-2:] != (4, 4):
-        raise ValueError(f"T has shape {poses.shape}; expected (..., 4, 4)")
-    return poses
 
 
 def _solved_externally(description: Description, T: Array, out: Array | None, threads: int) -> IKSolutions:

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kinematics.batches import check_whole
+from dhkit.kinematics.batches import check_whole, pose_rows
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
 from dhkit.kinematics.forward import forward_kinematics
-from dhkit.kinematics.inverse import pose_rows
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.solutions import IKSolutions
 
