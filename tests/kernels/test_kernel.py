@@ -1,7 +1,9 @@
 """Kernels: the same results compiled and in NumPy, on one thread and several, from the disk and without one."""
 
+import json
 import logging
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -190,3 +192,11 @@ __import__("os")._exit(0)
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="fork of POSIX")
 def test_a_fork_while_another_thread_compiles_does_not_hang(tmp_path):
     assert in_new_process(FORK, tmp_path).stdout.strip() == "0"
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names a processor of that kind")
+def test_a_processor_without_wide_registers_computes_the_same(tmp_path):
+    code = "import dhkit; print(dhkit.Arm.load('puma560').fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])[:3].tolist())"
+    plain = in_new_process(code, tmp_path, NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="")
+    T = Arm.load("puma560").fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])[:3]
+    assert np.abs(np.array(json.loads(plain.stdout)) - T).max() < TWINS
