@@ -118,5 +118,5 @@ def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
 def _inside(x: Any, begin: Any, width: Any, slides: bool) -> Any:
     if slides:
         return ca.logic_and(x >= begin, x - begin <= width)
-    turns = x / TURN - begin
+    turns = x * (1.0 / TURN) - begin  # a product: dividing costs as much as an arc tangent
     return turns - ca.floor(turns) <= width
