@@ -9,7 +9,7 @@ from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
 from dhkit.description.values import Convention
 
-__all__ = ["joint_array", "link_transforms", "world_to_frames", "world_to_tool"]
+__all__ = ["joint_array", "link_transforms", "number_array", "world_to_frames", "world_to_tool"]
 
 
 def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
@@ -22,16 +22,28 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
     TypeError
         Not numbers.
     """
-    try:
-        array = np.asarray(q)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError
-        array = array.astype(float, copy=False)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: found {type(q).__name__} of other things; expected numbers, shape (..., n)") from None
+    array = number_array(q, name, "(..., n)")
     if array.ndim == 0 or array.shape[-1] != description.n:
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
     return array
+
+
+def number_array(value: ArrayLike, name: str, shape: str) -> Array:
+    """Return numbers as a float64 array, itself where it is one.
+
+    Raises
+    ------
+    TypeError
+        Not numbers; names the argument and the shape expected.
+    """
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise TypeError
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError):
+        kind = type(value).__name__
+        raise TypeError(f"{name}: found {kind} of other things; expected numbers, shape {shape}") from None
 
 
 def link_transforms(description: Description, q: ArrayLike) -> Array:

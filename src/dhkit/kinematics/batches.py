@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array
+from dhkit.description.frames import number_array
 from dhkit.kernels import Kernel
 
 __all__ = ["check_whole", "fill", "pose_rows", "result_array"]
@@ -75,13 +76,7 @@ def pose_rows(T: ArrayLike) -> Array:
     TypeError
         Not numbers.
     """
-    try:
-        poses = np.asarray(T)
-        if poses.dtype.kind not in "fiu" and poses.size:
-            raise TypeError
-        poses = np.ascontiguousarray(poses, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"T: found {type(T).__name__} of other things; expected numbers, shape (..., 4, 4)") from None
+    poses = np.ascontiguousarray(number_array(T, "T", "(..., 4, 4)"))
     if poses.shape[-2:] != (4, 4):
         raise ValueError(f"T has shape {poses.shape}; expected (..., 4, 4)")
     return poses
