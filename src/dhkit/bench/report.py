@@ -238,7 +238,7 @@ def _cells(row: Row) -> list[str]:
 def duration(seconds: float) -> str:
     """Return a time in the unit that suits it, three digits."""
     for unit, scale in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= scale:
+        if seconds >= 0.9995 * scale:
             return f"{seconds / scale:.3g} {unit}"
     return f"{seconds / 1e-9:.3g} ns"
 
