@@ -52,4 +52,4 @@ format: $(READY)  ## let ruff format the sources
 	$(BIN)/ruff check --fix .
 
 clean:  ## remove what was built
-	rm -rf $(VENV) $(VENV)-lowest out dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-lowest .cache out dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis
