@@ -115,6 +115,15 @@ def test_axes_that_are_nearly_parallel_cost_what_a_table_must_cost():
     assert np.abs(world_to_tool(ours, q) - world_to_tool(arm, full)).max() < 1e-9
 
 
+def test_joints_at_the_base_are_held_without_a_common_normal():
+    """Axes 1 and 3 are 6e-10 from parallel, but axis 1 goes into the base."""
+    arm = from_dh([(0, 0.1, 0.4, "pi/2"), (0, 0.2, 0.3, 1.5707963262), (0, 0.1, 0.2, 0.3)])
+    ours = lock(arm, {0: "0", 1: "0"})
+    q = states(ours, 50)
+    full = np.concatenate([np.zeros((50, 2)), q], axis=1)
+    assert np.abs(world_to_tool(ours, q) - world_to_tool(arm, full)).max() < AGREES
+
+
 def test_right_angles_and_numbers_stay_exact():
     arm = lock(library_robot("puma560"), {3: 0, 4: 0, 5: 0})
     assert arm.joints[2].d == exact(0.15005)

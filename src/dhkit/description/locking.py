@@ -154,13 +154,19 @@ def _settled(
 
 
 def _locked(description: Description, held: dict[int, Expression]) -> Description:
-    """Freeze joints one by one, from the tip on."""
+    """Freeze joints one by one: those at the base from there on, the others from the tip on.
+
+    So no common normal is taken of two axes of which one goes into the base: nearly parallel ones would cost digits.
+    """
     bodies = tuple((joint.body,) for joint in description.joints)
     base: tuple[Body | None, ...] = (description.base.body,) if description.base.body is not None else ()
     chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
     values = resolved(description.parameters)
-    for place in sorted(held, reverse=True):
-        chain = _without(chain, description.convention, place, held[place], values)
+    first = next(place for place in range(description.n + 1) if place not in held)
+    for place in range(first):
+        chain = _without(chain, description.convention, 0, held[place], values)
+    for place in sorted((place for place in held if place > first), reverse=True):
+        chain = _without(chain, description.convention, place - first, held[place], values)
     kept = [i for i in range(description.n) if i not in held]
     configurations = Named({name: tuple(q[i] for i in kept) for name, q in description.configurations.items()})
     on_base = [body for body in chain.bodies[0] if body is not None]
