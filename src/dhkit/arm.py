@@ -288,8 +288,7 @@ class Arm:
         return Arm, (self._description,)
 
     def __repr__(self) -> str:
-        kinds = "".join("R" if joint.is_revolute else "P" for joint in self._description.joints)
-        return f"<Arm {self.name}: {kinds}, {self._description.convention.value} DH>"
+        return f"<Arm {self.name}: {self._description.kinds}, {self._description.convention.value} DH>"
 
     def _repr_html_(self) -> str:
         return f"<b>{self.name}</b>{self.dh._repr_html_()}"

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dhkit.bench.contenders import UnavailableError
-from dhkit.description import Array, Convention, Description, world_to_frames, world_to_tool
+from dhkit.description import Array, Description, world_to_frames, world_to_tool
+from dhkit.description.frames import carrying
 
 __all__ = ["JointAxes", "OrthoParallel", "bare", "has_spherical_wrist", "joint_axes"]
 
@@ -63,8 +64,7 @@ def joint_axes(description: Description, q: Array | None = None) -> JointAxes:
         raise UnavailableError("takes revolute joints only; this arm has prismatic ones")
     q = np.zeros(description.n) if q is None else q
     frames = world_to_frames(description, q)
-    # Joint i turns about z of frame i - 1 in the standard convention, of frame i in the modified one.
-    turning = frames[:-1] if description.convention is Convention.STANDARD else frames[1:]
+    turning = carrying(description.convention, frames)
     return JointAxes(turning[:, :3, 2], turning[:, :3, 3], world_to_tool(description, q))
 
 

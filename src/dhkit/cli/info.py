@@ -17,19 +17,14 @@ from dhkit.kinematics import classify
 __all__ = ["forward", "list_robots", "show"]
 
 
-def kinds(description: Description) -> str:
-    """Return one letter a joint, R or P."""
-    return "".join("R" if joint.is_revolute else "P" for joint in description.joints)
-
-
 def list_robots(json: bool) -> None:
     """Print the library."""
     arms = [Arm.load(name).description for name in robots()]
     if json:
         keys = ("name", "n", "source")
-        print_json([{key: getattr(arm, key) for key in keys} | {"kinds": kinds(arm)} for arm in arms])
+        print_json([{key: getattr(arm, key) for key in keys} | {"kinds": arm.kinds} for arm in arms])
         return
-    rows = [(arm.name, kinds(arm), arm.convention.value, f"{arm.reach:.2f}", _first(arm.source)) for arm in arms]
+    rows = [(arm.name, arm.kinds, arm.convention.value, f"{arm.reach:.2f}", _first(arm.source)) for arm in arms]
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
 
 
@@ -39,7 +34,7 @@ def show(arm: Arm, json: bool) -> None:
         print_json(_facts(arm))
         return
     description, numbers = arm.description, arm.description.numbers
-    say(f"{arm.name}: {kinds(description)}, {description.convention.value} DH, reach {description.reach:.4g} m", "bold")
+    say(f"{arm.name}: {description.kinds}, {description.convention.value} DH, reach {description.reach:.4g} m", "bold")
     if description.source:
         say(f"source: {description.source}")
     say(f"\n{arm.dh}\n")
@@ -121,7 +116,7 @@ def _facts(arm: Arm) -> dict[str, Any]:
     return {
         "name": arm.name,
         "n": arm.n,
-        "kinds": kinds(description),
+        "kinds": description.kinds,
         "convention": description.convention.value,
         "reach": description.reach,
         "inverse_kinematics": arm.family,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,7 +11,10 @@ from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
 from dhkit.description.values import Convention
 
-__all__ = ["joint_array", "link_transforms", "number_array", "world_to_frames", "world_to_tool"]
+__all__ = ["carrying", "joint_array", "link_transforms", "number_array", "world_to_frames", "world_to_tool"]
+
+Frames = TypeVar("Frames", Array, list[Any])
+"""An array (n+1, ...), or a list of n+1 expressions."""
 
 
 def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
@@ -86,6 +91,11 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
         A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
     A[missing] = np.nan
     return A
+
+
+def carrying(convention: Convention, frames: Frames) -> Frames:
+    """Return those of frames 0 ... n whose z axes joints move about: all but the last, or (modified) but the first."""
+    return frames[:-1] if convention is Convention.STANDARD else frames[1:]
 
 
 def world_to_frames(description: Description, q: ArrayLike) -> Array:

@@ -62,6 +62,11 @@ class Description:
         """The number of joints."""
         return len(self.joints)
 
+    @property
+    def kinds(self) -> str:
+        """One letter a joint, R or P."""
+        return "".join("R" if joint.is_revolute else "P" for joint in self.joints)
+
     @cached_property
     def numbers(self) -> Numbers:
         """The float view: read-only arrays of the table, the limits, bodies and drives."""

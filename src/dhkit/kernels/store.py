@@ -30,9 +30,8 @@ def cache_folder() -> Path | None:
 
     None where it cannot be written, or could be written by others: what lies in it is run.
     """
-    folder = (
-        Path(os.environ.get("DHKIT_CACHE_DIR") or platformdirs.user_cache_dir("dhkit", appauthor=False)) / "kernels"
-    )
+    root = os.environ.get("DHKIT_CACHE_DIR") or platformdirs.user_cache_dir("dhkit", appauthor=False)
+    folder = Path(root).expanduser() / "kernels"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()

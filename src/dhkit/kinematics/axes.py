@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description, world_to_frames
-from dhkit.description.values import Convention
+from dhkit.description.frames import carrying
 
 __all__ = ["TOLERANCE", "Axes", "inverse_pose"]
 
@@ -36,10 +36,10 @@ class Axes:
     def of(cls, description: Description, tolerance: float = TOLERANCE) -> Axes:
         """Return the axes of an arm."""
         frames = world_to_frames(description, np.zeros(description.n))
-        carrying = frames[:-1] if description.convention is Convention.STANDARD else frames[1:]
+        moving = carrying(description.convention, frames)
         return cls(
-            directions=carrying[:, :3, 2],
-            points=carrying[:, :3, 3],
+            directions=moving[:, :3, 2],
+            points=moving[:, :3, 3],
             prismatic=description.numbers.prismatic,
             T_world_tool=frames[-1] @ description.numbers.T_last_tool,
             scale=_scale(description),

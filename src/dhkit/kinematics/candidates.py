@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatus
 
 __all__ = ["are_poses", "collect", "orthonormal", "wrapped"]
 
-ORTHONORMAL = 1e-6
-"""By how much a rotation's columns may miss being orthonormal, as for every pose that dhkit takes."""
 TURN = 2 * np.pi
 
 

@@ -37,7 +37,8 @@ def inverse_kinematics(
         Poses of the tool in the world, shape (..., 4, 4).
     seed
         Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, one joint may take any angle (q4,
-        or q6 of an arm with three parallel axes): it takes that of the seed, or 0. ssik does not use it.
+        or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 may:
+        it takes that of the seed, or 0. ssik does not use it.
     out
         Where to write the joint values, shape (..., B, n), float64, contiguous. Not with ssik.
     threads

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from dhkit.description import Array, Convention, Description
+from dhkit.description.frames import carrying
 
 if TYPE_CHECKING:
     import casadi
@@ -134,8 +135,7 @@ def table_pattern(description: Description) -> tuple[str, Array]:
     """
     numbers = table_numbers(description)
     codes = np.select([numbers == x for x in FOLDED], list("0+-"), "p")
-    kinds = "".join("P" if moves else "R" for moves in description.numbers.prismatic)
-    return f"{description.convention.value} {kinds} {''.join(codes)}", numbers[codes == "p"]
+    return f"{description.convention.value} {description.kinds} {''.join(codes)}", numbers[codes == "p"]
 
 
 def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
@@ -148,9 +148,8 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
 
     frames = table.world_to_frames(q)
     tool = frames[-1] @ table.last_to_tool
-    carrying = frames[:-1] if table.convention is Convention.STANDARD else frames[1:]
     columns = []
-    for T, slides in zip(carrying, table.prismatic, strict=True):
+    for T, slides in zip(carrying(table.convention, frames), table.prismatic, strict=True):
         axis = T[:3, 2]
         linear = axis if slides else casadi.cross(axis, tool[:3, 3] - T[:3, 3])
         columns.append(casadi.vertcat(linear, casadi.SX(3, 1) if slides else axis))

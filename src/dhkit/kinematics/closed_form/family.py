@@ -61,26 +61,10 @@ class Fit:
         """Return all parameters in one row."""
         return np.concatenate([np.ravel(value) for value in self.parameters.values()]).astype(float)
 
-    def values(self) -> dict[str, SX]:
-        """Return the parameters themselves in the shapes that :meth:`symbols` has."""
+    def named(self, row: ca.SX) -> dict[str, SX]:
+        """Return a column of all parameters, or symbols for them, by name: pairs as tuples, matrices as matrices."""
         import casadi as ca
 
-        row = iter(self.vector().tolist())
-        named: dict[str, SX] = {}
-        for name, value in self.parameters.items():
-            entries = [next(row) for _ in range(np.size(value))]
-            shape = np.shape(value)
-            if len(shape) == 2:
-                named[name] = ca.SX(np.reshape(entries, shape))
-            else:
-                named[name] = tuple(entries) if shape else entries[0]
-        return named
-
-    def symbols(self) -> tuple[dict[str, SX], ca.SX]:
-        """Return symbols of the parameters' shapes (pairs as tuples, matrices as matrices), and all in one column."""
-        import casadi as ca
-
-        row = ca.SX.sym("p", sum(np.size(value) for value in self.parameters.values()))
         named: dict[str, SX] = {}
         start = 0
         for name, value in self.parameters.items():
@@ -91,7 +75,7 @@ class Fit:
             else:
                 named[name] = tuple(ca.vertsplit(part)) if shape else part
             start += np.size(value)
-        return named, row
+        return named
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def unit(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
 
 
 def times(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
-    """Return the pair of the sum of two angles, or of their difference for sense -1."""
+    """Return the pair of the sum of two angles, or of their difference for sense -1; b of any length is turned by a."""
     sine = sense * b[1]
     return a[0] * b[0] - a[1] * sine, a[1] * b[0] + a[0] * sine
 

@@ -25,6 +25,7 @@ from dhkit.kinematics.closed_form.formulas import (
     absolute,
     angle,
     both,
+    chosen,
     combined,
     hypot,
     no,
@@ -101,15 +102,17 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     lever = p["lever"]
     x, u, v = T.position
     if turning:
-        x, u = x - (rho[0] * lever[0] - rho[1] * lever[1]), u - (rho[1] * lever[0] + rho[0] * lever[1])
+        reached = times(rho, lever)
+        x, u = x - reached[0], u - reached[1]
     arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
     rise = v - p["height"]
     off = 0.0 if "P" in kinds else _off_plane(rise, pose.scale)
     branches = []
     for side in (0, 1):
         # Seen from above, left is left where v points up.
-        qa = times(_either(p["up"] > 0, arm.first, side), p["upper"], -1.0)
-        qb = times(_either(p["up"] > 0, arm.between, side), p["bend"], -1.0)
+        upright, other = p["up"] > 0, 1 - side
+        qa = times(chosen(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
+        qb = times(chosen(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
         turns = iter((qa, qb, times(times(rho, qa, -1.0), qb, -1.0)))
         joints = [
             sense * rise if kind == "P" else _sensed(next(turns), sense)
@@ -224,8 +227,3 @@ def _sensed(pair: Pair, sense: SX) -> SX:
 
 def _off_plane(rise: SX, scale: SX) -> SX:
     return where(absolute(rise) > FLAT * scale, absolute(rise), 0.0)
-
-
-def _either(upright: SX, both: tuple[tuple[SX, SX], tuple[SX, SX]], side: int) -> tuple[SX, SX]:
-    one, other = both[side], both[1 - side]
-    return where(upright, one[0], other[0]), where(upright, one[1], other[1])

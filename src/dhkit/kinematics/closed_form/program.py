@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.closed_form.family import TURN, Family, Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import SX, Branch, where
 from dhkit.kinematics.solutions import IKFlag, IKStatus
@@ -17,23 +18,19 @@ from dhkit.symbolic import Graph
 
 __all__ = ["arm_program", "program"]
 
-ORTHONORMAL = 1e-6
-"""By how much a rotation's columns may miss being orthonormal, as for every pose that dhkit takes."""
-
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     """Return the program of a family: T (4 x 4) and the free joints' angles to q, distance, valid, flags and status.
 
     Its parameters are ``fit.vector()`` and then ``limit_parameters``.
     """
-    named, symbols = fit.symbols()
-    limits = ca.SX.sym("limits", 2 * len(prismatic))
-    return _graph(family, fit, prismatic, named, limits, {"parameters": ca.vertcat(symbols, limits)})
+    symbols, limits = ca.SX.sym("p", len(fit.vector())), ca.SX.sym("limits", 2 * len(prismatic))
+    return _graph(family, fit, prismatic, fit.named(symbols), limits, {"parameters": ca.vertcat(symbols, limits)})
 
 
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
     """Return the same program with one arm's numbers in place of the parameters."""
-    return _graph(family, fit, prismatic, fit.values(), ca.SX(limits), {})
+    return _graph(family, fit, prismatic, fit.named(ca.SX(fit.vector())), ca.SX(limits), {})
 
 
 def _graph(

@@ -114,7 +114,8 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, n
     lever = p["lever"]
     x, u = position[0] - p["a1"], position[1]
     far, arm = hypot(x, u), hypot(lever[0], lever[1])
-    distance = hypot(x - (rho[0] * lever[0] - rho[1] * lever[1]), u - (rho[1] * lever[0] + rho[0] * lever[1]))
+    reached = times(rho, lever)
+    distance = hypot(x - reached[0], u - reached[1])
     reach, gap = p["L2"] + p["L3"], absolute(p["L2"] - p["L3"])
     wanted = where(distance > reach, reach, larger(distance, gap))
     # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
@@ -137,9 +138,8 @@ def _elbows(
     singular: SX,
     scale: SX,
 ) -> tuple[Branch, Branch]:
-    lever = p["lever"]
-    x = position[0] - p["a1"] - (rho[0] * lever[0] - rho[1] * lever[1])
-    u = position[1] - (rho[1] * lever[0] + rho[0] * lever[1])
+    reached = times(rho, p["lever"])
+    x, u = position[0] - p["a1"] - reached[0], position[1] - reached[1]
 
     def branch(elbow: Elbow) -> Branch:
         rest = times(rho, elbow.turned, -1.0)

@@ -137,9 +137,8 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     for shoulder in ordered_shoulders(p, T.position, pose):
         wanted = turned_back(combined(p["axis"], T.rotation), shoulder.q1)
         rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
-        lever = p["lever"]
-        x = shoulder.x - p["a1"] - (rho[0] * lever[0] - rho[1] * lever[1])
-        u = T.position[1] - (rho[1] * lever[0] + rho[0] * lever[1])
+        reached = times(rho, p["lever"])
+        x, u = shoulder.x - p["a1"] - reached[0], T.position[1] - reached[1]
         sideways = hypot(wanted[0], wanted[1]) < SINGULAR
         branches += _branches(p, shoulder, x, u, pose.scale, rho, sideways)
     return branches
