@@ -1,0 +1,324 @@
+"""A description in the exact ring: its table, bodies, drives and gravity as elements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Array, Body, Convention, Description, Drive, Joint
+from dhkit.description.parameters import resolved
+from dhkit.errors import DescriptionError
+from dhkit.expressions import Expression, exact, exact_angle, substitute
+from dhkit.symbolic.ring import Element, Elements, Ring
+from dhkit.symbolic.ring_reader import Direction, RingReader
+
+__all__ = ["INERTIA_KEYS", "ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
+
+Symbols: TypeAlias = Literal["none", "file", "inertial"]
+"""Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
+
+ONE = exact(1)
+INERTIA_KEYS = ("xx", "yy", "zz", "xy", "yz", "xz")
+INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+
+
+@dataclass(frozen=True, eq=False)
+class ExactRow:
+    """A row of the table at the joint's variable: lengths, and cosine and sine of the angles."""
+
+    a: Element
+    d: Element
+    alpha: Direction
+    theta: Direction
+
+
+@dataclass(frozen=True, eq=False)
+class ExactBody:
+    """A link's inertia in the axes of its DH frame."""
+
+    mass: Element
+    com: Elements
+    """Shape (3,)."""
+    inertia: Elements
+    """Shape (3, 3), about the centre of mass."""
+    moment: Elements
+    """Shape (3,): mass times centre of mass."""
+    second: Elements
+    """Shape (3, 3): the tensor about the frame's origin."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExactArm:
+    """A description in a ring.
+
+    Attributes
+    ----------
+    description, symbols
+        What it was made from.
+    ring
+        Where its elements are.
+    rows, bodies
+        One a joint.
+    gear, rotor
+        Gear ratio and rotor inertia of each joint's drive; 1 and 0 without one.
+    gravity
+        Free-fall acceleration in frame 0, shape (3,).
+    origin
+        Frame 0's origin in the axes of frame 0, seen from the world's origin, shape (3,).
+    values
+        Value of every constant of the ring.
+    notes
+        What is a symbol though it is a number.
+    """
+
+    description: Description
+    symbols: Symbols
+    ring: Ring
+    rows: tuple[ExactRow, ...]
+    bodies: tuple[ExactBody, ...]
+    gear: tuple[Element, ...]
+    rotor: tuple[Element, ...]
+    gravity: Elements
+    origin: Elements
+    values: dict[str, float]
+    notes: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.ring.n
+
+    @property
+    def armature(self) -> tuple[Element, ...]:
+        """Rotor inertia as the joints see it: gear^2 rotor inertia."""
+        return tuple(gear * gear * rotor for gear, rotor in zip(self.gear, self.rotor, strict=True))
+
+    @property
+    def is_standard(self) -> bool:
+        """Whether the table is the distal one."""
+        return self.description.convention is Convention.STANDARD
+
+    def evaluate(
+        self, elements: Element | Elements, q: Array, qd: Array | None = None, qdd: Array | None = None
+    ) -> Array:
+        """Return elements' numbers, shape (..., *elements.shape), at states (..., n)."""
+        q = np.asarray(q, dtype=float)
+        values = self.ring.values(self.values, q, qd, qdd)
+        batch = np.broadcast_shapes(*(np.shape(x) for x in (q, qd, qdd) if x is not None))[:-1]
+        array = np.asarray(elements, dtype=object)
+        numbers = [np.broadcast_to(element.value(values), batch) for element in array.flat]
+        return np.stack(numbers, axis=-1).reshape(*batch, *array.shape) if numbers else np.zeros((*batch, *array.shape))
+
+
+@dataclass(frozen=True)
+class _Link:
+    """What is read of a link, as expressions."""
+
+    row: tuple[Expression, Expression, Expression, Expression]
+    """a, d, alpha, theta."""
+    mass: Expression
+    com: tuple[Expression, ...]
+    inertia: tuple[Expression, ...] | None
+    """In the order of ``INERTIA_KEYS``, about the centre of mass; None where ``second`` is given."""
+    second: tuple[Expression, ...] | None
+    gear: Expression
+    rotor: Expression
+
+
+@lru_cache(maxsize=32)
+def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
+    """Return a description in a ring of its own; the same one each time, so that results can be compared.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    symbols
+        ``"none"``: numbers only. ``"file"``: the file's parameters, those that are not made of others. ``"inertial"``:
+        each link's mass ``m2``, first moments ``rx2 ry2 rz2`` and second moments about its frame's origin ``Ixx2`` ...
+        ``Ixz2``, its drive's ``Jm2`` and ``G2``, lengths ``a2 d2`` where they are not zero, and gravity ``g``.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body.
+    ValueError
+        Another choice of symbols.
+    """
+    if symbols not in ("none", "file", "inertial"):
+        raise ValueError(f"symbols is {symbols!r}; expected 'none', 'file' or 'inertial'")
+    for i, joint in enumerate(description.joints, start=1):
+        if joint.body is None:
+            raise DescriptionError(
+                f"{description.name}: joint {i} ({joint.name}) has no body, which dynamics need; "
+                "give it one, or see with_uniform_links"
+            )
+    naming = _Naming(description, symbols)
+    links = [naming.link(i, joint, body) for i, (joint, body) in enumerate(_with_bodies(description), start=1)]
+    gravity = naming.gravity()
+    placement = description.base.placement
+    xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
+
+    expressions = [*gravity, *xyz]
+    angles = [*rpy]
+    for link in links:
+        expressions += [
+            *link.row[:2],
+            link.mass,
+            *link.com,
+            *(link.inertia or link.second or ()),
+            link.gear,
+            link.rotor,
+        ]
+        angles += link.row[2:]
+    reader = RingReader(description.kinds, expressions, angles)
+    ring = reader.ring
+    rotation = _rotation(reader, rpy)
+    return ExactArm(
+        description,
+        symbols,
+        ring,
+        tuple(_row(reader, i, link) for i, link in enumerate(links)),
+        tuple(_body(reader, link) for link in links),
+        tuple(reader.element(link.gear) for link in links),
+        tuple(reader.element(link.rotor) for link in links),
+        rotation.T @ np.array([reader.element(x) for x in gravity], dtype=object),
+        rotation.T @ np.array([reader.element(x) for x in xyz], dtype=object),
+        {text: reader.number(text, naming.values) for text in ring.constants},
+        tuple(reader.notes),
+    )
+
+
+class _Naming:
+    """Decides which numbers become symbols, and remembers the symbols' values."""
+
+    def __init__(self, description: Description, symbols: Symbols) -> None:
+        self.description = description
+        self.symbols = symbols
+        self.values = resolved(description.parameters)
+        own = {name for name, value in description.parameters.items() if not value.symbols}
+        self._fixed = {
+            name: _through(description.parameters, name) for name in description.parameters if name not in own
+        }
+        if symbols == "none":
+            self._fixed = self.values
+
+    def known(self, expression: Expression) -> Expression:
+        """Return an expression in the symbols that are kept."""
+        return substitute(expression, self._fixed)
+
+    def symbol(self, name: str, value: Expression) -> Expression:
+        """Return a new symbol of that value; zero needs none."""
+        while name in self.values and self.values[name] != value:
+            name += "_"
+        self.values[name] = value
+        return Expression.symbol(name)
+
+    def length(self, name: str, expression: Expression) -> Expression:
+        """Return a length of the table, by a name of its own where all numbers are symbols."""
+        known = self.known(expression)
+        if self.symbols != "inertial" or known.symbols or known.is_zero:
+            return known
+        return self.symbol(name, known)
+
+    def gravity(self) -> list[Expression]:
+        """Return the free-fall acceleration in the world."""
+        vector = [self.known(x) for x in self.description.gravity]
+        if self.symbols != "inertial" or any(x.symbols for x in vector):
+            return vector
+        along = [x for x in vector if not x.is_zero]
+        if len(along) == 1:
+            size = along[0] if float(along[0]) > 0 else -along[0]
+            g = self.symbol("g", size)
+            return [x if x.is_zero else g if float(x) > 0 else -g for x in vector]
+        return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
+
+    def link(self, i: int, joint: Joint, body: Body) -> _Link:
+        """Return what link i, from 1, is read from."""
+        row = (
+            self.length(f"a{i}", joint.a),
+            self.length(f"d{i}", joint.d),
+            exact_angle(self.known(joint.alpha)),
+            exact_angle(self.known(joint.theta)),
+        )
+        drive = joint.drive or Drive()
+        gear, rotor = self.known(drive.gear), self.known(drive.rotor_inertia)
+        if self.symbols != "inertial":
+            inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_KEYS)
+            com = tuple(self.known(x) for x in body.com)
+            return _Link(row, self.known(body.mass), com, inertia, None, gear, rotor)
+        numbers = self.description.numbers
+        m, c, I_com = numbers.mass[i - 1], numbers.com[i - 1], numbers.inertia[i - 1]
+        about_origin = I_com + m * (c @ c * np.eye(3) - np.outer(c, c))
+        mass = self.symbol(f"m{i}", exact(float(m)))
+        moments = [self.symbol(f"r{axis}{i}", exact(float(m * x))) for axis, x in zip("xyz", c, strict=True)]
+        second = tuple(
+            self.symbol(f"I{key}{i}", exact(float(about_origin[place]))) for key, place in INERTIA_PLACES.items()
+        )
+        if not rotor.is_zero:
+            gear = gear if gear == ONE else self.symbol(f"G{i}", substitute(drive.gear, self.values))
+            rotor = self.symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
+        return _Link(row, mass, tuple(x / mass for x in moments), None, second, gear, rotor)
+
+
+def _with_bodies(description: Description) -> list[tuple[Joint, Body]]:
+    return [(joint, joint.body) for joint in description.joints if joint.body is not None]
+
+
+def _through(parameters: object, name: str) -> Expression:
+    """Return a parameter in those that are not made of others."""
+    table: dict[str, Expression] = dict(parameters)  # type: ignore[call-overload]
+    expression = table[name]
+    while made := {x for x in expression.symbols if table[x].symbols}:
+        expression = substitute(expression, {x: table[x] for x in made})
+    return expression
+
+
+def _row(reader: RingReader, i: int, link: _Link) -> ExactRow:
+    """Return row i, from 0, with the joint's variable added to theta or d."""
+    ring = reader.ring
+    a, d = reader.element(link.row[0]), reader.element(link.row[1])
+    alpha, theta = reader.direction(link.row[2]), reader.direction(link.row[3])
+    if ring.kinds[i] != "R":
+        return ExactRow(a, d + ring.position(i), alpha, theta)
+    c, s = ring.cosine(i), ring.sine(i)
+    return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
+
+
+def _body(reader: RingReader, link: _Link) -> ExactBody:
+    mass = reader.element(link.mass)
+    com = np.array([reader.element(x) for x in link.com], dtype=object)
+    moment = np.array([mass * x for x in com], dtype=object)
+    steiner = point_inertia(com, moment)
+    tensor = _symmetric([reader.element(x) for x in (link.inertia or link.second or ())])
+    if link.second is None:
+        return ExactBody(mass, com, tensor, moment, tensor + steiner)
+    return ExactBody(mass, com, tensor - steiner, moment, tensor)
+
+
+def point_inertia(lever: Elements, moment: Elements) -> Elements:
+    """Return m (c^2 1 - c c^T) of a lever c and a moment m c, shape (3, 3)."""
+    square = lever @ moment
+    return np.array([[(square if i == j else 0 * square) - lever[i] * moment[j] for j in range(3)] for i in range(3)])
+
+
+def _symmetric(entries: Sequence[Element]) -> Elements:
+    tensor = np.empty((3, 3), dtype=object)
+    for (i, j), entry in zip(INERTIA_PLACES.values(), entries, strict=True):
+        tensor[i, j] = tensor[j, i] = entry
+    return tensor
+
+
+def _rotation(reader: RingReader, rpy: Sequence[Expression]) -> Elements:
+    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
+    one, zero = reader.ring.one, reader.ring.zero
+    (cr, sr), (cp, sp), (cy, sy) = (reader.direction(angle) for angle in rpy)
+    z = np.array([[cy, -sy, zero], [sy, cy, zero], [zero, zero, one]], dtype=object)
+    y = np.array([[cp, zero, sp], [zero, one, zero], [-sp, zero, cp]], dtype=object)
+    x = np.array([[one, zero, zero], [zero, cr, -sr], [zero, sr, cr]], dtype=object)
+    rotation: Elements = z @ y @ x
+    return rotation

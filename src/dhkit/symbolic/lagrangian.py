@@ -1,0 +1,204 @@
+"""Lagrange's equations of an arm, exactly: M qdd + C qd + g = tau, and proofs about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.symbolic import composite
+from dhkit.symbolic.exact_arm import ExactArm, Symbols, exact_arm
+from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.textbook import TextbookDerivation, derive
+
+__all__ = ["Lagrangian", "Proof", "lagrangian"]
+
+_HALF = Fraction(1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """A statement, decided in the exact ring: true if the difference of its two sides is zero, which is kept.
+
+    Attributes
+    ----------
+    statement
+        What was to be proved.
+    difference
+        Left side less right side: an array of elements, all zero where the statement is true.
+    """
+
+    statement: str
+    difference: Elements
+
+    def __bool__(self) -> bool:
+        return all(element.is_zero for element in self.difference.flat)
+
+    @property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """Indices of the entries, from 0, in which the two sides differ."""
+        return tuple(place for place, element in np.ndenumerate(self.difference) if not element.is_zero)
+
+    def __str__(self) -> str:
+        if self:
+            return f"proved: {self.statement}"
+        place = self.places[0]
+        where = ", ".join(str(k + 1) for k in place)
+        return f"NOT TRUE: {self.statement}; entry {where} differs by {self.difference[place]}"
+
+
+@dataclass(frozen=True, eq=False)
+class Lagrangian:
+    """An arm's equations of motion in the exact ring, made by composite bodies and Christoffel symbols.
+
+    Arrays are of elements: exact functions of the state, in a normal form. ``str(lag.M[0, 0])`` is readable;
+    :meth:`evaluate` gives numbers.
+
+    Attributes
+    ----------
+    arm
+        The description in the ring.
+    M
+        Mass matrix, shape (n, n), kg m^2; reflected rotor inertia is part of it.
+    V
+        Potential energy, J; zero at the world's origin.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> lag = lagrangian(library_robot("planar2r"))
+    >>> print(lag.M[1, 1])
+    1/3*m2*l2^2
+    >>> bool(lag.prove_euler_lagrange()), bool(lag.prove_skew_symmetry())
+    (True, True)
+    """
+
+    arm: ExactArm
+    M: Elements
+    V: Element
+
+    @property
+    def description(self) -> Description:
+        """The robot."""
+        return self.arm.description
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.arm.n
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which numbers are symbols because they cannot be written exactly."""
+        return self.arm.notes
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """The symbols and what they are worth, SI."""
+        return dict(self.arm.values)
+
+    # Quantities
+
+    @cached_property
+    def christoffel(self) -> Elements:
+        """Christoffel symbols of the first kind, shape (n, n, n).
+
+        c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) / 2 (Siciliano et al., Robotics, 2009, eq. 7.45).
+        """
+        n = self.n
+        rates = np.empty((n, n, n), dtype=object)
+        for i in range(n):
+            for j in range(i, n):
+                for k in range(n):
+                    rates[i, j, k] = rates[j, i, k] = self.M[i, j].by_position(k)
+        symbols = np.empty((n, n, n), dtype=object)
+        for i in range(n):
+            for j in range(n):
+                for k in range(j, n):
+                    symbols[i, j, k] = symbols[i, k, j] = (rates[i, j, k] + rates[i, k, j] - rates[j, k, i]) * _HALF
+        return symbols
+
+    @cached_property
+    def C(self) -> Elements:
+        """Coriolis matrix of the Christoffel symbols, shape (n, n): C_ij = sum_k c_ijk qd_k."""
+        return self.christoffel @ self._rates
+
+    @cached_property
+    def h(self) -> Elements:
+        """Coriolis and centrifugal torques C qd, shape (n,)."""
+        return self.C @ self._rates
+
+    @cached_property
+    def g(self) -> Elements:
+        """Gravity torques dV/dq, shape (n,)."""
+        return np.array([self.V.by_position(i) for i in range(self.n)], dtype=object)
+
+    @cached_property
+    def K(self) -> Element:
+        """Kinetic energy qd^T M qd / 2, J."""
+        return self._rates @ self.M @ self._rates * _HALF  # type: ignore[no-any-return]
+
+    @cached_property
+    def tau(self) -> Elements:
+        """Joint torques M qdd + C qd + g, shape (n,)."""
+        ring = self.arm.ring
+        accelerations = np.array([ring.acceleration(i) for i in range(self.n)], dtype=object)
+        return self.M @ accelerations + self.h + self.g  # type: ignore[no-any-return]
+
+    @property
+    def _rates(self) -> Elements:
+        return np.array([self.arm.ring.rate(i) for i in range(self.n)], dtype=object)
+
+    def replaced(self, **quantities: Any) -> Lagrangian:
+        """Return equations in which some quantities are others, to be held against the truth.
+
+        Parameters
+        ----------
+        **quantities
+            Any of M, V, C, h, g, K, tau: elements of this one's ring. What is made of a replaced quantity follows it.
+        """
+        other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V))
+        for name in quantities:
+            if name not in ("C", "h", "g", "K", "tau"):
+                raise ValueError(f"no quantity {name!r}; expected M, V, C, h, g, K or tau")
+        vars(other).update(quantities)
+        return other
+
+    def evaluate(
+        self, elements: Element | Elements, q: Array, qd: Array | None = None, qdd: Array | None = None
+    ) -> Array:
+        """Return the numbers of elements, shape (..., *elements.shape), at states (..., n)."""
+        return self.arm.evaluate(elements, q, qd, qdd)
+
+    # Proofs
+
+    def prove_skew_symmetry(self) -> Proof:
+        """Decide whether dM/dt - 2 C is skew-symmetric, for every state."""
+        rate = np.array([[entry.by_time() for entry in row] for row in self.M], dtype=object)
+        N = rate - 2 * self.C
+        return Proof("dM/dt - 2 C is skew-symmetric", N + N.T)
+
+    def prove_euler_lagrange(self, other: TextbookDerivation | None = None) -> Proof:
+        """Decide whether M qdd + C qd + g is what Euler and Lagrange's equation gives by the textbook's route.
+
+        The other route starts at the positions of the centres of mass, differentiates them, and applies
+        d/dt dL/dqd - dL/dq to the Lagrangian; it shares the table with this one, and nothing else.
+
+        Parameters
+        ----------
+        other
+            A derivation of the same description with the same symbols, perhaps with mistakes; the right one unless
+            given.
+        """
+        route = other or derive(self.description, symbols=self.arm.symbols)
+        return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - route.tau)
+
+
+def lagrangian(description: Description, symbols: Symbols = "file") -> Lagrangian:
+    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for ``symbols``."""
+    arm = exact_arm(description, symbols)
+    return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))

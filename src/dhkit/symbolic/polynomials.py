@@ -1,0 +1,170 @@
+"""Polynomials with rational coefficients in many generators: sympy's, or python-flint's where it is installed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from operator import itemgetter
+from typing import Any, Protocol, TypeAlias
+
+__all__ = ["Monomial", "Polynomials", "Relation", "polynomials"]
+
+Monomial: TypeAlias = tuple[int, ...]
+"""One exponent a generator."""
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A polynomial that is zero, by which a power of a generator is replaced.
+
+    Attributes
+    ----------
+    place
+        Which generator.
+    power
+        2 for x^2 = replacement; 1 for x * (a sum) = 1.
+    polynomial
+        What is zero. Its leading term, in the lexicographic order of the generators, has the generator to that power.
+    """
+
+    place: int
+    power: int
+    polynomial: Any
+
+
+class Polynomials(Protocol):
+    """A polynomial ring over the rationals; its polynomials have ``+``, ``-``, ``*``, ``==`` and ``len``."""
+
+    def constant(self, value: int | Fraction) -> Any:
+        """Return a rational number."""
+
+    def generator(self, k: int) -> Any:
+        """Return generator k."""
+
+    def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
+        """Return the polynomial of coefficients by monomial."""
+
+    def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
+        """Return the coefficients by monomial; coefficients have ``numerator`` and ``denominator``."""
+
+    def derivative(self, polynomial: Any, k: int) -> Any:
+        """Return the derivative by generator k."""
+
+    def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
+        """Return what is left when relations, the greatest generator's first, are put to use as often as they can."""
+
+    def quotient(self, dividend: Any, divisor: Any) -> Any:
+        """Return the quotient of a division that leaves no remainder, None where one is left."""
+
+
+def polynomials(count: int) -> Polynomials:
+    """Return the polynomials in so many generators, by python-flint unless it is missing or ``DHKIT_FLINT=off``."""
+    if os.environ.get("DHKIT_FLINT", "").lower() != "off":
+        try:
+            return _Flint(count)
+        except ImportError:
+            pass
+    return _Sympy(count)
+
+
+class _Flint:
+    def __init__(self, count: int) -> None:
+        import flint
+
+        self._ring = flint.fmpq_mpoly_ctx.get([f"x{k}" for k in range(count)], flint.Ordering.lex)
+        self._number = flint.fmpq
+        self._generators = self._ring.gens()
+
+    def constant(self, value: int | Fraction) -> Any:
+        return self._ring.constant(self._number(value.numerator, value.denominator))
+
+    def generator(self, k: int) -> Any:
+        return self._generators[k]
+
+    def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
+        return self._ring.from_dict({m: self._number(c.numerator, c.denominator) for m, c in terms.items()})
+
+    def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
+        return {tuple(map(int, monomial)): Fraction(int(c.p), int(c.q)) for monomial, c in polynomial.to_dict().items()}
+
+    def derivative(self, polynomial: Any, k: int) -> Any:
+        return polynomial.derivative(k)
+
+    def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
+        degrees = polynomial.degrees() if len(polynomial) else None
+        for relation in relations:
+            if degrees and degrees[relation.place] >= relation.power:
+                polynomial = divmod(polynomial, relation.polynomial)[1]
+        return polynomial
+
+    def quotient(self, dividend: Any, divisor: Any) -> Any:
+        quotient, remainder = divmod(dividend, divisor)
+        return None if len(remainder) else quotient
+
+
+class _Sympy:
+    def __init__(self, count: int) -> None:
+        from sympy import QQ
+        from sympy.polys.orderings import lex
+        from sympy.polys.rings import PolyRing
+
+        self._ring = PolyRing([f"x{k}" for k in range(count)], QQ, lex)
+        self._number = QQ
+
+    def constant(self, value: int | Fraction) -> Any:
+        return self._ring.ground_new(self._number(value.numerator, value.denominator))
+
+    def generator(self, k: int) -> Any:
+        return self._ring.gens[k]
+
+    def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
+        return self._ring.from_dict({m: self._number(int(c.numerator), int(c.denominator)) for m, c in terms.items()})
+
+    def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
+        return {monomial: Fraction(int(c.numerator), int(c.denominator)) for monomial, c in polynomial.items()}
+
+    def derivative(self, polynomial: Any, k: int) -> Any:
+        return polynomial.diff(k)
+
+    def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
+        squares = [relation for relation in relations if relation.power == 2]
+        while squares and polynomial:
+            low, high = self._split(polynomial, [relation.place for relation in squares])
+            if not high:
+                break
+            polynomial = self._ring.from_dict(low)
+            for halves, factor in high.items():
+                product = self._ring.from_dict(factor)
+                for half, relation in zip(halves, squares, strict=True):
+                    if half:
+                        product *= (self._ring.gens[relation.place] ** 2 - relation.polynomial) ** half
+                polynomial += product
+        for relation in relations:
+            if relation.power == 1 and any(monomial[relation.place] for monomial in polynomial):
+                polynomial = polynomial.rem(relation.polynomial)
+        return polynomial
+
+    @staticmethod
+    def _split(
+        polynomial: Any, places: Sequence[int]
+    ) -> tuple[dict[Monomial, Any], dict[Monomial, dict[Monomial, Any]]]:
+        """Return the terms without squares, and by the halves of their exponents those with them, squares taken off."""
+        exponents = itemgetter(*places, places[0])  # two or more, so that it returns a tuple
+        low: dict[Monomial, Any] = {}
+        high: dict[Monomial, dict[Monomial, Any]] = {}
+        for monomial, coefficient in polynomial.items():
+            if max(exponents(monomial)) < 2:
+                low[monomial] = coefficient
+                continue
+            halves = tuple(monomial[k] // 2 for k in places)
+            rest = list(monomial)
+            for k, half in zip(places, halves, strict=True):
+                rest[k] -= 2 * half
+            high.setdefault(halves, {})[tuple(rest)] = coefficient
+        return low, high
+
+    def quotient(self, dividend: Any, divisor: Any) -> Any:
+        quotient, remainder = dividend.div(divisor)
+        return None if remainder else quotient

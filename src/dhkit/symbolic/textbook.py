@@ -1,0 +1,374 @@
+"""Lagrange's equations as a textbook derives them, every step kept, with the places where students go wrong.
+
+Positions of the centres of mass, their velocities by differentiation, angular velocities as sums over the joints'
+axes, kinetic and potential energy of each link, the Lagrangian, and d/dt dL/dqd - dL/dq (Spong, Hutchinson &
+Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1). It shares the
+table with :mod:`dhkit.symbolic.composite`, and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.symbolic.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
+from dhkit.symbolic.ring import Element, Elements, Ring
+
+__all__ = ["MISTAKES", "LinkMotion", "TextbookDerivation", "derive"]
+
+HALF = Fraction(1, 2)
+
+MISTAKES: Mapping[str, str] = {
+    "gravity_sign": "gravity has the wrong sign: V falls where it should rise",
+    "gravity_forgotten": "gravity is missing: V is zero",
+    "gravity_axis": "gravity acts along the wrong axis: its components are exchanged in turn, x to y to z",
+    "height_at_joint": "the height is that of the joint in place of the centre of mass",
+    "height_at_end": "the height is that of the link's end in place of the centre of mass",
+    "height_forgotten": "the link's potential energy is missing",
+    "height_relative_angle": "the height uses the joint's own angle in place of the sum of the angles up to it",
+    "com_at_end": "the centre of mass is taken at the link's end, the full length in place of the half",
+    "velocity_at_joint": "the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
+    "velocity_relative_angle": "the velocity uses the joint's own angle in place of the sum of the angles up to it",
+    "velocity_cross_term": "the square of the velocity lacks the cross term 2 v.(omega x r)",
+    "omega_relative": "the angular velocity is that of the joint alone, without the joints before it",
+    "inertia_about_joint": "the inertia about the joint is used as if it were about the centre of mass: Steiner twice",
+    "inertia_axes": "the inertia's moments are exchanged in turn: taken about the wrong axes",
+    "inertia_forgotten": "the link's inertia about its centre of mass is missing",
+    "inertia_doubled": "the link's inertia about its centre of mass counts twice",
+    "mass_forgotten": "the link's mass is missing",
+    "half_forgotten": "the kinetic energy lacks its factor 1/2",
+    "half_squared": "the kinetic energy has the factor 1/4 in place of 1/2",
+    "rotor_forgotten": "the rotor's inertia is missing",
+    "rotor_gear": "the rotor's inertia is multiplied by the gear ratio in place of its square",
+    "mass_rate_omitted": "d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
+    "kinetic_gradient_omitted": "dK/dq is missing from Euler and Lagrange's equation",
+    "kinetic_gradient_sign": "dK/dq has the wrong sign in Euler and Lagrange's equation",
+    "potential_gradient_sign": "dV/dq has the wrong sign in Euler and Lagrange's equation",
+    "coriolis_missing": "products of two different rates are missing",
+    "coriolis_halved": "products of two different rates have half their factor",
+    "coriolis_doubled": "products of two different rates have twice their factor",
+    "coriolis_sign": "products of two different rates have the wrong sign",
+    "centrifugal_missing": "squares of rates are missing",
+    "centrifugal_sign": "squares of rates have the wrong sign",
+}
+"""Places where a derivation goes wrong, by stable names, each with what is then the case."""
+
+VELOCITY_FACTORS = {
+    "coriolis_missing": (False, Fraction(0)),
+    "coriolis_halved": (False, HALF),
+    "coriolis_doubled": (False, Fraction(2)),
+    "coriolis_sign": (False, Fraction(-1)),
+    "centrifugal_missing": (True, Fraction(0)),
+    "centrifugal_sign": (True, Fraction(-1)),
+}
+"""Whether squares of rates are meant, and their factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMotion:
+    """What the derivation finds of a link; vectors of shape (3,).
+
+    Attributes
+    ----------
+    R
+        The link's DH frame in frame 0, shape (3, 3).
+    origin, com
+        The frame's origin and the centre of mass, in frame 0.
+    velocity, omega
+        Of the centre of mass, and angular, both in the link's own axes.
+    K, V
+        Kinetic and potential energy.
+    """
+
+    R: Elements
+    origin: Elements
+    com: Elements
+    velocity: Elements
+    omega: Elements
+    K: Element
+    V: Element
+
+
+@dataclass(frozen=True, eq=False)
+class TextbookDerivation:
+    """A derivation of an arm's equations of motion, step by step.
+
+    Attributes
+    ----------
+    arm
+        The description in the ring.
+    links
+        What it finds link by link.
+    mistakes
+        What was done wrong.
+    """
+
+    arm: ExactArm
+    links: tuple[LinkMotion, ...]
+    mistakes: frozenset[str] = field(default=frozenset())
+
+    @cached_property
+    def rotors(self) -> Element:
+        """Kinetic energy of the rotors, which turn with the gear's ratio: Jm (G qd)^2 / 2 each."""
+        arm, energies = self.arm, []
+        for i, (gear, rotor) in enumerate(zip(arm.gear, arm.rotor, strict=True)):
+            if not self._has("rotor_forgotten", i):
+                ratio = gear if self._has("rotor_gear", i) else gear * gear
+                energies.append(rotor * ratio * arm.ring.rate(i) * arm.ring.rate(i) * HALF)
+        return arm.ring.sum(energies)
+
+    @cached_property
+    def K(self) -> Element:
+        """Kinetic energy of links and rotors, J."""
+        return self.arm.ring.sum([*(link.K for link in self.links), self.rotors])
+
+    @cached_property
+    def V(self) -> Element:
+        """Potential energy, J; zero at the world's origin."""
+        return self.arm.ring.sum(link.V for link in self.links)
+
+    @property
+    def L(self) -> Element:
+        """The Lagrangian K - V, J."""
+        return self.K - self.V
+
+    @cached_property
+    def momenta(self) -> Elements:
+        """Generalised momenta dL/dqd, shape (n,)."""
+        return np.array([self.K.by_rate(i) for i in range(self.arm.n)], dtype=object)
+
+    @cached_property
+    def M(self) -> Elements:
+        """Mass matrix: the derivatives of the momenta by the rates, shape (n, n)."""
+        return np.array([[p.by_rate(j) for j in range(self.arm.n)] for p in self.momenta], dtype=object)
+
+    @cached_property
+    def g(self) -> Elements:
+        """Gravity torques dV/dq, shape (n,)."""
+        sign = -1 if self._has("potential_gradient_sign") else 1
+        return np.array([self.V.by_position(i) * sign for i in range(self.arm.n)], dtype=object)
+
+    @cached_property
+    def h(self) -> Elements:
+        """Coriolis and centrifugal torques, shape (n,): what is left of tau without accelerations and gravity."""
+        ring, n = self.arm.ring, self.arm.n
+        gradient = -1 if self._has("kinetic_gradient_sign") else 0 if self._has("kinetic_gradient_omitted") else 1
+        torques = []
+        for i, momentum in enumerate(self.momenta):
+            rate = [momentum.by_position(k) * ring.rate(k) for k in range(n)]
+            own = ring.zero if self._has("mass_rate_omitted") else ring.sum(rate)
+            torques.append(self._velocity_terms(own - self.K.by_position(i) * gradient))
+        return np.array(torques, dtype=object)
+
+    @cached_property
+    def tau(self) -> Elements:
+        """Euler and Lagrange's equation: d/dt dL/dqd - dL/dq, shape (n,)."""
+        ring, n = self.arm.ring, self.arm.n
+        inertial = [ring.sum(p.by_rate(j) * ring.acceleration(j) for j in range(n)) for p in self.momenta]
+        return np.array(inertial, dtype=object) + self.h + self.g
+
+    def _velocity_terms(self, torque: Element) -> Element:
+        """Put the mistakes in that concern products of rates."""
+        for name, (squares, factor) in VELOCITY_FACTORS.items():
+            if self._has(name):
+                torque = _scaled(torque, squares, factor)
+        return torque
+
+    def _has(self, mistake: str, i: int | None = None) -> bool:
+        return has(self.mistakes, mistake, i)
+
+
+def derive(
+    description: Description, mistakes: Iterable[str] = frozenset(), symbols: Symbols = "file"
+) -> TextbookDerivation:
+    """Derive an arm's equations of motion as a textbook does.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    mistakes
+        Names of :data:`MISTAKES`, made at every link, or ``NAME@2`` for link 2 alone.
+    symbols
+        See :func:`dhkit.symbolic.exact_arm`.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body.
+    ValueError
+        No such mistake, or no such link.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> wrong = derive(library_robot("planar2r"), {"gravity_sign"})
+    >>> print(derive(library_robot("planar2r")).g[1] - wrong.g[1] == -2 * wrong.g[1])
+    True
+    """
+    made = frozenset(mistakes)
+    for mistake in made:
+        _check(mistake, description)
+    arm = exact_arm(description, symbols)
+    return TextbookDerivation(arm, tuple(_links(arm, made)), made)
+
+
+def has(mistakes: frozenset[str], mistake: str, i: int | None = None) -> bool:
+    """Return whether a mistake is made, at link i (from 0) if one is given."""
+    return mistake in mistakes or (i is not None and f"{mistake}@{i + 1}" in mistakes)
+
+
+def _check(mistake: str, description: Description) -> None:
+    name, at, link = mistake.partition("@")
+    if name not in MISTAKES:
+        raise ValueError(f"no mistake {name!r}; expected one of {', '.join(MISTAKES)}")
+    if at and (not link.isdecimal() or not 1 <= int(link) <= description.n):
+        raise ValueError(f"mistake {mistake!r}: no link {link!r}; expected 1 to {description.n}")
+
+
+def _links(arm: ExactArm, mistakes: frozenset[str]) -> Iterable[LinkMotion]:
+    """Walk along the arm: frame, centre of mass, velocities and energies of each link."""
+    ring = arm.ring
+    R, p = _identity(ring), np.array([ring.zero] * 3, dtype=object)
+    axes: list[Elements] = []
+    for i, row in enumerate(arm.rows):
+        R_before, p_before = R, p
+        R_own, p_own = _transform(arm, row)
+        R, p = R_before @ R_own, p_before + R_before @ p_own
+        axes.append((R_before if arm.is_standard else R)[:, 2])
+        yield _Link(arm, mistakes, i, R_own, R, p_before, p).motion(axes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Link:
+    """One link in one state of the derivation."""
+
+    arm: ExactArm
+    mistakes: frozenset[str]
+    i: int
+    R_own: Elements
+    R: Elements
+    before: Elements
+    origin: Elements
+
+    def has(self, mistake: str) -> bool:
+        return has(self.mistakes, mistake, self.i)
+
+    def motion(self, axes: list[Elements]) -> LinkMotion:
+        velocity, omega = self.velocity(), self.omega(axes)
+        K = self.kinetic(velocity, omega)
+        return LinkMotion(
+            self.R, self.origin, self.place("velocity_relative_angle"), velocity, omega, K, self.potential()
+        )
+
+    @property
+    def mass(self) -> Element:
+        return self.arm.bodies[self.i].mass * (0 if self.has("mass_forgotten") else 1)
+
+    @property
+    def com(self) -> Elements:
+        """The centre of mass in the link's own frame."""
+        com = self.arm.bodies[self.i].com
+        return self.end if self.has("com_at_end") else com
+
+    @property
+    def joint(self) -> Elements:
+        """The link's joint, the origin of the frame that it moves about, in frame 0."""
+        return self.before if self.arm.is_standard else self.origin
+
+    @property
+    def end(self) -> Elements:
+        """The far end of the link, in its own frame: its origin, or (modified) the next frame's; the last has none."""
+        ring, following = self.arm.ring, self.i + 1
+        if self.arm.is_standard or following == self.arm.n:
+            return np.array([ring.zero] * 3, dtype=object)
+        return _transform(self.arm, self.arm.rows[following])[1]
+
+    def place(self, mistake: str) -> Elements:
+        """Return where the centre of mass is, in frame 0."""
+        return self.origin + (self.R_own if self.has(mistake) else self.R) @ self.com  # type: ignore[no-any-return]
+
+    def velocity(self) -> Elements:
+        """Differentiate the position, and resolve it in the link's axes, where it is shortest."""
+        place = self.joint if self.has("velocity_at_joint") else self.place("velocity_relative_angle")
+        rate = np.array([x.by_time() for x in place], dtype=object)
+        return self.R.T @ rate  # type: ignore[no-any-return]
+
+    def omega(self, axes: list[Elements]) -> Elements:
+        """Sum the axes of the revolute joints up to this link, each times its rate."""
+        ring = self.arm.ring
+        joints = range(self.i, self.i + 1) if self.has("omega_relative") else range(self.i + 1)
+        total = np.array([ring.zero] * 3, dtype=object)
+        for j in joints:
+            if ring.kinds[j] == "R":
+                total = total + (self.R.T @ axes[j]) * ring.rate(j)
+        return total
+
+    def inertia(self) -> Elements:
+        """Return the tensor about the centre of mass, in the link's axes."""
+        tensor = self.arm.bodies[self.i].inertia
+        if self.has("inertia_forgotten"):
+            return 0 * tensor
+        if self.has("inertia_doubled"):
+            tensor = 2 * tensor
+        if self.has("inertia_axes"):
+            tensor = np.roll(tensor, (1, 1), (0, 1))
+        if self.has("inertia_about_joint"):
+            lever = self.com - self.R.T @ (self.joint - self.origin)
+            tensor = tensor + point_inertia(lever, self.mass * lever)
+        return tensor
+
+    def kinetic(self, velocity: Elements, omega: Elements) -> Element:
+        """Return m v^2 / 2 + omega^T I omega / 2."""
+        factor = 1 if self.has("half_forgotten") else HALF * HALF if self.has("half_squared") else HALF
+        square = velocity @ velocity
+        if self.has("velocity_cross_term"):
+            own = self.R.T @ np.array([x.by_time() for x in self.joint], dtype=object)
+            square = square - 2 * (own @ (velocity - own))
+        return (self.mass * square + omega @ self.inertia() @ omega) * factor  # type: ignore[no-any-return]
+
+    def potential(self) -> Element:
+        """Return -m g.p, with p the centre of mass seen from the world's origin."""
+        arm, gravity = self.arm, self.arm.gravity
+        if self.has("gravity_forgotten") or self.has("height_forgotten"):
+            return arm.ring.zero
+        if self.has("gravity_axis"):
+            gravity = np.roll(gravity, 1)
+        place = self.place("height_relative_angle")
+        if self.has("height_at_joint"):
+            place = self.joint
+        if self.has("height_at_end"):
+            place = self.origin + self.R @ self.end
+        sign = 1 if self.has("gravity_sign") else -1
+        return sign * self.mass * (gravity @ (place + arm.origin))  # type: ignore[no-any-return]
+
+
+def _transform(arm: ExactArm, row: ExactRow) -> tuple[Elements, Elements]:
+    """Return rotation and translation of A_i."""
+    zero, (c, s), (ca, sa) = arm.ring.zero, row.theta, row.alpha
+    if arm.is_standard:
+        R = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, sa, ca]]
+        return np.array(R, dtype=object), np.array([row.a * c, row.a * s, row.d], dtype=object)
+    R = [[c, -s, zero], [s * ca, c * ca, -sa], [s * sa, c * sa, ca]]
+    return np.array(R, dtype=object), np.array([row.a, -sa * row.d, ca * row.d], dtype=object)
+
+
+def _identity(ring: Ring) -> Elements:
+    return np.array([[ring.one if i == j else ring.zero for j in range(3)] for i in range(3)], dtype=object)
+
+
+def _scaled(torque: Element, squares: bool, factor: Fraction) -> Element:
+    """Multiply the squares of rates, or the products of two different ones, by a factor."""
+    ring = torque.ring
+    rates = [ring.place("rate", i) for i in range(ring.n)]
+    return ring.from_terms(
+        {
+            monomial: coefficient * (factor if (max(monomial[k] for k in rates) == 2) == squares else 1)
+            for monomial, coefficient in torque.terms.items()
+        }
+    )
