@@ -7,6 +7,7 @@ parameters from the first line on, so that expressions stay as short as they can
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,18 +15,20 @@ import numpy as np
 from dhkit.symbolic.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.ring import Element, Elements, Ring
 
-__all__ = ["mass_matrix", "potential_energy"]
+__all__ = ["RigidBody", "Step", "joint_bodies", "joint_steps", "mass_matrix", "potential_energy"]
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class Step:
     """Where a joint's frame, its z along the joint's axis, stands in that of the joint before."""
 
     R: Elements
+    """Shape (3, 3)."""
     p: Elements
+    """Shape (3,)."""
 
     @classmethod
-    def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> _Step:
+    def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> Step:
         """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
         (ca, sa), (c, s) = alpha, row.theta
         R = np.array([[c, -s, ring.zero], [s * ca, c * ca, -sa], [s * sa, c * sa, ca]], dtype=object)
@@ -33,17 +36,19 @@ class _Step:
 
 
 @dataclass(frozen=True, eq=False)
-class _Mass:
+class RigidBody:
     """A rigid body in a joint's frame: mass, first moments, tensor about the origin."""
 
     mass: Element
     moment: Elements
+    """Shape (3,)."""
     second: Elements
+    """Shape (3, 3)."""
 
-    def __add__(self, other: _Mass) -> _Mass:
-        return _Mass(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
+    def __add__(self, other: RigidBody) -> RigidBody:
+        return RigidBody(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
 
-    def moved(self, step: _Step) -> _Mass:
+    def moved(self, step: Step) -> RigidBody:
         """Return the body in the frame before: Steiner's theorem in first moments."""
         p, m = step.p, self.mass
         h = step.R @ self.moment
@@ -54,13 +59,13 @@ class _Mass:
             for j in range(i, 3):
                 lever = p[i] * h[j] + h[i] * p[j] + m * p[i] * p[j]
                 second[i, j] = second[j, i] = J[i, j] - lever + (square if i == j else 0)
-        return _Mass(m, h + m * p, second)
+        return RigidBody(m, h + m * p, second)
 
 
-def mass_matrix(arm: ExactArm) -> Elements:
-    """Return M, shape (n, n), reflected rotor inertia included."""
+def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Elements:
+    """Return M, shape (n, n), reflected rotor inertia included; ``bodies`` stand in for the arm's own."""
     n, ring = arm.n, arm.ring
-    steps, bodies = _steps(arm), _bodies(arm)
+    steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
     M = np.empty((n, n), dtype=object)
     beyond = bodies[n - 1]
     for j in reversed(range(n)):
@@ -76,12 +81,12 @@ def mass_matrix(arm: ExactArm) -> Elements:
     return M
 
 
-def potential_energy(arm: ExactArm) -> Element:
-    """Return V = -sum m g.c, zero where the world's origin is."""
-    steps, bodies = _steps(arm), _bodies(arm)
+def potential_energy(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Element:
+    """Return V = -sum m g.c, zero where the world's origin is; ``bodies`` stand in for the arm's own."""
+    steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
     beyond = bodies[-1]
     for j in reversed(range(arm.n - 1)):
-        beyond = _Mass(
+        beyond = RigidBody(
             bodies[j].mass + beyond.mass,
             bodies[j].moment + steps[j + 1].R @ beyond.moment + beyond.mass * steps[j + 1].p,
             beyond.second,
@@ -90,7 +95,7 @@ def potential_energy(arm: ExactArm) -> Element:
     return -(arm.gravity @ moment)  # type: ignore[no-any-return]
 
 
-def _momentum(ring: Ring, kind: str, body: _Mass) -> tuple[Elements, Elements]:
+def _momentum(ring: Ring, kind: str, body: RigidBody) -> tuple[Elements, Elements]:
     """Return linear and angular momentum of a body about the frame's origin, for a unit rate of its joint."""
     x, y, _ = body.moment
     if kind == "R":
@@ -98,28 +103,28 @@ def _momentum(ring: Ring, kind: str, body: _Mass) -> tuple[Elements, Elements]:
     return np.array([ring.zero, ring.zero, body.mass], dtype=object), np.array([y, -x, ring.zero], dtype=object)
 
 
-def _steps(arm: ExactArm) -> list[_Step]:
-    """Return each joint's frame in the one before; a standard table's own a and alpha lie behind the joint."""
+def joint_steps(arm: ExactArm) -> list[Step]:
+    """Return each joint's frame in the one before, frame 0 first; a standard table's own a and alpha lie behind the joint."""
     ring = arm.ring
     if not arm.is_standard:
-        return [_Step.of(ring, row.a, row.alpha, row) for row in arm.rows]
+        return [Step.of(ring, row.a, row.alpha, row) for row in arm.rows]
     before = [(ring.zero, (ring.one, ring.zero)), *((row.a, row.alpha) for row in arm.rows[:-1])]
-    return [_Step.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
+    return [Step.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
 
 
-def _bodies(arm: ExactArm) -> list[_Mass]:
+def joint_bodies(arm: ExactArm) -> list[RigidBody]:
     """Return each link in its joint's frame."""
-    masses = [_Mass(body.mass, body.moment, body.second) for body in arm.bodies]
+    masses = [RigidBody(body.mass, body.moment, body.second) for body in arm.bodies]
     if not arm.is_standard:
         return masses
     return [body.moved(_behind(arm.ring, row)) for body, row in zip(masses, arm.rows, strict=True)]
 
 
-def _behind(ring: Ring, row: ExactRow) -> _Step:
+def _behind(ring: Ring, row: ExactRow) -> Step:
     """Return Tx(a) Rx(alpha): the DH frame in the joint's frame, of a standard row."""
     (ca, sa), zero, one = row.alpha, ring.zero, ring.one
     R = np.array([[one, zero, zero], [zero, ca, -sa], [zero, sa, ca]], dtype=object)
-    return _Step(R, np.array([row.a, zero, zero], dtype=object))
+    return Step(R, np.array([row.a, zero, zero], dtype=object))
 
 
 def _cross(a: Elements, b: Elements) -> Elements:

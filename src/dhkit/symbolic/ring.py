@@ -23,7 +23,7 @@ from dhkit.errors import DhkitError
 from dhkit.expressions import Expression
 from dhkit.symbolic.polynomials import Monomial, Relation, polynomials
 
-__all__ = ["Constant", "Element", "Elements", "Generator", "Ring", "RingError"]
+__all__ = ["Constant", "Element", "Elements", "Generator", "Ring", "RingError", "translated"]
 
 MAX_TERMS = 400_000
 """Terms of one element: some hundred times those of a PUMA's longest, a few hundred megabytes."""
@@ -108,6 +108,7 @@ class Ring:
         self, kinds: str, constants: Sequence[Constant] = (), angles: Mapping[int, tuple[int, ...]] | None = None
     ) -> None:
         self.kinds = kinds
+        self.given = tuple(constants)
         self.angles = {i: (angles or {}).get(i, (i,)) for i, kind in enumerate(kinds) if kind == "R"}
         reciprocals = [c for c in constants if c.reciprocal_of is not None]
         others = [c for c in constants if c.reciprocal_of is None]
@@ -124,7 +125,7 @@ class Ring:
             *(Generator("constant", c.text, meaning=c.meaning) for c in others if c.square is None),
         )
         self._places = {(g.kind, g.text if g.kind == "constant" else g.joint): k for k, g in enumerate(self.generators)}
-        self._polynomials = polynomials(len(self.generators))
+        self.polynomials = polynomials(len(self.generators))
         self._relations: tuple[Relation, ...] = ()
         relations = [self._square(("sine", i), 1 - self.cosine(i) * self.cosine(i)) for i in self.angles]
         for constant in constants:
@@ -134,7 +135,7 @@ class Ring:
                 relations.append(self._square(place, constant.square(self)))
             if constant.reciprocal_of is not None:
                 product = self._element(place).polynomial * constant.reciprocal_of(self).polynomial
-                relations.append(Relation(self._places[place], 1, product - self._polynomials.constant(1)))
+                relations.append(Relation(self._places[place], 1, product - self.polynomials.constant(1)))
         self._relations = tuple(sorted(relations, key=lambda relation: relation.place))
 
     def _square(self, place: tuple[str, int | str], value: Element) -> Relation:
@@ -142,13 +143,13 @@ class Ring:
         return Relation(self._places[place], 2, generator * generator - value.polynomial)
 
     def _element(self, place: tuple[str, int | str]) -> Element:
-        return Element(self, self._polynomials.generator(self._places[place]))
+        return Element(self, self.polynomials.generator(self._places[place]))
 
     # Elements
 
     def number(self, value: int | Fraction) -> Element:
         """Return a rational number."""
-        return Element(self, self._polynomials.constant(value))
+        return Element(self, self.polynomials.constant(value))
 
     @cached_property
     def zero(self) -> Element:
@@ -201,7 +202,7 @@ class Ring:
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
         """Return the element of coefficients by monomial, in the order of :attr:`generators`."""
-        return Element(self, self._polynomials.from_terms(terms)).reduced()
+        return Element(self, self.polynomials.from_terms(terms)).reduced()
 
     @property
     def n(self) -> int:
@@ -302,11 +303,11 @@ class Element:
             if other.ring is not self.ring:
                 raise RingError("elements of two rings; derive both from one description and with equal symbols")
             return other.polynomial
-        return self.ring._polynomials.constant(other)
+        return self.ring.polynomials.constant(other)
 
     def reduced(self) -> Element:
         """Return the normal form under the ring's relations."""
-        return Element(self.ring, self.ring._polynomials.reduced(self.polynomial, self.ring._relations))
+        return Element(self.ring, self.ring.polynomials.reduced(self.polynomial, self.ring._relations))
 
     # Comparing
 
@@ -336,10 +337,10 @@ class Element:
         for relation in self.ring._relations:
             if relation.power != 1:
                 continue
-            generator = self.ring._polynomials.generator(relation.place)
+            generator = self.ring.polynomials.generator(relation.place)
             while any(monomial[relation.place] for monomial in element.terms):
-                whole = relation.polynomial + self.ring._polynomials.constant(1)
-                divisor = self.ring._polynomials.quotient(whole, generator)
+                whole = relation.polynomial + self.ring.polynomials.constant(1)
+                divisor = self.ring.polynomials.quotient(whole, generator)
                 element = _without(element, relation.place, divisor)
         return element
 
@@ -348,7 +349,7 @@ class Element:
     @property
     def terms(self) -> Mapping[Monomial, Fraction]:
         """The coefficients by monomial, exponents in the order of the ring's generators."""
-        return self.ring._polynomials.terms(self.polynomial)
+        return self.ring.polynomials.terms(self.polynomial)
 
     def __len__(self) -> int:
         return len(self.polynomial)
@@ -365,7 +366,7 @@ class Element:
 
     def by_position(self, i: int) -> Element:
         """Return the partial derivative by joint i's variable."""
-        ring, derivative = self.ring, self.ring._polynomials.derivative
+        ring, derivative = self.ring, self.ring.polynomials.derivative
         if ring.kinds[i] != "R":
             return Element(ring, derivative(self.polynomial, ring.place("position", i)))
         change = ring.zero.polynomial
@@ -377,12 +378,12 @@ class Element:
 
     def by_rate(self, i: int) -> Element:
         """Return the partial derivative by joint i's rate."""
-        return Element(self.ring, self.ring._polynomials.derivative(self.polynomial, self.ring.place("rate", i)))
+        return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i)))
 
     def by_constant(self, text: str) -> Element:
         """Return the partial derivative by a constant that nothing else is written in."""
         place = self.ring.place("constant", text)
-        return Element(self.ring, self.ring._polynomials.derivative(self.polynomial, place))
+        return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, place))
 
     def by_time(self) -> Element:
         """Return the time derivative along the motion: qd by qdd, q by qd."""
@@ -420,5 +421,38 @@ def _without(element: Element, place: int, divisor: Any) -> Element:
     with_it = {m: c for m, c in element.terms.items() if m[place]}
     rest = {m: c for m, c in element.terms.items() if not m[place]}
     lowered = {(*m[:place], m[place] - 1, *m[place + 1 :]): c for m, c in with_it.items()}
-    product = ring._polynomials.from_terms(rest) * divisor
-    return Element(ring, product + ring._polynomials.from_terms(lowered)).reduced()
+    product = ring.polynomials.from_terms(rest) * divisor
+    return Element(ring, product + ring.polynomials.from_terms(lowered)).reduced()
+
+
+def translated(element: Element, ring: Ring, replacements: Mapping[int, Element]) -> Element:
+    """Return an element in another ring.
+
+    Parameters
+    ----------
+    element
+        Of any ring.
+    ring
+        Where the result is.
+    replacements
+        What generators become, by their place in the element's ring; others become those of the same kind and name.
+    """
+    own = element.ring.generators
+    powers: dict[tuple[int, int], Element] = {}
+    kept = [k for k in range(len(own)) if k not in replacements]
+    parts: dict[Monomial, dict[Monomial, Fraction]] = {}
+    for monomial, coefficient in element.terms.items():
+        replaced = tuple(monomial[k] for k in replacements)
+        moved = [0] * len(ring.generators)
+        for k in kept:
+            if monomial[k]:
+                moved[ring.place(own[k].kind, own[k].text if own[k].kind == "constant" else own[k].joint)] = monomial[k]
+        parts.setdefault(replaced, {})[tuple(moved)] = coefficient
+    total = []
+    for exponents, group in parts.items():
+        product = ring.one
+        for k, exponent in zip(replacements, exponents, strict=True):
+            if exponent:
+                product = product * powers.setdefault((k, exponent), replacements[k] ** exponent)
+        total.append(ring.from_terms(group) * product)
+    return ring.sum(total)
