@@ -1,9 +1,9 @@
 """Base parameters: the fewest combinations of inertial parameters that the torques depend on.
 
-What part of a link is symmetric about its joint's axis might as well belong to the link before, and a sliding link turns
-with the one before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
+What part of a link is symmetric about its joint's axis might as well belong to the link before, and a sliding link
+turns with the one before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
 robots"). That is done exactly, with symbols. What depends on others still, or has no effect, is found in the columns
-of the regressor, and grouped exactly. That the grouped equations are the full ones is then proved by substitution.
+of the regressor, and grouped exactly. That the grouped equations are the full ones can be proved by substitution.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.symbolic import composite
 from dhkit.symbolic.composite import RigidBody, Step
-from dhkit.symbolic.exact_arm import ExactArm, ExactRow, exact_arm
+from dhkit.symbolic.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.polynomials import Monomial
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
@@ -166,6 +166,7 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
         origin=_mapped(arm.origin, ring, {}),
         values={text: arm.values[text] for text in ring.constants if text in arm.values}
         | {name: float(element.value(numbers)) for name, element in definitions.items()},
+        inertial=tuple(definitions),
     )
     bodies = [body(j) for j in range(1, arm.n + 1)]
     return Lagrangian(short, composite.mass_matrix(short, bodies), composite.potential_energy(short, bodies))
@@ -292,7 +293,9 @@ class _Regressor:
             A = [[self.rows[k].get(other, ring.zero) for other in support] for k in chosen]
             right = [self.rows[k].get(name, ring.zero) for k in chosen]
             whole = _determinant(A)
-            parts = [_determinant([[*r[:j], b, *r[j + 1 :]] for r, b in zip(A, right, strict=True)]) for j in range(len(A))]
+            parts = [
+                _determinant([[*r[:j], b, *r[j + 1 :]] for r, b in zip(A, right, strict=True)]) for j in range(len(A))
+            ]
             quotients = [polynomials.quotient(part.polynomial, whole.polynomial) for part in parts]
             if all(quotient is not None for quotient in quotients):
                 return {other: Element(ring, x) for other, x in zip(support, quotients, strict=True)}

@@ -104,10 +104,11 @@ def _momentum(ring: Ring, kind: str, body: RigidBody) -> tuple[Elements, Element
 
 
 def joint_steps(arm: ExactArm) -> list[Step]:
-    """Return each joint's frame in the one before, frame 0 first; a standard table's own a and alpha lie behind the joint."""
+    """Return each joint's frame in the one before, of which frame 0 is the first."""
     ring = arm.ring
     if not arm.is_standard:
         return [Step.of(ring, row.a, row.alpha, row) for row in arm.rows]
+    # A standard row's a and alpha lie behind its joint: they are the next one's.
     before = [(ring.zero, (ring.one, ring.zero)), *((row.a, row.alpha) for row in arm.rows[:-1])]
     return [Step.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
 

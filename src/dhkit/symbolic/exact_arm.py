@@ -73,6 +73,8 @@ class ExactArm:
         Value of every constant of the ring.
     notes
         What is a symbol though it is a number.
+    inertial
+        The symbols that torques are linear in, link by link; none unless every inertial parameter is one.
     """
 
     description: Description
@@ -86,6 +88,7 @@ class ExactArm:
     origin: Elements
     values: dict[str, float]
     notes: tuple[str, ...]
+    inertial: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:
@@ -190,6 +193,7 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
         rotation.T @ np.array([reader.element(x) for x in xyz], dtype=object),
         {text: reader.number(text, naming.values) for text in ring.constants},
         tuple(reader.notes),
+        tuple(naming.inertial),
     )
 
 
@@ -199,6 +203,7 @@ class _Naming:
     def __init__(self, description: Description, symbols: Symbols) -> None:
         self.description = description
         self.symbols = symbols
+        self.inertial: list[str] = []
         self.values = resolved(description.parameters)
         own = {name for name, value in description.parameters.items() if not value.symbols}
         self._fixed = {
@@ -217,6 +222,12 @@ class _Naming:
             name += "_"
         self.values[name] = value
         return Expression.symbol(name)
+
+    def inertial_symbol(self, name: str, value: Expression) -> Expression:
+        """Return a new symbol that torques are linear in."""
+        symbol = self.symbol(name, value)
+        self.inertial.append(symbol.text)
+        return symbol
 
     def length(self, name: str, expression: Expression) -> Expression:
         """Return a length of the table, by a name of its own where all numbers are symbols."""
@@ -254,14 +265,15 @@ class _Naming:
         numbers = self.description.numbers
         m, c, I_com = numbers.mass[i - 1], numbers.com[i - 1], numbers.inertia[i - 1]
         about_origin = I_com + m * (c @ c * np.eye(3) - np.outer(c, c))
-        mass = self.symbol(f"m{i}", exact(float(m)))
-        moments = [self.symbol(f"r{axis}{i}", exact(float(m * x))) for axis, x in zip("xyz", c, strict=True)]
+        mass = self.inertial_symbol(f"m{i}", exact(float(m)))
+        moments = [self.inertial_symbol(f"r{axis}{i}", exact(float(m * x))) for axis, x in zip("xyz", c, strict=True)]
         second = tuple(
-            self.symbol(f"I{key}{i}", exact(float(about_origin[place]))) for key, place in INERTIA_PLACES.items()
+            self.inertial_symbol(f"I{key}{i}", exact(float(about_origin[place])))
+            for key, place in INERTIA_PLACES.items()
         )
         if not rotor.is_zero:
             gear = gear if gear == ONE else self.symbol(f"G{i}", substitute(drive.gear, self.values))
-            rotor = self.symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
+            rotor = self.inertial_symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
         return _Link(row, mass, tuple(x / mass for x in moments), None, second, gear, rotor)
 
 

@@ -93,6 +93,9 @@ class Ring:
         Of each turning joint the joints, itself the last, whose variables the angle of its sine and cosine is the sum
         of; itself alone unless given. Frames of parallel axes turn by sums of joint values, which makes c23 of
         c2*c3 - s2*s3.
+    sums
+        Angles that have a sine and a cosine besides, to print with. Elements in them are compared after
+        :meth:`expanded` has put in what they are.
 
     Examples
     --------
@@ -105,26 +108,32 @@ class Ring:
     """
 
     def __init__(
-        self, kinds: str, constants: Sequence[Constant] = (), angles: Mapping[int, tuple[int, ...]] | None = None
+        self,
+        kinds: str,
+        constants: Sequence[Constant] = (),
+        angles: Mapping[int, tuple[int, ...]] | None = None,
+        sums: Sequence[tuple[int, ...]] = (),
     ) -> None:
         self.kinds = kinds
         self.given = tuple(constants)
         self.angles = {i: (angles or {}).get(i, (i,)) for i, kind in enumerate(kinds) if kind == "R"}
         reciprocals = [c for c in constants if c.reciprocal_of is not None]
         others = [c for c in constants if c.reciprocal_of is None]
-        names = {i: angle_name(joints) for i, joints in self.angles.items()}
+        self.sums = tuple(joints for joints in sums if joints not in self.angles.values())
+        turning = [(i, joints, angle_name(joints)) for i, joints in self.angles.items()]
+        summed = [(-1, joints, angle_name(joints)) for joints in self.sums]
         # Relations rewrite the greatest generator that they hold: reciprocals first, the last made foremost.
         self.generators: tuple[Generator, ...] = (
             *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(reciprocals)),
             *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(others) if c.square is not None),
-            *(Generator("sine", f"s{name}", i, self.angles[i]) for i, name in names.items()),
-            *(Generator("cosine", f"c{name}", i, self.angles[i]) for i, name in names.items()),
+            *(Generator("sine", f"s{name}", i, joints) for i, joints, name in [*summed, *turning]),
+            *(Generator("cosine", f"c{name}", i, joints) for i, joints, name in [*summed, *turning]),
             *(Generator("position", f"q{i + 1}", i) for i, kind in enumerate(kinds) if kind != "R"),
             *(Generator("rate", f"qd{i + 1}", i) for i in range(len(kinds))),
             *(Generator("acceleration", f"qdd{i + 1}", i) for i in range(len(kinds))),
             *(Generator("constant", c.text, meaning=c.meaning) for c in others if c.square is None),
         )
-        self._places = {(g.kind, g.text if g.kind == "constant" else g.joint): k for k, g in enumerate(self.generators)}
+        self._places = {(g.kind, g.text if g.joint < 0 else g.joint): k for k, g in enumerate(self.generators)}
         self.polynomials = polynomials(len(self.generators))
         self._relations: tuple[Relation, ...] = ()
         relations = [self._square(("sine", i), 1 - self.cosine(i) * self.cosine(i)) for i in self.angles]
@@ -203,6 +212,26 @@ class Ring:
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
         """Return the element of coefficients by monomial, in the order of :attr:`generators`."""
         return Element(self, self.polynomials.from_terms(terms)).reduced()
+
+    @cached_property
+    def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
+        """Places of each angle's sine and cosine, and the joints that it is the sum of."""
+        cosines = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
+        return tuple((k, cosines[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
+
+    @cached_property
+    def _expansions(self) -> dict[int, Element]:
+        """What sines and cosines of :attr:`sums` are in those of the ring's own angles."""
+        single = {joints: (self.sine(i), self.cosine(i)) for i, joints in self.angles.items()}
+        expansions: dict[int, Element] = {}
+        for sine, cosine, joints in self.turning:
+            if joints in self.sums:
+                expansions[sine], expansions[cosine] = _sum_of_angles(self, joints, single)
+        return expansions
+
+    def expanded(self, element: Element) -> Element:
+        """Return an element in the sines and cosines of the ring's own angles alone: its normal form."""
+        return translated(element, self, self._expansions) if self.sums else element
 
     @property
     def n(self) -> int:
@@ -314,7 +343,7 @@ class Element:
     @property
     def is_zero(self) -> bool:
         """Whether this is zero for every state and every value of the parameters."""
-        return not self or not self._cleared()
+        return not self or not self.ring.expanded(self)._cleared()
 
     def __bool__(self) -> bool:
         """Whether the normal form has a term."""
@@ -370,10 +399,11 @@ class Element:
         if ring.kinds[i] != "R":
             return Element(ring, derivative(self.polynomial, ring.place("position", i)))
         change = ring.zero.polynomial
-        for k, joints in ring.angles.items():
+        for sine, cosine, joints in ring.turning:
             if i in joints:
-                change = change + derivative(self.polynomial, ring.place("sine", k)) * ring.cosine(k).polynomial
-                change = change - derivative(self.polynomial, ring.place("cosine", k)) * ring.sine(k).polynomial
+                generator = ring.polynomials.generator
+                change = change + derivative(self.polynomial, sine) * generator(cosine)
+                change = change - derivative(self.polynomial, cosine) * generator(sine)
         return Element(ring, change).reduced()
 
     def by_rate(self, i: int) -> Element:
@@ -407,6 +437,21 @@ Elements: TypeAlias = NDArray[Any]
 """An array whose entries are elements of one ring."""
 
 Scalar: TypeAlias = "Element | int | Fraction"
+
+
+def _sum_of_angles(
+    ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
+) -> tuple[Element, Element]:
+    """Return sine and cosine of a sum of joint angles; an angle that begins earlier takes off what is too much."""
+    s, c = ring.zero, ring.one
+    for i in joints:
+        own = ring.angles[i]
+        s_own, c_own = single[own]
+        if len(own) > 1:
+            s_less, c_less = _sum_of_angles(ring, own[:-1], single)
+            s_own, c_own = s_own * c_less - c_own * s_less, c_own * c_less + s_own * s_less
+        s, c = s * c_own + c * s_own, c * c_own - s * s_own
+    return s, c
 
 
 def angle_name(joints: Sequence[int]) -> str:
@@ -446,7 +491,7 @@ def translated(element: Element, ring: Ring, replacements: Mapping[int, Element]
         moved = [0] * len(ring.generators)
         for k in kept:
             if monomial[k]:
-                moved[ring.place(own[k].kind, own[k].text if own[k].kind == "constant" else own[k].joint)] = monomial[k]
+                moved[ring.place(own[k].kind, own[k].text if own[k].joint < 0 else own[k].joint)] = monomial[k]
         parts.setdefault(replaced, {})[tuple(moved)] = coefficient
     total = []
     for exponents, group in parts.items():

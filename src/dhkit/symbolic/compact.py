@@ -1,0 +1,143 @@
+"""The shortest way to write equations: sines and cosines of sums of joint angles where axes are parallel.
+
+Frames of parallel axes turn by sums of joint values: c2*c3 - s2*s3 is c23. The ring's normal form is kept for
+proofs; for reading, each entry is written in whichever angles make it shortest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import islice, product
+
+import numpy as np
+
+from dhkit.symbolic.exact_arm import ExactArm
+from dhkit.symbolic.polynomials import Monomial
+from dhkit.symbolic.ring import Element, Elements, Ring, translated
+
+__all__ = ["parallel_runs", "shortened"]
+
+WAYS = 24
+"""Choices of angles that are tried."""
+
+
+def parallel_runs(arm: ExactArm) -> list[tuple[int, ...]]:
+    """Return the turning joints, from 0, whose axes are parallel and point the same way, run by run.
+
+    A sliding joint between them leaves them parallel.
+    """
+    runs: list[list[int]] = [[]]
+    for i, row in enumerate(arm.rows):
+        twist = row.alpha[0] if not arm.is_standard else arm.rows[i - 1].alpha[0] if i else arm.ring.one
+        if not (twist - 1).is_zero:
+            runs.append([])
+        if arm.ring.kinds[i] == "R":
+            runs[-1].append(i)
+    return [tuple(run) for run in runs if len(run) > 1]
+
+
+def shortened(arm: ExactArm, elements: Elements) -> Elements:
+    """Return elements, each in the angles that make it shortest; they are equal, and stay elements of a ring.
+
+    Parameters
+    ----------
+    arm
+        Whose ring they are of.
+    elements
+        An array of elements.
+    """
+    runs = parallel_runs(arm)
+    if not runs:
+        return elements
+    rings = [_ring(arm, angles, runs) for angles in islice(_ways(runs), WAYS)]
+    turns = [_turns(arm.ring, ring) for ring in rings]
+    shortest = np.empty(elements.shape, dtype=object)
+    for place, element in np.ndenumerate(elements):
+        written = (_merged(translated(element, ring, turn)) for ring, turn in zip(rings, turns, strict=True))
+        shortest[place] = min([element, *written], key=len)
+    return shortest
+
+
+def _ways(runs: Sequence[tuple[int, ...]]) -> Iterator[dict[int, tuple[int, ...]]]:
+    """Yield which joints each angle is the sum of: in every run from some joint on, or none."""
+    for starts in product(*(range(len(run)) for run in runs)):
+        angles: dict[int, tuple[int, ...]] = {}
+        for run, start in zip(runs, starts, strict=True):
+            summed = len(run) - 1 - start  # none first: joint angles themselves
+            angles |= {run[k]: run[summed : k + 1] for k in range(summed + 1, len(run))}
+        yield angles
+
+
+def _ring(arm: ExactArm, angles: Mapping[int, tuple[int, ...]], runs: Iterable[tuple[int, ...]]) -> Ring:
+    sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
+    return Ring(arm.ring.kinds, arm.ring.given, angles, sums)
+
+
+def _turns(old: Ring, new: Ring) -> dict[int, Element]:
+    """Return what the sines and cosines of the old ring's joints are in the new one's angles."""
+    turns: dict[int, Element] = {}
+    for i, joints in new.angles.items():
+        s, c = new.sine(i), new.cosine(i)
+        if len(joints) > 1:
+            before = joints[-2]
+            s_before, c_before = new.sine(before), new.cosine(before)
+            s, c = s * c_before - c * s_before, c * c_before + s * s_before
+        turns[old.place("sine", i)], turns[old.place("cosine", i)] = s, c
+    return turns
+
+
+def _merged(element: Element) -> Element:
+    """Put the addition theorem to use, backwards, as often as it makes the element shorter."""
+    ring = element.ring
+    terms = dict(element.terms)
+    angles = {joints: (sine, cosine) for sine, cosine, joints in ring.turning}
+    changed = True
+    while changed:
+        changed = False
+        for first, second in product(angles, angles):
+            if first[-1] < second[0] and first + second in angles:
+                changed |= _add(terms, angles[first], angles[second], angles[first + second])
+            elif len(first) > len(second) and first[: len(second)] == second:
+                changed |= _subtract(terms, angles[first], angles[second], angles[first[len(second) :]])
+    return ring.from_terms(terms)
+
+
+Places = tuple[int, int]
+"""Of an angle's sine and cosine in a monomial."""
+
+
+def _add(terms: dict[Monomial, Fraction], a: Places, b: Places, total: Places) -> bool:
+    """Write cos a cos b - sin a sin b as cos(a + b), and sin a cos b + cos a sin b as sin(a + b)."""
+    (sa, ca), (sb, cb), (s, c) = a, b, total
+    one = _paired(terms, (ca, cb), (sa, sb), c, -1)
+    return _paired(terms, (sa, cb), (ca, sb), s, 1) or one
+
+
+def _subtract(terms: dict[Monomial, Fraction], a: Places, b: Places, difference: Places) -> bool:
+    """Write cos a cos b + sin a sin b as cos(a - b), and sin a cos b - cos a sin b as sin(a - b)."""
+    (sa, ca), (sb, cb), (s, c) = a, b, difference
+    one = _paired(terms, (ca, cb), (sa, sb), c, 1)
+    return _paired(terms, (sa, cb), (ca, sb), s, -1) or one
+
+
+def _paired(terms: dict[Monomial, Fraction], first: Places, second: Places, merged: int, sign: int) -> bool:
+    """Replace x first + sign x second by x merged, wherever both are there."""
+    found = False
+    for monomial in [m for m in terms if m[first[0]] and m[first[1]]]:
+        coefficient = terms.get(monomial)
+        rest = list(monomial)
+        for k in first:
+            rest[k] -= 1
+        partner = list(rest)
+        for k in second:
+            partner[k] += 1
+        if coefficient is None or terms.get(tuple(partner)) != sign * coefficient:
+            continue
+        rest[merged] += 1
+        del terms[monomial], terms[tuple(partner)]
+        terms[tuple(rest)] = terms.get(tuple(rest), Fraction(0)) + coefficient
+        if not terms[tuple(rest)]:
+            del terms[tuple(rest)]
+        found = True
+    return found

@@ -1,0 +1,68 @@
+"""The regressor: torques are linear in the inertial parameters, tau = Y(q, qd, qdd) theta."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.symbolic.lagrangian import Lagrangian, Proof
+from dhkit.symbolic.ring import Elements, RingError
+
+__all__ = ["Regressor", "regressor"]
+
+
+@dataclass(frozen=True, eq=False)
+class Regressor:
+    """Torques as a matrix times inertial parameters (Khosla & Kanade, 1985; Atkeson, An & Hollerbach, 1986).
+
+    Attributes
+    ----------
+    lagrangian
+        The equations.
+    names
+        The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame's origin
+        ``Ixx2`` ..., and its drive's rotor inertia ``Jm2``; or base parameters.
+    Y
+        Shape (n, parameters): elements without any of them.
+    """
+
+    lagrangian: Lagrangian
+    names: tuple[str, ...]
+    Y: Elements
+
+    @property
+    def theta(self) -> Elements:
+        """The parameters as elements, shape (parameters,)."""
+        ring = self.lagrangian.arm.ring
+        return np.array([ring.constant(name) for name in self.names], dtype=object)
+
+    def prove(self) -> Proof:
+        """Decide whether Y theta is M qdd + C qd + g: whether torques are linear in the parameters."""
+        return Proof("tau = Y theta", self.Y @ self.theta - self.lagrangian.tau)
+
+
+def regressor(equations: Lagrangian) -> Regressor:
+    """Return the regressor of equations in inertial parameters (``symbols="inertial"``), or in base parameters.
+
+    Raises
+    ------
+    RingError
+        The equations have no inertial parameters of their own: a link's mass and moments are numbers, or made of others.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> found = regressor(lagrangian(library_robot("cart_pendulum"), "inertial"))
+    >>> found.Y.shape, bool(found.prove())
+    ((2, 20), True)
+    """
+    names = equations.arm.inertial
+    if not names:
+        raise RingError(
+            f"the equations of {equations.description.name} have no inertial parameters; derive them with"
+            " symbols='inertial'"
+        )
+    Y = np.array([[torque.by_constant(name) for name in names] for torque in equations.tau], dtype=object)
+    return Regressor(equations, names, Y)
