@@ -3,11 +3,12 @@
 What part of a link is symmetric about its joint's axis might as well belong to the link before, and a sliding link
 turns with the one before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
 robots"). That is done exactly, with symbols. What depends on others still, or has no effect, is found in the columns
-of the regressor, and grouped exactly. That the grouped equations are the full ones can be proved by substitution.
+of the regressor, lengths and angles being in general position, and grouped exactly. That the grouped equations are the full ones can be proved by substitution.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -17,6 +18,7 @@ from itertools import combinations, islice
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.expressions import Expression, exact, substitute
 from dhkit.symbolic import composite
 from dhkit.symbolic.composite import RigidBody, Step
 from dhkit.symbolic.exact_arm import ExactArm, ExactRow
@@ -66,11 +68,15 @@ class BaseParameters:
         return len(self.definitions)
 
     def prove(self) -> Proof:
-        """Decide whether the equations in base parameters are the full ones, by putting the definitions in."""
+        """Decide whether the equations in base parameters are the full ones, by putting the definitions in.
+
+        M and g decide everything else: C is made of M's derivatives.
+        """
         short, ring = self.lagrangian, self.full.arm.ring
         places = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
-        back = np.array([translated(element, ring, places) for element in short.tau], dtype=object)
-        return Proof("the torques in base parameters are those in all parameters", back - self.full.tau)
+        back = _mapped(np.column_stack([short.M, short.g]), ring, places)
+        difference = back - np.column_stack([self.full.M, self.full.g])
+        return Proof("M and g in base parameters are those in all parameters", difference)
 
 
 @lru_cache(maxsize=32)
@@ -226,21 +232,21 @@ def _independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[
 
 @dataclass(frozen=True, eq=False)
 class _Regressor:
-    """The torques' coefficients of parameters: a row for every joint and function of the state.
+    """Coefficients of the parameters in M and g, which decide the torques: a row for every entry and monomial of state.
 
     Attributes
     ----------
-    lagrangian
-        Equations that are linear in the parameters.
+    ring, names
+        Of the parameters.
     rows
-        By joint and monomial of the state, the coefficient of each parameter: an element without the state.
+        The coefficient of each parameter: terms without the state.
     numbers
-        What the rows are worth, shape (rows, parameters).
+        What the rows are worth where lengths and angles are anything, shape (rows, parameters).
     """
 
-    lagrangian: Lagrangian
+    ring: Ring
     names: Sequence[str]
-    rows: Sequence[Mapping[str, Element]]
+    rows: Sequence[Mapping[str, Mapping[Monomial, Fraction]]]
     numbers: Array
 
     @classmethod
@@ -249,18 +255,20 @@ class _Regressor:
         places = {ring.place("constant", name): name for name in names}
         of_state = [k for k, generator in enumerate(ring.generators) if generator.kind != "constant"]
         terms: dict[tuple[int, Monomial], dict[str, dict[Monomial, Fraction]]] = {}
-        for i, torque in enumerate(trial.tau):
-            for monomial, coefficient in torque.terms.items():
+        for i, element in enumerate([*trial.M[np.triu_indices(trial.n)], *trial.g]):
+            for monomial, coefficient in element.terms.items():
                 place = next(place for place in places if monomial[place])
                 rest = list(monomial)
                 for k in (*of_state, place):
                     rest[k] = 0
                 row = terms.setdefault((i, tuple(monomial[k] for k in of_state)), {})
                 row.setdefault(places[place], {})[tuple(rest)] = coefficient
-        rows = [{name: ring.from_terms(entry) for name, entry in row.items()} for row in terms.values()]
-        values = ring.values(trial.arm.values, np.zeros(trial.n))
-        numbers = np.array([[row[name].value(values) if name in row else 0.0 for name in names] for row in rows])
-        return cls(trial, names, rows, numbers)
+        anywhere = _somewhere(ring)
+        numbers = np.zeros((len(terms), len(names)))
+        for k, row in enumerate(terms.values()):
+            for name, entry in row.items():
+                numbers[k, names.index(name)] = sum(_worth(m, c, anywhere) for m, c in entry.items())
+        return cls(ring, names, list(terms.values()), numbers)
 
     def column(self, name: str) -> Array:
         """Return a parameter's column of numbers."""
@@ -283,15 +291,15 @@ class _Regressor:
         raise RingError(f"{name} depends on more than {MOST} parameters before it; base parameters were not found")
 
     def _factors(self, name: str, support: Sequence[str]) -> dict[str, Element]:
-        ring, polynomials = self.lagrangian.arm.ring, self.lagrangian.arm.ring.polynomials
+        ring, polynomials = self.ring, self.ring.polynomials
         places = [self.names.index(other) for other in support]
         touching = [k for k, row in enumerate(self.rows) if not row.keys().isdisjoint(support)]
         touching.sort(key=lambda k: sum(len(entry) for entry in self.rows[k].values()))
         for chosen in islice(combinations(touching, len(support)), TRIES):
             if abs(np.linalg.det(self.numbers[np.ix_(chosen, places)])) < DEPENDENT:
                 continue
-            A = [[self.rows[k].get(other, ring.zero) for other in support] for k in chosen]
-            right = [self.rows[k].get(name, ring.zero) for k in chosen]
+            A = [[ring.from_terms(self.rows[k].get(other, {})) for other in support] for k in chosen]
+            right = [ring.from_terms(self.rows[k].get(name, {})) for k in chosen]
             whole = _determinant(A)
             parts = [
                 _determinant([[*r[:j], b, *r[j + 1 :]] for r, b in zip(A, right, strict=True)]) for j in range(len(A))
@@ -300,6 +308,35 @@ class _Regressor:
             if all(quotient is not None for quotient in quotients):
                 return {other: Element(ring, x) for other, x in zip(support, quotients, strict=True)}
         raise RingError(f"{name} depends on {', '.join(support)} by no polynomial; base parameters were not found")
+
+
+def _somewhere(ring: Ring) -> list[float]:
+    """Return a number for each generator, lengths and angles in general position: what their relations allow."""
+    rng = np.random.default_rng(0)
+    known: dict[str, float] = {}
+    values = {name: exact(float(x)) for name, x in zip(_symbols(ring), rng.uniform(0.5, 2.0, 1000), strict=False)}
+    for constant in ring.given:
+        if constant.text in known:
+            continue
+        if constant.text.startswith("cos(") and constant.meaning is not None:
+            angle = rng.uniform(0.2, 1.4)
+            known[constant.text], known[f"sin{constant.text[3:]}"] = math.cos(angle), math.sin(angle)
+        else:
+            known[constant.text] = float(substitute(constant.meaning or Expression.symbol(constant.text), values))
+    return [known.get(generator.text, 1.0) for generator in ring.generators]
+
+
+def _symbols(ring: Ring) -> list[str]:
+    found = {constant.text for constant in ring.given if constant.meaning is None}
+    return sorted(found.union(*(constant.meaning.symbols for constant in ring.given if constant.meaning)))
+
+
+def _worth(monomial: Monomial, coefficient: Fraction, values: Sequence[float]) -> float:
+    number = float(coefficient)
+    for value, exponent in zip(values, monomial, strict=True):
+        if exponent:
+            number *= value**exponent
+    return number
 
 
 def _determinant(A: list[list[Element]]) -> Element:

@@ -21,7 +21,7 @@ class Regressor:
     lagrangian
         The equations.
     names
-        The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame's origin
+        The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame
         ``Ixx2`` ..., and its drive's rotor inertia ``Jm2``; or base parameters.
     Y
         Shape (n, parameters): elements without any of them.
@@ -48,7 +48,7 @@ def regressor(equations: Lagrangian) -> Regressor:
     Raises
     ------
     RingError
-        The equations have no inertial parameters of their own: a link's mass and moments are numbers, or made of others.
+        The equations have no inertial parameters: masses and moments are numbers, or made of others.
 
     Examples
     --------
