@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from fractions import Fraction
 from time import perf_counter
@@ -17,6 +18,7 @@ from dhkit import Arm
 from dhkit.description import Body, Description, from_dh, library_robot
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
+from dhkit.symbolic.base_parameters import base_parameters
 from dhkit.symbolic.exact_arm import exact_arm
 from dhkit.symbolic.lagrangian import lagrangian
 from dhkit.symbolic.textbook import MISTAKES, derive
@@ -354,3 +356,12 @@ def test_exact_puma_with_flint_is_faster(law):
     lag = lagrangian(library_robot("puma560"), "inertial")
     lag.C, lag.g, lag.tau  # noqa: B018
     law.takes("exact PUMA, all inertial parameters symbolic, python-flint, s", perf_counter() - start, 0.3)
+
+
+def test_results_are_pickled():
+    description = library_robot("cart_pendulum")
+    for value in (lagrangian(description), derive(description), base_parameters(description)):
+        again = pickle.loads(pickle.dumps(value))
+        assert type(again) is type(value)
+    again = pickle.loads(pickle.dumps(lagrangian(description)))
+    assert again.prove_euler_lagrange()

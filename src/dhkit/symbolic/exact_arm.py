@@ -13,8 +13,9 @@ from dhkit.description import Array, Body, Convention, Description, Drive, Joint
 from dhkit.description.parameters import resolved
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle, substitute
+from dhkit.symbolic.constants import Constants, value_of
+from dhkit.symbolic.reading import Direction
 from dhkit.symbolic.ring import Element, Elements, Ring
-from dhkit.symbolic.ring_reader import Direction, RingReader
 
 __all__ = ["INERTIA_KEYS", "ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
 
@@ -178,21 +179,21 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
             link.rotor,
         ]
         angles += link.row[2:]
-    reader = RingReader(description.kinds, expressions, angles)
-    ring = reader.ring
-    rotation = _rotation(reader, rpy)
+    constants = Constants.of(expressions, angles)
+    ring = Ring(description.kinds, list(constants.found.values()))
+    rotation = _rotation(ring, rpy)
     return ExactArm(
         description,
         symbols,
         ring,
-        tuple(_row(reader, i, link) for i, link in enumerate(links)),
-        tuple(_body(reader, link) for link in links),
-        tuple(reader.element(link.gear) for link in links),
-        tuple(reader.element(link.rotor) for link in links),
-        rotation.T @ np.array([reader.element(x) for x in gravity], dtype=object),
-        rotation.T @ np.array([reader.element(x) for x in xyz], dtype=object),
-        {text: reader.number(text, naming.values) for text in ring.constants},
-        tuple(reader.notes),
+        tuple(_row(ring, i, link) for i, link in enumerate(links)),
+        tuple(_body(ring, link) for link in links),
+        tuple(ring.read(link.gear) for link in links),
+        tuple(ring.read(link.rotor) for link in links),
+        rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
+        rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),
+        {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+        tuple(constants.notes),
         tuple(naming.inertial),
     )
 
@@ -290,23 +291,22 @@ def _through(parameters: object, name: str) -> Expression:
     return expression
 
 
-def _row(reader: RingReader, i: int, link: _Link) -> ExactRow:
+def _row(ring: Ring, i: int, link: _Link) -> ExactRow:
     """Return row i, from 0, with the joint's variable added to theta or d."""
-    ring = reader.ring
-    a, d = reader.element(link.row[0]), reader.element(link.row[1])
-    alpha, theta = reader.direction(link.row[2]), reader.direction(link.row[3])
+    a, d = ring.read(link.row[0]), ring.read(link.row[1])
+    alpha, theta = ring.direction(link.row[2]), ring.direction(link.row[3])
     if ring.kinds[i] != "R":
         return ExactRow(a, d + ring.position(i), alpha, theta)
     c, s = ring.cosine(i), ring.sine(i)
     return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
 
 
-def _body(reader: RingReader, link: _Link) -> ExactBody:
-    mass = reader.element(link.mass)
-    com = np.array([reader.element(x) for x in link.com], dtype=object)
+def _body(ring: Ring, link: _Link) -> ExactBody:
+    mass = ring.read(link.mass)
+    com = np.array([ring.read(x) for x in link.com], dtype=object)
     moment = np.array([mass * x for x in com], dtype=object)
     steiner = point_inertia(com, moment)
-    tensor = _symmetric([reader.element(x) for x in (link.inertia or link.second or ())])
+    tensor = _symmetric([ring.read(x) for x in (link.inertia or link.second or ())])
     if link.second is None:
         return ExactBody(mass, com, tensor, moment, tensor + steiner)
     return ExactBody(mass, com, tensor - steiner, moment, tensor)
@@ -325,10 +325,10 @@ def _symmetric(entries: Sequence[Element]) -> Elements:
     return tensor
 
 
-def _rotation(reader: RingReader, rpy: Sequence[Expression]) -> Elements:
+def _rotation(ring: Ring, rpy: Sequence[Expression]) -> Elements:
     """Return Rz(yaw) Ry(pitch) Rx(roll)."""
-    one, zero = reader.ring.one, reader.ring.zero
-    (cr, sr), (cp, sp), (cy, sy) = (reader.direction(angle) for angle in rpy)
+    one, zero = ring.one, ring.zero
+    (cr, sr), (cp, sp), (cy, sy) = (ring.direction(angle) for angle in rpy)
     z = np.array([[cy, -sy, zero], [sy, cy, zero], [zero, zero, one]], dtype=object)
     y = np.array([[cp, zero, sp], [zero, one, zero], [-sp, zero, cp]], dtype=object)
     x = np.array([[one, zero, zero], [zero, cr, -sr], [zero, sr, cr]], dtype=object)

@@ -9,28 +9,22 @@ sampled.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.errors import DhkitError
 from dhkit.expressions import Expression
+from dhkit.expressions.exact import Monomial as TermMonomial
+from dhkit.symbolic.elements import Element, Elements, RingError, translated
 from dhkit.symbolic.polynomials import Monomial, Relation, polynomials
+from dhkit.symbolic.reading import read_angle, read_expression
 
 __all__ = ["Constant", "Element", "Elements", "Generator", "Ring", "RingError", "translated"]
-
-MAX_TERMS = 400_000
-"""Terms of one element: some hundred times those of a PUMA's longest, a few hundred megabytes."""
-
-
-class RingError(DhkitError):
-    """An expression that the exact ring does not have, or one too long for it."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +38,15 @@ class Constant:
     meaning
         The expression that it stands for; None where its text is its name.
     square
-        What its square is, given the ring; None where nothing is known of it.
+        What its square is; None where nothing is known of it.
     reciprocal_of
-        What it is the reciprocal of, given the ring; None for all others.
+        What it is the reciprocal of; None for all others.
     """
 
     text: str
     meaning: Expression | None = None
-    square: Callable[[Ring], Element] | None = field(default=None, compare=False)
-    reciprocal_of: Callable[[Ring], Element] | None = field(default=None, compare=False)
+    square: Expression | None = None
+    reciprocal_of: Expression | None = None
 
 
 @dataclass(frozen=True)
@@ -135,21 +129,39 @@ class Ring:
         )
         self._places = {(g.kind, g.text if g.joint < 0 else g.joint): k for k, g in enumerate(self.generators)}
         self.polynomials = polynomials(len(self.generators))
-        self._relations: tuple[Relation, ...] = ()
-        relations = [self._square(("sine", i), 1 - self.cosine(i) * self.cosine(i)) for i in self.angles]
+        self.relations: tuple[Relation, ...] = ()
+        """What is zero, the greatest generator's first."""
+        for i in self.angles:
+            self._relate(("sine", i), 2, 1 - self.cosine(i) * self.cosine(i))
         for constant in constants:
             place = ("constant", constant.text)
-            self._relations = tuple(sorted(relations, key=lambda relation: relation.place))
             if constant.square is not None:
-                relations.append(self._square(place, constant.square(self)))
+                self._relate(place, 2, self.read(constant.square))
             if constant.reciprocal_of is not None:
-                product = self._element(place).polynomial * constant.reciprocal_of(self).polynomial
-                relations.append(Relation(self._places[place], 1, product - self.polynomials.constant(1)))
-        self._relations = tuple(sorted(relations, key=lambda relation: relation.place))
+                self._relate(place, 1, self.read(constant.reciprocal_of))
 
-    def _square(self, place: tuple[str, int | str], value: Element) -> Relation:
-        generator = self._element(place).polynomial
-        return Relation(self._places[place], 2, generator * generator - value.polynomial)
+    def _relate(self, place: tuple[str, int | str], power: int, other: Element) -> None:
+        """Add x^2 = other (power 2), or x other = 1 (power 1)."""
+        x = self._element(place).polynomial
+        zero = x * x - other.polynomial if power == 2 else x * other.polynomial - self.polynomials.constant(1)
+        relations = [*self.relations, Relation(self._places[place], power, zero)]
+        self.relations = tuple(sorted(relations, key=lambda relation: relation.place))
+
+    def _key(self) -> tuple[Any, ...]:
+        return self.kinds, self.given, tuple(self.angles.items()), self.sums
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Ring) and self._key() == other._key())
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[Ring], tuple[Any, ...]]:
+        return Ring, (self.kinds, self.given, self.angles, self.sums)
 
     def _element(self, place: tuple[str, int | str]) -> Element:
         return Element(self, self.polynomials.generator(self._places[place]))
@@ -181,6 +193,26 @@ class Ring:
         if ("constant", text) not in self._places:
             raise RingError(f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}")
         return self._element(("constant", text))
+
+    def read(self, expression: Expression) -> Element:
+        """Return an exact expression in the ring's constants.
+
+        Raises
+        ------
+        RingError
+            It has a name or a function that the ring has not.
+        """
+        return read_expression(self, expression)
+
+    def direction(self, angle: Expression) -> tuple[Element, Element]:
+        """Return cosine and sine of an angle that does not depend on the state.
+
+        Raises
+        ------
+        RingError
+            As for :meth:`read`.
+        """
+        return read_angle(self, angle)
 
     def sine(self, i: int) -> Element:
         """Return the sine of joint i's variable, from 0."""
@@ -233,6 +265,17 @@ class Ring:
         """Return an element in the sines and cosines of the ring's own angles alone: its normal form."""
         return translated(element, self, self._expansions) if self.sums else element
 
+    @cached_property
+    def units(self) -> Mapping[TermMonomial, Sequence[Fraction]]:
+        """Angles whose cosines are constants, as multiples by what they are multiples of: pi, a parameter, 1."""
+        units: dict[TermMonomial, list[Fraction]] = {}
+        for constant in self.given:
+            if constant.meaning is not None and constant.text.startswith("cos("):
+                ((((atom, _),), _),) = constant.meaning.terms
+                ((monomial, unit),) = atom.arguments[0].terms
+                units.setdefault(monomial, []).append(unit)
+        return units
+
     @property
     def n(self) -> int:
         """The number of joints."""
@@ -271,174 +314,6 @@ class Ring:
         return values
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Element:
-    """An element of a ring, in normal form."""
-
-    ring: Ring
-    polynomial: Any
-
-    # Arithmetic
-
-    def __add__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
-            return NotImplemented
-        return Element(self.ring, self.polynomial + self._coerced(other))
-
-    __radd__ = __add__
-
-    def __neg__(self) -> Element:
-        return Element(self.ring, -self.polynomial)
-
-    def __sub__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
-            return NotImplemented
-        return Element(self.ring, self.polynomial - self._coerced(other))
-
-    def __rsub__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
-            return NotImplemented
-        return Element(self.ring, self._coerced(other) - self.polynomial)
-
-    def __mul__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
-            return NotImplemented
-        if len(self.polynomial) == 0:
-            return self
-        factor = self._coerced(other)
-        if len(self.polynomial) * len(factor) > MAX_TERMS * 16:
-            raise RingError(
-                f"a product of {len(self.polynomial)} by {len(factor)} terms: too long to be derived exactly; "
-                "fewer symbols (symbols='none'), or fewer joints (lock), make it shorter"
-            )
-        product = Element(self.ring, self.polynomial * factor).reduced()
-        if len(product.polynomial) > MAX_TERMS:
-            raise RingError(
-                f"an expression of {len(product.polynomial)} terms, beyond {MAX_TERMS}: too long to be derived exactly;"
-                " fewer symbols (symbols='none'), or fewer joints (lock), make it shorter"
-            )
-        return product
-
-    __rmul__ = __mul__
-
-    def __pow__(self, exponent: int) -> Element:
-        result = self.ring.one
-        for _ in range(exponent):
-            result = result * self
-        return result
-
-    def _coerced(self, other: Scalar) -> Any:
-        if isinstance(other, Element):
-            if other.ring is not self.ring:
-                raise RingError("elements of two rings; derive both from one description and with equal symbols")
-            return other.polynomial
-        return self.ring.polynomials.constant(other)
-
-    def reduced(self) -> Element:
-        """Return the normal form under the ring's relations."""
-        return Element(self.ring, self.ring.polynomials.reduced(self.polynomial, self.ring._relations))
-
-    # Comparing
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether this is zero for every state and every value of the parameters."""
-        return not self or not self.ring.expanded(self)._cleared()
-
-    def __bool__(self) -> bool:
-        """Whether the normal form has a term."""
-        return len(self.polynomial) > 0
-
-    def __eq__(self, other: object) -> bool:
-        if isinstance(other, Element | int | Fraction):
-            return (self - other).is_zero
-        return NotImplemented
-
-    def __hash__(self) -> int:
-        return hash(str(self))
-
-    def _cleared(self) -> Element:
-        """Return this times what its reciprocals are the reciprocals of: zero only together with this.
-
-        Reciprocals of sums that share parameters have more than one form (partial fractions).
-        """
-        element = self
-        for relation in self.ring._relations:
-            if relation.power != 1:
-                continue
-            generator = self.ring.polynomials.generator(relation.place)
-            while any(monomial[relation.place] for monomial in element.terms):
-                whole = relation.polynomial + self.ring.polynomials.constant(1)
-                divisor = self.ring.polynomials.quotient(whole, generator)
-                element = _without(element, relation.place, divisor)
-        return element
-
-    # Reading
-
-    @property
-    def terms(self) -> Mapping[Monomial, Fraction]:
-        """The coefficients by monomial, exponents in the order of the ring's generators."""
-        return self.ring.polynomials.terms(self.polynomial)
-
-    def __len__(self) -> int:
-        return len(self.polynomial)
-
-    def __str__(self) -> str:
-        from dhkit.symbolic.equations import plain_text
-
-        return plain_text(self)
-
-    def __repr__(self) -> str:
-        return f"Element({self})"
-
-    # Calculus
-
-    def by_position(self, i: int) -> Element:
-        """Return the partial derivative by joint i's variable."""
-        ring, derivative = self.ring, self.ring.polynomials.derivative
-        if ring.kinds[i] != "R":
-            return Element(ring, derivative(self.polynomial, ring.place("position", i)))
-        change = ring.zero.polynomial
-        for sine, cosine, joints in ring.turning:
-            if i in joints:
-                generator = ring.polynomials.generator
-                change = change + derivative(self.polynomial, sine) * generator(cosine)
-                change = change - derivative(self.polynomial, cosine) * generator(sine)
-        return Element(ring, change).reduced()
-
-    def by_rate(self, i: int) -> Element:
-        """Return the partial derivative by joint i's rate."""
-        return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i)))
-
-    def by_constant(self, text: str) -> Element:
-        """Return the partial derivative by a constant that nothing else is written in."""
-        place = self.ring.place("constant", text)
-        return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, place))
-
-    def by_time(self) -> Element:
-        """Return the time derivative along the motion: qd by qdd, q by qd."""
-        ring = self.ring
-        parts = [self.by_position(i) * ring.rate(i) for i in range(ring.n)]
-        return ring.sum([*parts, *(self.by_rate(i) * ring.acceleration(i) for i in range(ring.n))])
-
-    def value(self, values: Sequence[Any]) -> Any:
-        """Return the number, or array (...), at values of the generators; see :meth:`Ring.values`."""
-        total: Any = 0.0
-        for monomial, coefficient in self.terms.items():
-            product: Any = float(coefficient)
-            for k, exponent in enumerate(monomial):
-                if exponent:
-                    product = product * (values[k] if exponent == 1 else values[k] ** exponent)
-            total = total + product
-        return total
-
-
-Elements: TypeAlias = NDArray[Any]
-"""An array whose entries are elements of one ring."""
-
-Scalar: TypeAlias = "Element | int | Fraction"
-
-
 def _sum_of_angles(
     ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
 ) -> tuple[Element, Element]:
@@ -458,46 +333,3 @@ def angle_name(joints: Sequence[int]) -> str:
     """Return what a sum of joint angles is called: 23 for q2 + q3; 9_10 where a number has two digits."""
     numbers = [str(joint + 1) for joint in joints]
     return ("_" if any(len(number) > 1 for number in numbers) and len(numbers) > 1 else "").join(numbers)
-
-
-def _without(element: Element, place: int, divisor: Any) -> Element:
-    """Multiply by what the generator at ``place`` is the reciprocal of, once."""
-    ring = element.ring
-    with_it = {m: c for m, c in element.terms.items() if m[place]}
-    rest = {m: c for m, c in element.terms.items() if not m[place]}
-    lowered = {(*m[:place], m[place] - 1, *m[place + 1 :]): c for m, c in with_it.items()}
-    product = ring.polynomials.from_terms(rest) * divisor
-    return Element(ring, product + ring.polynomials.from_terms(lowered)).reduced()
-
-
-def translated(element: Element, ring: Ring, replacements: Mapping[int, Element]) -> Element:
-    """Return an element in another ring.
-
-    Parameters
-    ----------
-    element
-        Of any ring.
-    ring
-        Where the result is.
-    replacements
-        What generators become, by their place in the element's ring; others become those of the same kind and name.
-    """
-    own = element.ring.generators
-    powers: dict[tuple[int, int], Element] = {}
-    kept = [k for k in range(len(own)) if k not in replacements]
-    parts: dict[Monomial, dict[Monomial, Fraction]] = {}
-    for monomial, coefficient in element.terms.items():
-        replaced = tuple(monomial[k] for k in replacements)
-        moved = [0] * len(ring.generators)
-        for k in kept:
-            if monomial[k]:
-                moved[ring.place(own[k].kind, own[k].text if own[k].joint < 0 else own[k].joint)] = monomial[k]
-        parts.setdefault(replaced, {})[tuple(moved)] = coefficient
-    total = []
-    for exponents, group in parts.items():
-        product = ring.one
-        for k, exponent in zip(replacements, exponents, strict=True):
-            if exponent:
-                product = product * powers.setdefault((k, exponent), replacements[k] ** exponent)
-        total.append(ring.from_terms(group) * product)
-    return ring.sum(total)

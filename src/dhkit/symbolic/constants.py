@@ -1,0 +1,128 @@
+"""Which constants a ring needs to hold a robot file's expressions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from dhkit.errors import ExpressionError
+from dhkit.expressions import PI, Atom, Expression, cos, sin, substitute
+from dhkit.expressions.exact import Monomial
+from dhkit.symbolic.reading import is_exact, reciprocal_text
+from dhkit.symbolic.ring import Constant
+
+__all__ = ["Constants", "value_of"]
+
+MOST = 8
+"""The largest multiple of an angle that is written in the cosine and sine of the angle itself."""
+
+
+@dataclass
+class Constants:
+    """Finds the constants of expressions and of cosines and sines of angles.
+
+    Numbers stay rational. Of angles only multiples of 15 degrees have cosines that can be written exactly; the cosine
+    and the sine of another angle are two constants, related by the sum of their squares.
+
+    Attributes
+    ----------
+    found
+        By text, each after those that it is written in.
+    notes
+        What is a constant of its own though it is a number.
+    """
+
+    found: dict[str, Constant] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    _units: dict[Monomial, Fraction] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, expressions: Iterable[Expression], angles: Iterable[Expression]) -> Constants:
+        """Return those of expressions, and of the cosines and sines of angles."""
+        expressions, angles = list(expressions), list(angles)
+        constants = cls()
+        constants._units = _common_angles(expressions, angles)
+        for angle in angles:
+            constants._scan_angle(angle)
+        for expression in expressions:
+            constants._scan(expression)
+        return constants
+
+    def _scan(self, expression: Expression) -> None:
+        for monomial, _ in expression.terms:
+            for atom, exponent in monomial:
+                self._scan_atom(atom)
+                if exponent < 0:
+                    whole = atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
+                    self._add(Constant(reciprocal_text(atom), 1 / whole, reciprocal_of=whole))
+
+    def _scan_atom(self, atom: Atom) -> None:
+        inside = atom.arguments[0] if atom.arguments else None
+        if inside is None:
+            self._add(Constant(atom.text, Expression.of_atom(atom) if atom.name == "pi" else None))
+        elif atom.name == "group":
+            self._scan(inside)
+        elif atom.name in ("sin", "cos"):
+            self._scan_angle(inside)
+        elif atom.name == "sqrt":
+            self._scan(inside)
+            self._add(Constant(atom.text, Expression.of_atom(atom), square=inside))
+        else:
+            self.notes.append(f"{atom.text} is a symbol of its own")
+            self._add(Constant(atom.text, Expression.of_atom(atom)))
+
+    def _scan_angle(self, angle: Expression) -> None:
+        for monomial, coefficient in angle.terms:
+            if is_exact(monomial, coefficient):
+                self._scan(cos(PI * coefficient))
+                self._scan(sin(PI * coefficient))
+                continue
+            unit = self._units[monomial]
+            one = Expression(((monomial, unit if abs(coefficient) / unit <= MOST else abs(coefficient)),))
+            cosine, sine = (Expression.of_atom(Atom(name, (one,))) for name in ("cos", "sin"))
+            if cosine.text in self.found:
+                continue
+            self._add(Constant(cosine.text, cosine))
+            self._add(Constant(sine.text, sine, square=1 - cosine * cosine))
+            if not one.symbols:
+                self.notes.append(f"{cosine} and {sine} are symbols, related by {cosine}^2 + {sine}^2 = 1")
+
+    def _add(self, constant: Constant) -> None:
+        self.found.setdefault(constant.text, constant)
+
+
+def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
+    """Return the number that a constant is, given those of the parameters; NaN of the reciprocal of 0."""
+    try:
+        return float(substitute(constant.meaning or Expression.symbol(constant.text), values))
+    except ExpressionError:
+        return math.nan
+
+
+def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expression]) -> dict[Monomial, Fraction]:
+    """Return, of the angles that are multiples of one another, the largest that all are whole multiples of."""
+    multiples: dict[Monomial, set[Fraction]] = {}
+
+    def collect(angle: Expression) -> None:
+        for monomial, coefficient in angle.terms:
+            if not is_exact(monomial, coefficient):
+                multiples.setdefault(monomial, set()).add(abs(coefficient))
+
+    def search(expression: Expression) -> None:
+        for monomial, _ in expression.terms:
+            for atom, _ in monomial:
+                if atom.name in ("sin", "cos") and atom.arguments:
+                    collect(atom.arguments[0])
+                elif atom.name in ("group", "sqrt") and atom.arguments:
+                    search(atom.arguments[0])
+
+    for angle in angles:
+        collect(angle)
+    for expression in expressions:
+        search(expression)
+    return {
+        monomial: Fraction(math.gcd(*(x.numerator for x in found)), math.lcm(*(x.denominator for x in found)))
+        for monomial, found in multiples.items()
+    }
