@@ -31,8 +31,9 @@ check: $(READY)  ## ruff, mypy --strict, import order
 accept: $(READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
 
-bench: $(BENCH_READY)  ## kinematics beside its peers; writes benchmarks/results/kinematics.md and .json
+bench: $(BENCH_READY)  ## kinematics and dynamics beside their peers; writes benchmarks/results/
 	$(BIN)/python benchmarks/kinematics.py $(ARGS)
+	$(BIN)/python benchmarks/dynamics.py $(ARGS)
 
 $(BENCH_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'

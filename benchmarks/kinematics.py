@@ -11,4 +11,4 @@ from dhkit.cli import main
 RESULT = Path(__file__).parent / "results" / "kinematics"
 
 if __name__ == "__main__":
-    main(["bench", "--output", str(RESULT), *sys.argv[1:]])
+    main(["bench", "fk", "ik", "jacobian", "--output", str(RESULT), *sys.argv[1:]])

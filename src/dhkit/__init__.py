@@ -18,6 +18,7 @@ from dhkit.errors import (
 if TYPE_CHECKING:
     from dhkit.arm import Arm
     from dhkit.description import Description, pose, pose_parts, robots
+    from dhkit.dynamics import Friction
     from dhkit.kinematics import IKFlag, IKSolutions, IKStatus
     from dhkit.viewer import plot
 
@@ -30,6 +31,7 @@ __all__ = [
     "DescriptionError",
     "DhkitError",
     "ExpressionError",
+    "Friction",
     "IKFlag",
     "IKSolutions",
     "IKStatus",
@@ -46,6 +48,7 @@ __all__ = [
 _HOMES = {
     "Arm": "dhkit.arm",
     "Description": "dhkit.description",
+    "Friction": "dhkit.dynamics",
     "IKFlag": "dhkit.kinematics",
     "IKSolutions": "dhkit.kinematics",
     "IKStatus": "dhkit.kinematics",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dhkit.description.table import Quantity
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
+    from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
 
@@ -227,6 +228,124 @@ class Arm:
         from dhkit.kinematics import export_kinematics
 
         return export_kinematics(self._description, folder, name)
+
+    # Dynamics
+
+    def mass_matrix(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the mass matrix M, shape (..., n, n), drives included, for q (..., n)."""
+        from dhkit.dynamics import mass_matrix
+
+        return mass_matrix(self._description, q, out, threads)
+
+    def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the Coriolis matrix C by Christoffel symbols, shape (..., n, n)."""
+        from dhkit.dynamics import coriolis_matrix
+
+        return coriolis_matrix(self._description, q, qd, out, threads)
+
+    def gravity_torque(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the torques g that hold the arm at rest, shape (..., n)."""
+        from dhkit.dynamics import gravity_torque
+
+        return gravity_torque(self._description, q, out, threads)
+
+    def bias(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return C qd + g, shape (..., n)."""
+        from dhkit.dynamics import bias
+
+        return bias(self._description, q, qd, out, threads)
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        wrench: ArrayLike | None = None,
+        friction: bool | Friction = False,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
+        """Return the joint torques of a motion, shape (..., n).
+
+        See :func:`dhkit.dynamics.inverse_dynamics`; ``wrench`` (..., 6) is what the environment does to the tool.
+        """
+        from dhkit.dynamics import inverse_dynamics
+
+        return inverse_dynamics(self._description, q, qd, qdd, wrench, friction, out, threads)
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike,
+        wrench: ArrayLike | None = None,
+        friction: bool | Friction = False,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
+        """Return the joint accelerations that torques cause, shape (..., n).
+
+        See :func:`dhkit.dynamics.forward_dynamics`.
+        """
+        from dhkit.dynamics import forward_dynamics
+
+        return forward_dynamics(self._description, q, qd, tau, wrench, friction, out, threads)
+
+    def kinetic_energy(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the kinetic energy, shape (...), J, drives included."""
+        from dhkit.dynamics import kinetic_energy
+
+        return kinetic_energy(self._description, q, qd, out, threads)
+
+    def potential_energy(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+        """Return the potential energy, shape (...), J, 0 for a mass at the world's origin."""
+        from dhkit.dynamics import potential_energy
+
+        return potential_energy(self._description, q, out, threads)
+
+    def power(self, qd: ArrayLike, tau: ArrayLike, out: Array | None = None) -> Array:
+        """Return the mechanical power of the joints, qd . tau, shape (...), W."""
+        from dhkit.dynamics import power
+
+        return power(self._description, qd, tau, out)
+
+    def friction_torque(
+        self, qd: ArrayLike, friction: Friction | None = None, out: Array | None = None, threads: int = 1
+    ) -> Array:
+        """Return the torques that friction takes, shape (..., n); see :func:`dhkit.dynamics.friction_torque`."""
+        from dhkit.dynamics import friction_torque
+
+        return friction_torque(self._description, qd, friction, out, threads)
+
+    @cached_property
+    def casadi(self) -> CasadiFunctions:
+        """The arm's mechanics as CasADi functions; see :class:`dhkit.symbolic.CasadiFunctions`."""
+        from dhkit.symbolic import CasadiFunctions
+
+        return CasadiFunctions(self._description)
+
+    # Equations
+
+    def derive(self, symbols: Symbols = "file") -> Lagrangian:
+        """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.
+
+        ``symbols="none"``: in numbers; ``"file"``: in the file's parameters; ``"inertial"``: every inertial parameter
+        is a symbol.
+        """
+        from dhkit.symbolic import lagrangian
+
+        return lagrangian(self._description, symbols)
+
+    @cached_property
+    def lagrangian(self) -> Lagrangian:
+        """Lagrange's equations in the file's parameters: exact M, C, g, tau, K and V."""
+        return self.derive()
+
+    def base_parameters(self) -> BaseParameters:
+        """Return the fewest inertial parameters that decide the torques; see :func:`dhkit.symbolic.base_parameters`."""
+        from dhkit.symbolic import base_parameters
+
+        return base_parameters(self._description)
 
     # The reference path
 

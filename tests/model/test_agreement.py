@@ -46,15 +46,6 @@ def central_difference(arm, q):
 
 
 @pytest.mark.parametrize("name", robots())
-def test_library_robots_agree_with_pinocchio(name, law):
-    report = verify(library_robot(name), law.samples(1000))
-    for agreement in report.agreements:
-        required = FRAMES if agreement.quantity.startswith("frame") else JACOBIANS
-        law.holds(f"{agreement.quantity} against Pinocchio", agreement.error, required, (name, agreement.q))
-    assert report.ok
-
-
-@pytest.mark.parametrize("name", robots())
 def test_library_robots_agree_with_yourdfpy(name, law, tmp_path):
     arm = library_robot(name)
     q = random_states(arm, law.samples(1000))
@@ -97,8 +88,7 @@ def test_check_urdf_accepts_the_library(name, tmp_path, check_urdf):
 def test_any_table_agrees_with_pinocchio_and_yourdfpy(tmp_path, law, arm):
     law.samples(1000)
     for agreement in verify(arm, 5).agreements:
-        required = FRAMES if agreement.quantity.startswith("frame") else JACOBIANS
-        law.holds(f"{agreement.quantity} against Pinocchio", agreement.error, required, arm)
+        law.holds(f"{agreement.quantity} against Pinocchio", agreement.error, agreement.tolerance, arm)
     scale = max(1.0, arm.reach)
     q = states(arm, 3)
     ours = np.concatenate([world_to_frames(arm, q), world_to_tool(arm, q)[:, None]], axis=1)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from exact_checks import errors, states
 from hypothesis import given, settings
-from random_arms import arms
 
 import dhkit
 from dhkit.description import library_robot
@@ -15,6 +13,8 @@ from dhkit.symbolic.base_parameters import base_parameters
 from dhkit.symbolic.lagrangian import lagrangian
 from dhkit.symbolic.regressor import regressor
 from dhkit.symbolic.ring import RingError
+from exact_checks import errors, states
+from random_arms import arms
 
 
 def in_general_position(description) -> bool:

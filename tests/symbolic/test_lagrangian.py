@@ -1,4 +1,4 @@
-"""Exact equations of motion: against Pinocchio, against the textbook's route, and against the textbooks' own formulas."""
+"""Exact equations of motion against Pinocchio, the textbook's route, and the textbooks' own formulas."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
-from exact_checks import errors
 from hypothesis import given, settings
-from random_arms import arms
 
 import dhkit
 from dhkit import Arm
@@ -22,6 +20,8 @@ from dhkit.symbolic.base_parameters import base_parameters
 from dhkit.symbolic.exact_arm import exact_arm
 from dhkit.symbolic.lagrangian import lagrangian
 from dhkit.symbolic.textbook import MISTAKES, derive
+from exact_checks import errors
+from random_arms import arms
 
 TOLERANCE = 1e-12
 PROVED = ["planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "cobra600", "stanford", "puma560"]
@@ -98,7 +98,7 @@ def test_a_coefficient_off_by_1e_9_is_found(name):
 
 def test_another_factorization_gives_the_same_torques_and_is_not_skew():
     lag = lagrangian(library_robot("planar2r"))
-    w1, w2 = _rates(lag)
+    w1, _ = _rates(lag)
     C = lag.C.copy()
     C[0, 0], C[0, 1] = C[0, 0] * 2, C[0, 1] - lag.christoffel[0, 0, 1] * w1
     assert _equal(C @ _rates(lag), lag.h)

@@ -1,7 +1,8 @@
-"""dhkit's kinematics timed beside its peers: same robot, same states, one process, interleaved rounds."""
+"""dhkit timed beside its peers: same robot, same states, one process, interleaved rounds."""
 
 from dhkit.bench.agreement import Verdict
 from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, UnavailableError, Workload
+from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.bench.report import BenchReport, Missing, Requirement, Row
@@ -11,10 +12,12 @@ __all__ = [
     "QUANTITIES",
     "BenchReport",
     "Contender",
+    "Derivation",
     "FirstCall",
     "Machine",
     "Missing",
     "Mode",
+    "Operations",
     "PeakMemory",
     "Requirement",
     "Row",

@@ -13,7 +13,8 @@ from dhkit.description import Array
 __all__ = ["TOLERANCE", "Verdict", "judge"]
 
 TOLERANCE = 1e-9
-"""Largest error that counts as agreement, m or rotation entry: a nanometre, far above any rounding."""
+"""Largest error that counts as agreement, m or rotation entry: a nanometre, far above any rounding. Of dynamics over
+the largest entry where that is above 1."""
 CHECKED = 32
 """Items that are compared: enough to meet every branch, few enough for a solver of 50 ms."""
 
@@ -46,8 +47,8 @@ def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
     answers = task.answers(count)
     if quantity == "ik":
         return _closes(workload, answers)
-    ours = getattr(workload.arm, quantity)(workload.q[:count])
-    return Verdict(_worst(np.asarray(answers) - ours))
+    ours = getattr(workload.arm, quantity)(*(x[:count] for x in workload.inputs(quantity)))
+    return Verdict(_worst((np.asarray(answers) - ours) / max(1.0, float(np.abs(ours).max()))))
 
 
 def _closes(workload: Workload, answers: Sequence[Array]) -> Verdict:

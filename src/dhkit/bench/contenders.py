@@ -6,8 +6,11 @@ import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from itertools import cycle, islice
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
+
+import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
@@ -25,11 +28,10 @@ __all__ = [
     "one_by_one",
 ]
 
-QUANTITIES = ("fk", "ik", "jacobian")
+QUANTITIES = ("fk", "ik", "jacobian", "inverse_dynamics", "mass_matrix", "forward_dynamics")
 """What is timed; each is the name of a method of :class:`dhkit.Arm`."""
 
 Call: TypeAlias = Callable[[], object]
-Input = TypeVar("Input")
 
 
 class UnavailableError(Exception):
@@ -47,34 +49,51 @@ class Mode(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Workload:
-    """The states and poses that every contender gets.
+    """The states that every contender gets.
 
     Attributes
     ----------
     arm
         The robot.
-    q
-        Random joint values, shape (N, n), rad and m.
-    T
-        The tool's poses there, world to tool, shape (N, 4, 4).
+    q, qd, qdd
+        Random joint values, rates and accelerations, shape (N, n), rad, m and seconds.
     threads
         How many threads a contender that offers threads may use.
     """
 
     arm: Arm
     q: Array
-    T: Array
+    qd: Array
+    qdd: Array
     threads: int = 1
 
     @classmethod
     def of(cls, arm: Arm, batch: int, threads: int, seed: int) -> Workload:
         """Draw N = ``batch`` states, full turns and strokes within the limits."""
         q = random_states(arm.description, batch, seed)
-        return cls(arm, q, arm.fk(q), threads)
+        rng = np.random.default_rng(seed + 1)
+        return cls(arm, q, rng.uniform(-1, 1, q.shape), rng.uniform(-1, 1, q.shape), threads)
 
-    def inputs(self, quantity: str) -> Array:
-        """Return what a quantity is computed from: poses for ``ik``, joint values otherwise."""
-        return self.T if quantity == "ik" else self.q
+    @cached_property
+    def T(self) -> Array:
+        """The tool's poses, world to tool, shape (N, 4, 4)."""
+        return self.arm.fk(self.q)
+
+    @cached_property
+    def tau(self) -> Array:
+        """The motion's torques, shape (N, n), N m and N."""
+        return self.arm.inverse_dynamics(self.q, self.qd, self.qdd)
+
+    def inputs(self, quantity: str) -> tuple[Array, ...]:
+        """Return what a quantity is computed from, each with N as its first axis."""
+        match quantity:
+            case "ik":
+                return (self.T,)
+            case "inverse_dynamics":
+                return self.q, self.qd, self.qdd
+            case "forward_dynamics":
+                return self.q, self.qd, self.tau
+        return (self.q,)
 
 
 @dataclass(frozen=True)
@@ -86,7 +105,8 @@ class Task:
     prepare
         Makes, for a number of items, the call that is timed; everything that a user need not pay for is done here.
     answers
-        Results of the first k items in dhkit's conventions: fk (4, 4), jacobian (6, n), ik (solutions, n) each.
+        Results of the first k items in dhkit's conventions: fk (4, 4), jacobian (6, n), ik (solutions, n) each,
+        torques and accelerations (n,), mass_matrix (n, n).
     """
 
     prepare: Callable[[int], Call]
@@ -134,16 +154,25 @@ def import_peer(module: str) -> Any:
         raise UnavailableError(f"cannot be imported: {error}") from None
 
 
-def one_by_one(function: Callable[[Input], object], inputs: Sequence[Input]) -> Callable[[int], Call]:
-    """Return what prepares a loop of calls over inputs, which are taken round and round."""
+def one_by_one(function: Callable[..., object], inputs: Sequence[Any]) -> Callable[[int], Call]:
+    """Return what prepares a loop of calls over inputs, each one argument or a tuple of them, taken round and round."""
 
     def prepare(items: int) -> Call:
         chosen = list(islice(cycle(inputs), items))
 
-        def loop() -> None:
+        def of_one() -> None:
             for value in chosen:
                 function(value)
 
-        return loop
+        def of_two_or_three() -> None:
+            for values in chosen:
+                function(*values)
+
+        if not isinstance(chosen[0], tuple):
+            return of_one
+        if len(chosen[0]) > 1:
+            return of_two_or_three
+        chosen = [value for (value,) in chosen]
+        return of_one
 
     return prepare

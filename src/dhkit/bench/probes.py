@@ -144,7 +144,7 @@ def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadSca
     out = new_output(function, inputs)
 
     def on(threads: int) -> Call:
-        return lambda: function(inputs, out=out, threads=threads)
+        return lambda: function(*inputs, out=out, threads=threads)
 
     on(2)()
     times = lasting(on(1))
@@ -193,10 +193,11 @@ def report_peak() -> None:
     workload = Workload.of(Arm.load(robot), int(batch), int(threads), seed=0)
     function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
     out = new_output(function, inputs) if called == "out=" else None
-    warm = min(len(inputs), 1024)
-    function(inputs[:warm], out=None if out is None else out[:warm], threads=workload.threads)
-    result, extra = _watched(lambda: function(inputs, out=out, threads=workload.threads))
-    sizes = {"inputs": inputs.nbytes, "outputs": _bytes_of(result), "extra": extra}
+    warm = min(len(inputs[0]), 1024)
+    few = [x[:warm] for x in inputs]
+    function(*few, out=None if out is None else out[:warm], threads=workload.threads)
+    result, extra = _watched(lambda: function(*inputs, out=out, threads=workload.threads))
+    sizes = {"inputs": sum(x.nbytes for x in inputs), "outputs": _bytes_of(result), "extra": extra}
     sys.stdout.write(json.dumps(sizes))
 
 
@@ -230,7 +231,7 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
         A process fails, or there is no such method.
     """
     method(workload.arm, quantity)
-    given = "arm.fk(q)" if quantity == "ik" else "q"
+    given = {"ik": "arm.fk(q)", "inverse_dynamics": "q, q, q", "forward_dynamics": "q, q, q"}.get(quantity, "q")
     code = (
         "import sys, numpy as np, dhkit; arm = dhkit.Arm.load(sys.argv[1]); "
         f"q = np.random.default_rng(0).uniform(-1, 1, (int(sys.argv[2]), arm.n)); arm.{quantity}({given})"

@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from dhkit.bench.agreement import Verdict
 from dhkit.bench.contenders import Mode
+from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 
@@ -19,7 +20,8 @@ BATCH = 100_000
 Table: TypeAlias = tuple[str, Sequence[str], list[list[str]]]
 RATIO_MEANING = (
     "x batch and x single: how many times as long as dhkit's batch call with out=, and as its single call; "
-    "medians over the rounds. Error: largest difference from dhkit's answers; a solution is one that closes to 1e-9."
+    "medians over the rounds. Error: largest difference from dhkit's answers (of dynamics over their "
+    "largest); a solution is one that closes to 1e-9."
 )
 
 
@@ -122,7 +124,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class BenchReport:
-    """dhkit's kinematics beside its peers', one robot, one process.
+    """dhkit beside its peers, one robot, one process.
 
     Attributes
     ----------
@@ -140,6 +142,8 @@ class BenchReport:
         Where it ran.
     interrupted
         Whether it was stopped before the end.
+    derivations, operations
+        How long equations take to derive, and how many operations they are.
     """
 
     robot: str
@@ -154,6 +158,8 @@ class BenchReport:
     requirements: tuple[Requirement, ...]
     machine: Machine
     interrupted: bool = False
+    derivations: tuple[Derivation, ...] = ()
+    operations: tuple[Operations, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """Return everything as what JSON knows: no NaN, no tuples, no classes."""
@@ -210,6 +216,8 @@ class BenchReport:
             ("Two threads", ThreadScaling.COLUMNS, [list(line.cells) for line in self.scaling]),
             ("Peak memory", PeakMemory.COLUMNS, [list(line.cells) for line in self.memory]),
             ("A new process", FirstCall.COLUMNS, [list(line.cells) for line in self.starts]),
+            ("Operations", Operations.COLUMNS, [list(line.cells) for line in self.operations]),
+            ("Derivations", Derivation.COLUMNS, [list(line.cells) for line in self.derivations]),
             (
                 "Did not take part",
                 ("quantity", "who", "why"),

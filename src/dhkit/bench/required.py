@@ -1,10 +1,11 @@
-"""What dhkit's kinematics must reach beside its peers, and whether they did."""
+"""What dhkit must reach beside its peers, and whether it did."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
+from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PROOFS, Derivation, Operations
 from dhkit.bench.peers import eaik, pinocchio
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.bench.report import Requirement, Row
@@ -28,6 +29,8 @@ class _Comparison:
     target: float | None = None
 
 
+DERIVED = {CASADI: 0.5, PROOFS: 5.0}
+"""s that derivations may take."""
 COMPARISONS = (
     _Comparison(
         "fk",
@@ -63,6 +66,22 @@ COMPARISONS = (
         6.0,
         lambda row: row.times_batch,
     ),
+    _Comparison(
+        "inverse_dynamics",
+        "times pin.rneaInParallel on one thread",
+        pinocchio.RNEA_BATCH,
+        15.0,
+        lambda row: row.times_batch,
+        target=30.0,
+    ),
+    _Comparison("mass_matrix", "times a loop over pin.crba", pinocchio.CRBA, 8.0, lambda row: row.times_batch),
+    _Comparison(
+        "forward_dynamics",
+        "times pin.abaInParallel on one thread",
+        pinocchio.ABA_BATCH,
+        20.0,
+        lambda row: row.times_batch,
+    ),
 )
 
 
@@ -72,6 +91,8 @@ def requirements(
     scaling: Iterable[ThreadScaling],
     memory: Iterable[PeakMemory],
     starts: Iterable[FirstCall],
+    derived: Iterable[Derivation] = (),
+    counted: Iterable[Operations] = (),
     *,
     as_asked: bool,
 ) -> tuple[Requirement, ...]:
@@ -79,7 +100,7 @@ def requirements(
 
     Parameters
     ----------
-    rows, scaling, memory, starts
+    rows, scaling, memory, starts, derived, counted
         What was measured.
     quantities
         What the run was about.
@@ -107,6 +128,16 @@ def requirements(
                 line.quantity, "s from the start of a second process to its first batch", 2.0, True, line.second
             )
             for line in starts
+        ),
+        *(
+            Requirement(line.robot, f"s: {line.what}", DERIVED[line.what], True, line.seconds)
+            for line in derived
+            if line.what in DERIVED
+        ),
+        *(
+            Requirement("inverse_dynamics", "additions and multiplications", 400, True, line.total, target=305)
+            for line in counted
+            if line.program == INVERSE_DYNAMICS
         ),
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.bench.agreement import Verdict, judge
 from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, UnavailableError, Workload
+from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
@@ -20,6 +21,9 @@ from dhkit.description import Array
 
 __all__ = ["REPEATS", "run"]
 
+DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
+DERIVING = 90.0
+"""s that a peer may derive: one that takes longer would not be waited for."""
 REPEATS = 9
 """Rounds: odd, so that the median is one of them."""
 
@@ -46,6 +50,8 @@ class _Findings:
     scaling: list[ThreadScaling] = field(default_factory=list)
     memory: list[PeakMemory] = field(default_factory=list)
     starts: list[FirstCall] = field(default_factory=list)
+    derivations: list[Derivation] = field(default_factory=list)
+    operations: list[Operations] = field(default_factory=list)
 
 
 def run(
@@ -60,14 +66,14 @@ def run(
     probes: bool = True,
     contenders: Sequence[Contender] | None = None,
 ) -> BenchReport:
-    """Time dhkit's kinematics beside every peer that is installed, in one process and in interleaved rounds.
+    """Time dhkit beside every peer that is installed, in one process and in interleaved rounds.
 
     Parameters
     ----------
     arm
         The robot.
     quantities
-        Any of ``fk``, ``ik``, ``jacobian``.
+        Any of :data:`QUANTITIES`.
     batch
         Items of a batch; slow contenders get fewer, as their rows say.
     threads
@@ -79,7 +85,7 @@ def run(
     progress
         Gets a line before each step.
     probes
-        Whether to measure threads, memory and new processes too.
+        Whether to measure threads, memory and new processes too, and with dynamics derivations.
     contenders
         Who takes part; everyone unless given.
 
@@ -111,6 +117,9 @@ def run(
                 _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, findings, tell)
             for quantity in quantities if probes else ():
                 _probe(workload, quantity, repeats, findings, tell)
+            if probes and not DYNAMICS.isdisjoint(quantities):
+                tell("derivations")
+                _derive(arm, findings)
     except KeyboardInterrupt:
         interrupted = True
     asked = requirements(
@@ -119,6 +128,8 @@ def run(
         findings.scaling,
         findings.memory,
         findings.starts,
+        findings.derivations,
+        findings.operations,
         as_asked=batch >= BATCH and threads == 1,
     )
     return BenchReport(
@@ -131,6 +142,8 @@ def run(
         scaling=tuple(findings.scaling),
         memory=tuple(findings.memory),
         starts=tuple(findings.starts),
+        derivations=tuple(findings.derivations),
+        operations=tuple(findings.operations),
         requirements=asked,
         machine=Machine.here(),
         interrupted=interrupted,
@@ -212,6 +225,15 @@ def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
         )
         for k, entrant in enumerate(entrants)
     ]
+
+
+def _derive(arm: Arm, findings: _Findings) -> None:
+    """Count operations and time derivations."""
+    try:
+        findings.operations += operations(arm)
+        findings.derivations += derivations(arm, DERIVING)
+    except Exception as error:  # as for the contenders
+        findings.missing.append(Missing("dynamics", "derivations", _reason(error)))
 
 
 def _probe(workload: Workload, quantity: str, repeats: int, findings: _Findings, tell: Progress) -> None:

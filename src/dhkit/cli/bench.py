@@ -1,4 +1,4 @@
-"""`dhkit bench`: kinematics beside its peers, with progress on stderr."""
+"""`dhkit bench`: kinematics and dynamics beside its peers, with progress on stderr."""
 
 from __future__ import annotations
 

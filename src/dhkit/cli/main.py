@@ -15,6 +15,7 @@ from dhkit.arm import Arm
 from dhkit.cli import demo as demo_command
 from dhkit.cli import info as info_command
 from dhkit.cli import inverse as inverse_command
+from dhkit.cli import verify as verify_command
 from dhkit.cli import workspace as workspace_command
 from dhkit.cli.arguments import gathering, joint_values, target
 from dhkit.cli.output import print_json, say
@@ -160,16 +161,26 @@ def verify(
     robot: Robot,
     samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    urdf: Annotated[Path | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the longest chain's end.")] = None,
+    tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
     json: Json = False,
 ) -> int:
-    """Hold our kinematics against Pinocchio's; exit status 1 where they disagree."""
-    report = Arm.load(robot).verify(samples, seed)
-    if json:
-        agreements = [vars(agreement) | {"ok": agreement.ok} for agreement in report.agreements]
-        print_json(vars(report) | {"agreements": agreements, "ok": report.ok})
-    else:
-        say(str(report))
-    return 0 if report.ok else 1
+    """Hold our kinematics and dynamics against Pinocchio's; exit status 1 where they disagree.
+
+    With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.
+    """
+    return verify_command.run(
+        Arm.load(robot),
+        samples,
+        seed,
+        urdf=urdf,
+        tip=tip,
+        tolerance=tolerance,
+        output=output,
+        json=json,
+    )
 
 
 @app.command()
@@ -185,8 +196,28 @@ def workspace(
 
 
 @app.command()
+def equations(
+    robot: Robot,
+    what: Annotated[str, typer.Option(help="Any of M, C, h, g, tau, K, V.")] = "M,C,g",
+    form: Annotated[str, typer.Option("--format", help="text, latex, python, c, matlab or html.")] = "text",
+    symbols: Annotated[
+        str, typer.Option(help="none: numbers; file: the file's parameters; inertial: every inertial parameter.")
+    ] = "file",
+    compact: Annotated[bool, typer.Option("--compact", help="Base parameters, and sums of angles.")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
+    json: Json = False,
+) -> None:
+    """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."""
+    from dhkit.cli import equations as equations_command
+
+    equations_command.run(
+        Arm.load(robot), what=what, form=form, symbols=symbols, compact=compact, output=output, json=json
+    )
+
+
+@app.command()
 def bench(
-    quantities: Annotated[list[str] | None, typer.Argument(help="Any of fk, ik, jacobian; all unless given.")] = None,
+    quantities: Annotated[list[str] | None, typer.Argument(help="What to time; all unless given.")] = None,
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
     batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Items of a batch.")] = 100_000,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that batch calls may use.")] = 1,
@@ -196,12 +227,16 @@ def bench(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
     json: Json = False,
 ) -> int:
-    """Time our kinematics beside every installed peer: median, spread and ratios."""
+    """Time our kinematics and dynamics beside every installed peer: median, spread and ratios.
+
+    Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.
+    """
+    from dhkit.bench import QUANTITIES
     from dhkit.cli import bench as bench_command
 
     return bench_command.run(
         Arm.load(robot),
-        quantities or ("fk", "ik", "jacobian"),
+        quantities or QUANTITIES,
         batch=batch,
         threads=threads,
         repeats=repeats,

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-__all__ = ["print_json", "print_table", "say"]
+__all__ = ["finite", "print_json", "print_table", "say"]
 
 PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables then do not break."""
@@ -31,7 +31,7 @@ def say(text: str, style: str = "") -> None:
 
 def print_json(value: Any, indent: int | None = None) -> None:
     """Print a value as one JSON document; NaN and infinities are null."""
-    sys.stdout.write(json.dumps(_finite(value), ensure_ascii=False, allow_nan=False, indent=indent) + "\n")
+    sys.stdout.write(json.dumps(finite(value), ensure_ascii=False, allow_nan=False, indent=indent) + "\n")
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
@@ -54,11 +54,12 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return a value as JSON has it: NaN and infinities are null."""
     if isinstance(value, float):
         return value if value == value and abs(value) != float("inf") else None
     if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: finite(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     return value

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
+from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.batches import check_whole, pose_rows
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL

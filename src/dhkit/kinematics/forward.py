@@ -7,8 +7,7 @@ from functools import lru_cache
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import kernel
-from dhkit.kinematics.batches import fill
+from dhkit.kernels import fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
 __all__ = ["forward_kinematics", "frames", "pattern_of"]

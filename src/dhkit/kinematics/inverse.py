@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import kernel
+from dhkit.kernels import check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics import closed_form
-from dhkit.kinematics.batches import check_whole, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions

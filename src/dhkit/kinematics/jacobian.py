@@ -5,8 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import kernel
-from dhkit.kinematics.batches import fill
+from dhkit.kernels import fill, kernel
 from dhkit.kinematics.forward import pattern_of
 from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols
 from dhkit.symbolic import jacobian as symbolic_jacobian

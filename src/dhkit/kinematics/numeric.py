@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kinematics.batches import check_whole, pose_rows
+from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
 from dhkit.kinematics.forward import forward_kinematics

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.errors import UnreachableError
-from dhkit.kinematics.batches import pose_rows
+from dhkit.kernels import pose_rows
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms

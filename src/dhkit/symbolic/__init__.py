@@ -1,5 +1,21 @@
 """An arm's mechanics as expressions: CasADi frames and Jacobians, straight-line programs, and their source text."""
 
+from dhkit.symbolic.base_parameters import BaseParameters, base_parameters
+from dhkit.symbolic.bodies import Moments
+from dhkit.symbolic.casadi_functions import CasadiFunctions
+from dhkit.symbolic.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+from dhkit.symbolic.elements import Element, Elements, RingError
+from dhkit.symbolic.energies import (
+    kinetic_energy,
+    lagrange_coriolis_matrix,
+    lagrange_gravity_torque,
+    lagrange_inverse_dynamics,
+    lagrange_mass_matrix,
+    lagrange_torque,
+    potential_energy,
+)
+from dhkit.symbolic.exact_arm import ExactArm, Symbols, exact_arm
+from dhkit.symbolic.forward_dynamics import SINGULAR, recursive_forward_dynamics, solve_for_acceleration
 from dhkit.symbolic.frames import (
     ReferenceAxes,
     SymbolicTable,
@@ -8,20 +24,66 @@ from dhkit.symbolic.frames import (
     joint_symbols,
     table_pattern,
 )
+from dhkit.symbolic.friction import Friction, friction_torque, smooth_direction
 from dhkit.symbolic.graph import Graph, Node, Variable
+from dhkit.symbolic.inertial_table import InertialTable, inertial_pattern, require_bodies
+from dhkit.symbolic.lagrangian import Lagrangian, Proof, lagrangian
+from dhkit.symbolic.operations import operation_count
 from dhkit.symbolic.printers import c_source, export_c, python_lines
+from dhkit.symbolic.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+from dhkit.symbolic.regressor import Regressor
+from dhkit.symbolic.textbook import MISTAKES, TextbookDerivation, derive
 
 __all__ = [
+    "MISTAKES",
+    "SINGULAR",
+    "BaseParameters",
+    "CasadiFunctions",
+    "Element",
+    "Elements",
+    "ExactArm",
+    "Friction",
     "Graph",
+    "InertialTable",
+    "Lagrangian",
+    "Moments",
     "Node",
+    "Proof",
     "ReferenceAxes",
+    "Regressor",
+    "RingError",
     "SymbolicTable",
+    "Symbols",
+    "TextbookDerivation",
     "Variable",
+    "base_parameters",
     "c_source",
+    "composite_coriolis_matrix",
+    "composite_mass_matrix",
+    "derive",
+    "exact_arm",
     "export_c",
+    "friction_torque",
+    "inertial_pattern",
     "jacobian",
     "jacobian_dot",
     "joint_symbols",
+    "kinetic_energy",
+    "lagrange_coriolis_matrix",
+    "lagrange_gravity_torque",
+    "lagrange_inverse_dynamics",
+    "lagrange_mass_matrix",
+    "lagrange_torque",
+    "lagrangian",
+    "operation_count",
+    "potential_energy",
     "python_lines",
+    "recursive_bias",
+    "recursive_forward_dynamics",
+    "recursive_gravity",
+    "recursive_inverse_dynamics",
+    "require_bodies",
+    "smooth_direction",
+    "solve_for_acceleration",
     "table_pattern",
 ]

@@ -3,7 +3,8 @@
 What part of a link is symmetric about its joint's axis might as well belong to the link before, and a sliding link
 turns with the one before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
 robots"). That is done exactly, with symbols. What depends on others still, or has no effect, is found in the columns
-of the regressor, lengths and angles being in general position, and grouped exactly. That the grouped equations are the full ones can be proved by substitution.
+of the regressor, lengths and angles being in general position, and grouped exactly. That the grouped equations are the
+full ones can be proved by substitution.
 """
 
 from __future__ import annotations

@@ -58,6 +58,8 @@ FOLDING: Mapping[str, Callable[..., float]] = {
 }
 """What is worked out when all arguments are constants."""
 
+SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
+"""What a sign can be taken out of."""
 LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
 COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
 
@@ -93,6 +95,7 @@ def _operations() -> dict[int, str]:
         "OR": "logical_or",
         "NOT": "logical_not",
         "IF_ELSE_ZERO": ":gate",
+        "SIGN": ":sign",
     }
     return {getattr(casadi, f"OP_{key}"): name for key, name in names.items()}
 
@@ -207,6 +210,10 @@ class _Builder:
             return self.apply("divide", (self.constant(1.0), first))
         if operation == ":gate":
             return self.apply("select", (*arguments, self.constant(0.0)))
+        if operation == ":sign":
+            return self._sign(first)
+        if operation in SIGNED and (signed := self._signed(operation, arguments)) is not None:
+            return signed
         operands = [self.nodes[k] for k in arguments]
         if operation in FOLDING and all(node.operation == "constant" for node in operands):
             return self.constant(FOLDING[operation](*(node.value for node in operands)))
@@ -217,6 +224,30 @@ class _Builder:
         if operation in COMMUTATIVE:
             arguments = sorted(arguments)
         return self.add(Node(operation, tuple(arguments)))
+
+    def _sign(self, x: int) -> int:
+        """Return 1, -1, or x itself where it is 0 or NaN."""
+        zero = self.constant(0.0)
+        below = self.apply("select", (self.apply("less", (x, zero)), self.constant(-1.0), x))
+        return self.apply("select", (self.apply("less", (zero, x)), self.constant(1.0), below))
+
+    def _signed(self, operation: str, arguments: Sequence[int]) -> int | None:
+        """Return an operation on negated values with the sign taken out: a sum or a difference takes it in for free."""
+        plain = [self.nodes[k].arguments[0] if self.nodes[k].operation == "negate" else k for k in arguments]
+        negated = [k != own for k, own in zip(plain, arguments, strict=True)]
+        if not any(negated):
+            return None
+        if operation == "negate":
+            return plain[0]
+        if operation in ("multiply", "divide"):
+            result = self.apply(operation, plain)
+            return result if all(negated) else self.apply("negate", (result,))
+        x, y = plain
+        flipped = (negated[0], negated[1] != (operation == "subtract"))  # the signs of x and y in their sum
+        if flipped[0] == flipped[1]:
+            total = self.apply("add", (x, y))
+            return self.apply("negate", (total,)) if flipped[0] else total
+        return self.apply("subtract", (y, x) if flipped[0] else (x, y))
 
     def _decided(self, operation: str, arguments: Sequence[int]) -> int | None:
         """Return the result of a choice or of a logical operation one of whose conditions is a constant."""

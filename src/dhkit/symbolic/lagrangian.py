@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.symbolic import composite
+from dhkit.symbolic import composite, equations
 from dhkit.symbolic.exact_arm import ExactArm, Symbols, exact_arm
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.textbook import TextbookDerivation, derive
@@ -18,6 +19,8 @@ from dhkit.symbolic.textbook import TextbookDerivation, derive
 __all__ = ["Lagrangian", "Proof", "lagrangian"]
 
 _HALF = Fraction(1, 2)
+_SHOWN = 200
+"""Terms of a mass matrix that is shown unasked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +75,7 @@ class Lagrangian:
     >>> from dhkit.description import library_robot
     >>> lag = lagrangian(library_robot("planar2r"))
     >>> print(lag.M[1, 1])
-    1/3*m2*l2^2
+    m2*l2^2/3
     >>> bool(lag.prove_euler_lagrange()), bool(lag.prove_skew_symmetry())
     (True, True)
     """
@@ -173,6 +176,41 @@ class Lagrangian:
     ) -> Array:
         """Return the numbers of elements, shape (..., *elements.shape), at states (..., n)."""
         return self.arm.evaluate(elements, q, qd, qdd)
+
+    # Reading
+
+    def text(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
+        """Return some of M, C, h, g, tau, K and V as text, entry by entry.
+
+        Raises
+        ------
+        RingError
+            An entry is too long to be read.
+        """
+        return equations.equations_text(equations.quantities(self, what))
+
+    def latex(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
+        """Return some of M, C, h, g, tau, K and V in LaTeX, for a page that loads amsmath.
+
+        Raises
+        ------
+        RingError
+            An entry is too long to be read.
+        """
+        return equations.equations_latex(equations.quantities(self, what))
+
+    def sympy(self, what: str | Sequence[str] = tuple(equations.QUANTITIES)) -> dict[str, Any]:
+        """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
+        return equations.equations_sympy(equations.quantities(self, what))
+
+    def __str__(self) -> str:
+        size = sum(len(element) for element in self.M.flat)
+        if size <= _SHOWN:
+            return self.text()
+        return f"{self.description.name}: M qdd + C qd + g = tau, M of {size} terms; .text(('g',)) prints a part"
+
+    def _repr_latex_(self) -> str | None:
+        return self.latex() if sum(len(element) for element in self.M.flat) <= _SHOWN else None
 
     # Proofs
 

@@ -1,6 +1,8 @@
 """The two paths from a table, our own mechanics and Pinocchio's, held against each other."""
 
-from dhkit.verification.kinematics import random_states, verify
+from dhkit.verification.comparison import verify
+from dhkit.verification.foreign import verify_urdf
 from dhkit.verification.report import Agreement, VerificationReport
+from dhkit.verification.states import Motion, random_motions, random_states
 
-__all__ = ["Agreement", "VerificationReport", "random_states", "verify"]
+__all__ = ["Agreement", "Motion", "VerificationReport", "random_motions", "random_states", "verify", "verify_urdf"]

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 __all__ = ["Agreement", "VerificationReport"]
+
+MEASURE = (
+    "Errors are largest differences of an entry at one state: of positions and linear Jacobians over the arm's reach "
+    "(1 m at least), of rotations as they are, of all else over the reference's largest entry, or where that is small "
+    "over what the quantity is made of (of torques: the links' weights times the reach, and the largest entries of M "
+    "times those of the accelerations and of the products of rates)."
+)
 
 
 @dataclass(frozen=True)
@@ -18,20 +27,28 @@ class Agreement:
     error
         The largest error over the samples, by the quantity's measure; NaN if a value was missing or not finite.
     tolerance
-        The largest error that still counts as agreement.
-    q
-        The state at which it was seen, rad and m.
+        The largest error that still counts as agreement, at that state.
+    q, qd, qdd
+        The state at which it was seen, rad, m and seconds.
     """
 
     quantity: str
     error: float
     tolerance: float
     q: tuple[float, ...]
+    qd: tuple[float, ...] = ()
+    qdd: tuple[float, ...] = ()
 
     @property
     def ok(self) -> bool:
         """Whether the two agree."""
         return self.error <= self.tolerance
+
+    @property
+    def state(self) -> str:
+        """The state in words, six digits."""
+        named = (("q", self.q), ("qd", self.qd), ("qdd", self.qdd))
+        return ", ".join(f"{name} = {[float(f'{x:.6g}') for x in vector]}" for name, vector in named if vector)
 
 
 @dataclass(frozen=True)
@@ -48,6 +65,8 @@ class VerificationReport:
         How many random states, from which seed.
     agreements
         The worst of each quantity.
+    notes
+        What was not compared, and why.
     """
 
     robot: str
@@ -55,6 +74,7 @@ class VerificationReport:
     samples: int
     seed: int
     agreements: tuple[Agreement, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -66,9 +86,85 @@ class VerificationReport:
 
     def __str__(self) -> str:
         width = max(len(agreement.quantity) for agreement in self.agreements)
-        lines = [f"{self.robot} against {self.reference}, {self.samples} states, seed {self.seed}"]
+        lines = [self._title]
         for agreement in self.agreements:
-            verdict = "agrees" if agreement.ok else f"DISAGREES at q = {[float(f'{x:.6g}') for x in agreement.q]}"
+            verdict = "agrees" if agreement.ok else f"DISAGREES at {agreement.state}"
             figures = f"{agreement.error:8.1e}  of at most {agreement.tolerance:.0e}"
             lines.append(f"  {agreement.quantity:{width}}  {figures}  {verdict}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+    @property
+    def _title(self) -> str:
+        return f"{self.robot} against {self.reference}, {self.samples} states, seed {self.seed}"
+
+    def json(self) -> dict[str, Any]:
+        """Return everything as what JSON knows."""
+        agreements = [vars(agreement) | {"ok": agreement.ok} for agreement in self.agreements]
+        return vars(self) | {"agreements": agreements, "ok": self.ok}
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+        rows = [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]
+        table = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
+        notes = [f"- {note}" for note in self.notes]
+        return "\n".join([f"# {self._title}", "", *table, "", *notes, *([""] if notes else []), MEASURE, ""])
+
+    def latex(self) -> str:
+        """Return a table for a paper's appendix: booktabs, with a caption that says what was measured."""
+        rows = [
+            f"{_escaped(agreement.quantity)} & ${_power(agreement.error)}$ & ${_power(agreement.tolerance)}$ & "
+            f"{'yes' if agreement.ok else 'no'} \\\\"
+            for agreement in self.agreements
+        ]
+        caption = f"{_escaped(self._title)}. {_escaped(' '.join([*self.notes, MEASURE]))}"
+        return "\n".join(
+            [
+                "% needs \\usepackage{booktabs}",
+                "\\begin{table}",
+                "  \\centering",
+                f"  \\caption{{{caption}}}",
+                "  \\begin{tabular}{lccc}",
+                "    \\toprule",
+                "    quantity & worst error & at most & agrees \\\\",
+                "    \\midrule",
+                *(f"    {row}" for row in rows),
+                "    \\bottomrule",
+                "  \\end{tabular}",
+                "\\end{table}",
+                "",
+            ]
+        )
+
+    @property
+    def _rows(self) -> Sequence[tuple[str, ...]]:
+        return [
+            (
+                agreement.quantity,
+                f"{agreement.error:.1e}",
+                f"{agreement.tolerance:.0e}",
+                "agrees" if agreement.ok else "DISAGREES",
+                agreement.state,
+            )
+            for agreement in self.agreements
+        ]
+
+
+SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
+    "\\": "\\textbackslash{}",
+    "~": "\\textasciitilde{}",
+    "^": "\\textasciicircum{}",
+}
+
+
+def _escaped(text: str) -> str:
+    """Return text for LaTeX: a robot's name may hold anything."""
+    return "".join(SPECIAL.get(character, character) for character in text)
+
+
+def _power(number: float) -> str:
+    if number != number:
+        return "\\mathrm{NaN}"
+    if number == 0:
+        return "0"
+    mantissa, exponent = f"{number:.1e}".split("e")
+    return f"{mantissa} \\times 10^{{{int(exponent)}}}"

@@ -38,19 +38,19 @@ def method(arm: Arm, quantity: str) -> Callable[..., Any]:
     function: Callable[..., Any] | None = getattr(arm, quantity, None)
     if function is None:
         raise UnavailableError(f"this dhkit has no arm.{quantity}")
-    state = np.zeros((1, arm.n))
+    workload = Workload.of(arm, batch=1, threads=1, seed=0)
     try:
-        function(arm.fk(state) if quantity == "ik" else state)
+        function(*workload.inputs(quantity))
     except (DhkitError, NotImplementedError) as error:
         raise UnavailableError(f"arm.{quantity}: {error}") from None
     return function
 
 
-def new_output(function: Callable[..., Any], inputs: Array) -> Array:
+def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
     """Return an array to write a batch's results into, its pages touched."""
-    result = function(inputs[:1])
+    result = function(*(x[:1] for x in inputs))
     one: Array = result if isinstance(result, np.ndarray) else result.q
-    return np.full((len(inputs), *one.shape[1:]), np.nan)
+    return np.full((len(inputs[0]), *one.shape[1:]), np.nan)
 
 
 def _into_out(quantity: str) -> Callable[[Workload], Task]:
@@ -58,9 +58,9 @@ def _into_out(quantity: str) -> Callable[[Workload], Task]:
         function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
 
         def prepare(items: int) -> Callable[[], Any]:
-            chosen = inputs[:items]
+            chosen = [x[:items] for x in inputs]
             out = new_output(function, chosen)
-            return lambda: function(chosen, out=out, threads=workload.threads)
+            return lambda: function(*chosen, out=out, threads=workload.threads)
 
         return Task(prepare, lambda k: _answers(quantity, prepare(k)()))
 
@@ -72,8 +72,8 @@ def _into_new_arrays(quantity: str) -> Callable[[Workload], Task]:
         function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
 
         def prepare(items: int) -> Callable[[], Any]:
-            chosen = inputs[:items]
-            return lambda: function(chosen, threads=workload.threads)
+            chosen = [x[:items] for x in inputs]
+            return lambda: function(*chosen, threads=workload.threads)
 
         return Task(prepare, lambda k: _answers(quantity, prepare(k)()))
 
@@ -83,9 +83,10 @@ def _into_new_arrays(quantity: str) -> Callable[[Workload], Task]:
 def _single(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
         function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        items = list(zip(*inputs, strict=True))
         return Task(
-            one_by_one(function, list(inputs)),
-            lambda k: [_answers(quantity, function(x[None]))[0] for x in inputs[:k]],
+            one_by_one(function, items),
+            lambda k: [_answers(quantity, function(*(x[None] for x in item)))[0] for item in items[:k]],
         )
 
     return setup

@@ -1,4 +1,4 @@
-"""Pinocchio's algorithms in a Python loop, as its users call them; it has no batch call for kinematics."""
+"""Pinocchio's algorithms in a Python loop, as its users call them, and its batch calls, which dynamics alone have."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import numpy as np
 from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer
 from dhkit.description import Array
 
-__all__ = ["FORWARD", "JACOBIANS", "contenders"]
+__all__ = ["ABA_BATCH", "CRBA", "FORWARD", "JACOBIANS", "RNEA_BATCH", "contenders"]
 
 FORWARD = "pin.forwardKinematics"
 JACOBIANS = "pin.computeJointJacobians"
+CRBA = "pin.crba"
+RNEA_BATCH = "pin.rneaInParallel"
+ABA_BATCH = "pin.abaInParallel"
 
 
 def contenders() -> tuple[Contender, ...]:
@@ -23,6 +26,11 @@ def contenders() -> tuple[Contender, ...]:
         Contender(FORWARD, "fk", Mode.SINGLE, _forward),
         Contender(JACOBIANS, "jacobian", Mode.SINGLE, _joint_jacobians),
         Contender("pin.computeFrameJacobian", "jacobian", Mode.SINGLE, _frame_jacobian),
+        Contender("pin.rnea", "inverse_dynamics", Mode.SINGLE, _algorithm("rnea", "inverse_dynamics")),
+        Contender(RNEA_BATCH, "inverse_dynamics", Mode.BATCH, _in_parallel("rneaInParallel", "inverse_dynamics")),
+        Contender(CRBA, "mass_matrix", Mode.SINGLE, _algorithm("crba", "mass_matrix")),
+        Contender("pin.aba", "forward_dynamics", Mode.SINGLE, _algorithm("aba", "forward_dynamics")),
+        Contender(ABA_BATCH, "forward_dynamics", Mode.BATCH, _in_parallel("abaInParallel", "forward_dynamics")),
     )
 
 
@@ -65,6 +73,59 @@ def _frame_jacobian(workload: Workload) -> Task:
         return loop
 
     return Task(prepare, _each(lambda q: np.reshape(compute(model, data, q, tool, axes), (6, model.nv)), workload))
+
+
+def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
+    """Return the set-up of an algorithm of dynamics, called state by state."""
+
+    def setup(workload: Workload) -> Task:
+        pin, model, _ = _model(workload)
+        data, compute = model.createData(), getattr(pin, name)
+        states = list(zip(*workload.inputs(quantity), strict=True))
+
+        def answer(state: tuple[Array, ...]) -> Array:
+            result = np.array(compute(model, data, *state))
+            if quantity != "mass_matrix":
+                return result
+            upper = np.triu(np.reshape(result, (model.nv, model.nv)))
+            symmetric: Array = upper + np.triu(upper, 1).T
+            return symmetric
+
+        def prepare(items: int) -> Call:
+            chosen = list(islice(cycle(states), items))
+
+            def loop() -> None:
+                for state in chosen:
+                    compute(model, data, *state)
+
+            return loop
+
+        return Task(prepare, lambda k: [answer(state) for state in states[:k]])
+
+    return setup
+
+
+def _in_parallel(name: str, quantity: str) -> Callable[[Workload], Task]:
+    """Return the set-up of a batch call, which takes a column a state and writes into an array."""
+
+    def setup(workload: Workload) -> Task:
+        pin, model, _ = _model(workload)
+        pool, compute = pin.ModelPool(model, workload.threads), getattr(pin, name)
+        inputs = workload.inputs(quantity)
+
+        def prepare(items: int) -> Call:
+            columns = [np.asfortranarray(x[:items].T) for x in inputs]
+            result = np.empty((model.nv, items), order="F")
+
+            def batch() -> Array:
+                compute(workload.threads, pool, *columns, result)
+                return result
+
+            return batch
+
+        return Task(prepare, lambda k: list(np.asarray(prepare(k)()).T))
+
+    return setup
 
 
 def _model(workload: Workload) -> tuple[Any, Any, int]:

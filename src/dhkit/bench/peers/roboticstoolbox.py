@@ -31,6 +31,9 @@ def contenders() -> tuple[Contender, ...]:
         Contender("roboticstoolbox ikine_a", "ik", Mode.SINGLE, _ikine_a),
         Contender("roboticstoolbox analytic_ik", "ik", Mode.SINGLE, _analytic_ik),
         Contender("roboticstoolbox ik_LM", "ik", Mode.SINGLE, _ik_LM),
+        Contender("roboticstoolbox rne", "inverse_dynamics", Mode.SINGLE, _rne),
+        Contender("roboticstoolbox inertia", "mass_matrix", Mode.SINGLE, _inertia),
+        Contender("roboticstoolbox accel", "forward_dynamics", Mode.SINGLE, _accel),
     )
 
 
@@ -96,6 +99,23 @@ def _ik_LM(workload: Workload) -> Task:
     return Task(one_by_one(solve, list(workload.T)), lambda k: [_found(solve(T)) for T in workload.T[:k]])
 
 
+def _rne(workload: Workload) -> Task:
+    robot = _robot(workload.arm.description)
+    states = list(zip(workload.q, workload.qd, workload.qdd, strict=True))
+    return Task(one_by_one(robot.rne, states), lambda k: [np.ravel(robot.rne(*state)) for state in states[:k]])
+
+
+def _inertia(workload: Workload) -> Task:
+    robot = _robot(workload.arm.description)
+    return Task(one_by_one(robot.inertia, list(workload.q)), lambda k: [robot.inertia(q) for q in workload.q[:k]])
+
+
+def _accel(workload: Workload) -> Task:
+    robot = _robot(workload.arm.description).nofriction()
+    states = list(zip(workload.q, workload.qd, workload.tau, strict=True))
+    return Task(one_by_one(robot.accel, states), lambda k: [robot.accel(*state) for state in states[:k]])
+
+
 def _found(solution: Any) -> Any:
     """Return the joint values of an IKSolution that succeeded, shape (m, n)."""
     q = np.atleast_2d(np.asarray(solution.q, dtype=float))
@@ -117,11 +137,15 @@ def _robot(description: Description) -> Any:
     revolute, prismatic = getattr(toolbox, f"Revolute{ending}"), getattr(toolbox, f"Prismatic{ending}")
     links = []
     for i in range(description.n):
-        shared: dict[str, float] = {"a": float(numbers.a[i]), "alpha": float(numbers.alpha[i])}
+        shared: dict[str, Any] = {"a": float(numbers.a[i]), "alpha": float(numbers.alpha[i])}
+        if np.isfinite(numbers.mass[i]):
+            # The reflected inertia is what counts: as a rotor behind a gear of 1.
+            shared |= {"m": float(numbers.mass[i]), "r": numbers.com[i], "I": np.array(numbers.inertia[i])}
+            shared |= {"Jm": float(numbers.armature[i]), "G": 1.0, "B": 0.0, "Tc": [0.0, 0.0]}
         d, theta = float(numbers.d[i]), float(numbers.theta[i])
         if numbers.prismatic[i]:
             links.append(prismatic(theta=theta, offset=d, **shared))
         else:
             links.append(revolute(d=d, offset=theta, **shared))
     base, tool = (SE3(np.array(T), check=False) for T in (numbers.T_world_base, numbers.T_last_tool))
-    return toolbox.DHRobot(links, name=description.name, base=base, tool=tool)
+    return toolbox.DHRobot(links, name=description.name, base=base, tool=tool, gravity=np.array(numbers.gravity))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array
 from dhkit.description.frames import number_array
-from dhkit.kernels import Kernel
+from dhkit.kernels.kernel import Kernel
 
 __all__ = ["check_whole", "fill", "pose_rows", "result_array"]
 

@@ -1,0 +1,27 @@
+"""How an arm moves under forces: inverse and forward dynamics, their terms, energies and friction, on batches."""
+
+from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
+from dhkit.dynamics.equations import bias, coriolis_matrix, gravity_torque, inverse_dynamics, mass_matrix
+from dhkit.dynamics.forward import forward_dynamics
+from dhkit.dynamics.loads import friction_torque, wrench_torque
+from dhkit.dynamics.programs import dynamics_graph
+from dhkit.dynamics.regressor import inertial_parameters, regressor
+from dhkit.symbolic import Friction
+
+__all__ = [
+    "Friction",
+    "bias",
+    "coriolis_matrix",
+    "dynamics_graph",
+    "forward_dynamics",
+    "friction_torque",
+    "gravity_torque",
+    "inertial_parameters",
+    "inverse_dynamics",
+    "kinetic_energy",
+    "mass_matrix",
+    "potential_energy",
+    "power",
+    "regressor",
+    "wrench_torque",
+]

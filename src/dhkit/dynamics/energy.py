@@ -1,0 +1,62 @@
+"""Energies of an arm, and the power of its drives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics.programs import evaluate
+from dhkit.kernels import result_array
+
+__all__ = ["kinetic_energy", "potential_energy", "power"]
+
+
+def kinetic_energy(
+    description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
+    """Return the kinetic energy, rotors of the drives included.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    q, qd
+        Joint values and rates, shapes (..., n), rad, m and seconds; batch axes broadcast.
+    out, threads
+        As for :func:`dhkit.dynamics.mass_matrix`; ``out`` of shape (...).
+
+    Returns
+    -------
+    Array
+        Shape (...), J; NaN where an input is not finite.
+
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`dhkit.dynamics.mass_matrix`.
+    """
+    return evaluate("kinetic_energy", description, {"q": q, "qd": qd}, (), out, threads)
+
+
+def potential_energy(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    """Return the potential energy of the moving links in gravity, shape (...), J; arguments as for ``mass_matrix``.
+
+    It is 0 for a mass at the world's origin: V = -sum(m g . c).
+    """
+    return evaluate("potential_energy", description, {"q": q}, (), out, threads)
+
+
+def power(description: Description, qd: ArrayLike, tau: ArrayLike, out: Array | None = None) -> Array:
+    """Return the mechanical power of the joints, qd . tau, shape (...), W; qd and tau (..., n) broadcast.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument of another shape, or not numeric; ``out`` does not fit.
+    """
+    rates, torques = joint_array(description, qd, "qd"), joint_array(description, tau, "tau")
+    shape = np.broadcast_shapes(rates.shape, torques.shape)[:-1]
+    result = result_array(shape, out)
+    result[...] = np.sum(rates * torques, axis=-1)
+    return result

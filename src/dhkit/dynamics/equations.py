@@ -1,0 +1,122 @@
+"""The terms of the equation of motion M qdd + C qd + g = tau, and inverse dynamics."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics.loads import external_torque
+from dhkit.dynamics.programs import evaluate
+from dhkit.symbolic import Friction
+
+__all__ = ["bias", "coriolis_matrix", "gravity_torque", "inverse_dynamics", "mass_matrix"]
+
+
+def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    """Return the joint-space mass matrix M(q), drives' rotor inertia included.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    q
+        Joint values, shape (..., n), rad and m; angles, and sums of those of parallel joints, up to 1e6 rad.
+    out
+        Where to write, shape (..., n, n), float64, C-contiguous.
+    threads
+        How many threads share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, n), symmetric, kg m^2, kg m and kg; NaN where q has an entry that is not finite or too large.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body.
+    ValueError, TypeError
+        q has not shape (..., n) or is not numeric; ``out`` does not fit.
+    """
+    return evaluate("mass_matrix", description, {"q": q}, (description.n, description.n), out, threads)
+
+
+def coriolis_matrix(
+    description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
+    """Return the Coriolis matrix C(q, qd) by Christoffel symbols, shape (..., n, n): Mdot - 2 C is skew-symmetric.
+
+    Parameters
+    ----------
+    description, q, out, threads
+        As for :func:`mass_matrix`.
+    qd
+        Joint rates, shape (..., n), rad/s and m/s; batch axes broadcast.
+
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`mass_matrix`.
+    """
+    tail = (description.n, description.n)
+    return evaluate("coriolis_matrix", description, {"q": q, "qd": qd}, tail, out, threads)
+
+
+def gravity_torque(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    """Return g(q), shape (..., n), N m and N: what holds the arm at rest; arguments as for :func:`mass_matrix`."""
+    return evaluate("gravity_torque", description, {"q": q}, (description.n,), out, threads)
+
+
+def bias(description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    """Return C(q, qd) qd + g(q), shape (..., n), N m and N; arguments as for :func:`coriolis_matrix`."""
+    return evaluate("bias", description, {"q": q, "qd": qd}, (description.n,), out, threads)
+
+
+def inverse_dynamics(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    wrench: ArrayLike | None = None,
+    friction: bool | Friction = False,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return the joint torques of a motion, tau = M qdd + C qd + g + friction - J^T wrench.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    q, qd, qdd
+        Joint values, rates and accelerations, shapes (..., n), rad, m and seconds; batch axes broadcast.
+    wrench
+        Shape (..., 6): force (N) then moment (N m) that the environment applies at the tool's origin, world axes.
+    friction
+        True for dry friction as a step, 0 at rest; ``Friction(width=...)`` for a smooth one.
+    out
+        Where to write, shape (..., n), float64, C-contiguous.
+    threads
+        How many threads share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), N m and N; NaN where an input is not finite.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body.
+    ValueError, TypeError
+        An argument of another shape, or not numeric; ``out`` does not fit.
+    """
+    load = external_torque(description, q, qd, wrench, friction, threads)
+    if load is None:
+        return evaluate("inverse_dynamics", description, {"q": q, "qd": qd, "qdd": qdd}, (description.n,), out, threads)
+    start = joint_array(description, q)
+    start = np.broadcast_to(start, np.broadcast_shapes(start.shape, load.shape))
+    tau = evaluate("inverse_dynamics", description, {"q": start, "qd": qd, "qdd": qdd}, load.shape[-1:], out, threads)
+    tau -= load
+    return tau

@@ -1,0 +1,113 @@
+"""Forward dynamics: how an arm accelerates."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics.equations import mass_matrix
+from dhkit.dynamics.loads import external_torque
+from dhkit.dynamics.programs import evaluate
+from dhkit.errors import DescriptionError
+from dhkit.symbolic import SINGULAR, Friction
+
+__all__ = ["forward_dynamics"]
+
+log = logging.getLogger(__name__)
+
+PROBES = 16
+"""Random states at which a mass matrix must be singular to be called singular everywhere."""
+
+
+def forward_dynamics(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike,
+    wrench: ArrayLike | None = None,
+    friction: bool | Friction = False,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return the joint accelerations that torques cause: M qdd = tau - C qd - g - friction + J^T wrench.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    q, qd, tau
+        Joint values, rates and torques, shapes (..., n), rad, m, seconds, N m and N; batch axes broadcast.
+    wrench, friction, out, threads
+        As for :func:`dhkit.dynamics.inverse_dynamics`.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), rad/s^2 and m/s^2; NaN where an input is not finite, or M is singular at this state, of which
+        the log tells.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body; joints that carry no inertia at any state.
+    ValueError, TypeError
+        An argument of another shape, or not numeric; ``out`` does not fit.
+    """
+    load = external_torque(description, q, qd, wrench, friction, threads)
+    q, qd, tau = (joint_array(description, array, name) for array, name in ((q, "q"), (qd, "qd"), (tau, "tau")))
+    if out is not None and np.may_share_memory(out, q):
+        q = q.copy()  # where the arm was is asked once more if it has no acceleration there
+    drive = tau if load is None else tau + load
+    states = {"q": q, "qd": qd, "tau": drive}
+    qdd = evaluate("forward_dynamics", description, states, (description.n,), out, threads)
+    # The sum finds a NaN in one pass; only then is it asked where it comes from.
+    if qdd.size and not np.isfinite(qdd.sum()):
+        _explain(description, q, qdd)
+    return qdd
+
+
+def _explain(description: Description, q: Array, qdd: Array) -> None:
+    """Raise or log where M is singular; other NaN come from states that are not finite, as everywhere."""
+    everywhere = _failing(mass_matrix(description, _random_states(description)))
+    if np.all(everywhere >= 0):
+        names = _named(description, np.unique(everywhere))
+        raise DescriptionError(
+            f"{description.name}: the mass matrix is singular: {names} no inertia; give the links behind a body with "
+            "inertia, or the drive a rotor inertia"
+        )
+    lost = np.isnan(qdd).any(axis=-1)
+    joints = _failing(mass_matrix(description, np.broadcast_to(q, qdd.shape)[lost]))
+    if np.all(joints < 0):
+        return
+    log.warning(
+        "%s: no acceleration of %d of %d states: their mass matrix is singular, %s no inertia there",
+        description.name,
+        int(np.sum(joints >= 0)),
+        lost.size,
+        _named(description, np.unique(joints[joints >= 0])),
+    )
+
+
+def _failing(M: Array) -> Array:
+    """Return, of each matrix (N, n, n), the last joint that feels no inertia, or -1; as ``solve_for_acceleration``."""
+    A, diagonal = M.copy(), np.diagonal(M, axis1=-2, axis2=-1).copy()
+    failing = np.full(len(M), -1)
+    for k in reversed(range(M.shape[-1])):
+        pivot = A[:, k, k].copy()
+        singular = (pivot <= SINGULAR * diagonal[:, k]) & (failing < 0)
+        failing[singular] = k
+        with np.errstate(all="ignore"):  # what comes behind a singular pivot is of no interest
+            A -= A[:, :, k, None] * A[:, None, k, :] / pivot[:, None, None]
+    return failing
+
+
+def _random_states(description: Description) -> Array:
+    return np.random.default_rng(0).uniform(-np.pi, np.pi, (PROBES, description.n))
+
+
+def _named(description: Description, joints: Array) -> str:
+    names = [f"{i + 1} ({description.joints[i].name})" for i in joints]
+    return f"joint{'s' * (len(names) > 1)} {', '.join(names)} {'carry' if len(names) > 1 else 'carries'}"

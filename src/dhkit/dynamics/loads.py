@@ -1,0 +1,140 @@
+"""Torques beside the links' own dynamics: friction of the joints, and wrenches on the tool."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.description.frames import number_array
+from dhkit.kernels import fill, kernel
+from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
+from dhkit.symbolic import friction_torque as friction_expression
+
+__all__ = ["external_torque", "friction_torque", "wrench_torque"]
+
+
+def friction_torque(
+    description: Description,
+    qd: ArrayLike,
+    friction: Friction | None = None,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return the torques that friction takes: viscous, and dry friction that differs by direction.
+
+    Parameters
+    ----------
+    description
+        The robot; a joint without a drive has no friction.
+    qd
+        Joint rates, shape (..., n), rad/s and m/s.
+    friction
+        How dry friction changes with the direction of motion: a step unless given, 0 at rest.
+    out, threads
+        As for :func:`dhkit.dynamics.mass_matrix`.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), joint side, N m and N, of the sign of the motion: what a motor must give on top.
+
+    Raises
+    ------
+    ValueError, TypeError
+        qd has not shape (..., n) or is not numeric; ``out`` does not fit.
+    """
+    state = joint_array(description, qd, "qd")
+    width = Friction().width if friction is None else friction.width
+    smooth = width > 0
+    name = "smooth_friction" if smooth else "friction"
+    run = kernel(name, str(description.n), lambda: _friction_graph(name, description.n, smooth))
+    numbers = description.numbers
+    parameters = np.concatenate([numbers.viscous, numbers.coulomb.ravel(), [width]])
+    return fill(run, parameters, [state], (description.n,), out, threads)
+
+
+def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, threads: int = 1) -> Array:
+    """Return J^T w, shape (..., n): the torques with which a wrench on the tool drives the joints.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    q
+        Joint values, shape (..., n), rad and m.
+    wrench
+        Shape (..., 6): force (N) then moment (N m) that the environment applies at the tool's origin, world axes.
+    threads
+        As for :func:`dhkit.dynamics.mass_matrix`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument of another shape, or not numeric.
+    """
+    load = number_array(wrench, "wrench", "(..., 6)")
+    if load.ndim == 0 or load.shape[-1] != 6:
+        raise ValueError(f"wrench has shape {load.shape}; expected (..., 6): force, then moment")
+    pattern, parameters = _table_pattern_of(description)
+    run = kernel("wrench_torque", pattern, lambda: _wrench_graph(description))
+    return fill(run, parameters, [joint_array(description, q), load], (description.n,), None, threads)
+
+
+def external_torque(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    wrench: ArrayLike | None,
+    friction: bool | Friction,
+    threads: int = 1,
+) -> Array | None:
+    """Return J^T wrench - friction, shape (..., n): what drives the joints beside their motors; None for nothing.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As for :func:`friction_torque` and :func:`wrench_torque`; ``friction`` is neither a bool nor a Friction.
+    """
+    model = _chosen(friction)
+    push = None if wrench is None else wrench_torque(description, q, wrench, threads)
+    if model is None:
+        return push
+    loss = friction_torque(description, qd, model, threads=threads)
+    return -loss if push is None else push - loss
+
+
+def _chosen(friction: bool | Friction) -> Friction | None:
+    """Return what ``friction=`` means."""
+    if isinstance(friction, Friction):
+        return friction
+    if not isinstance(friction, bool | np.bool_):
+        raise TypeError(f"friction is {friction!r}; expected False, True or a Friction")
+    return Friction() if friction else None
+
+
+def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
+    import casadi
+
+    parameters, qd = joint_symbols("parameters", 3 * n + 1), joint_symbols("qd", n)
+    viscous = [parameters[i] for i in range(n)]
+    coulomb = [(parameters[n + 2 * i], parameters[n + 2 * i + 1]) for i in range(n)]
+    width = parameters[3 * n]
+    directions = [smooth_direction(qd[i], width) if smooth else casadi.sign(qd[i]) for i in range(n)]
+    torque = friction_expression(qd, viscous, coulomb, directions)
+    return Graph.of(name, {"parameters": parameters, "qd": qd}, {"tau": torque})
+
+
+def _wrench_graph(description: Description) -> Graph:
+    table, parameters = SymbolicTable.parametric(description)
+    q, wrench = joint_symbols("q", description.n), joint_symbols("wrench", 6)
+    return Graph.of(
+        "wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": jacobian(table, q).T @ wrench}
+    )
+
+
+@lru_cache(maxsize=512)
+def _table_pattern_of(description: Description) -> tuple[str, Array]:
+    return table_pattern(description)

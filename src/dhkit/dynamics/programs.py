@@ -1,0 +1,79 @@
+"""The programs of dynamics, and their kernels: each belongs to a pattern of arms, whose numbers are its arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.kernels import fill, kernel
+from dhkit.symbolic import (
+    Graph,
+    InertialTable,
+    composite_coriolis_matrix,
+    composite_mass_matrix,
+    inertial_pattern,
+    joint_symbols,
+    kinetic_energy,
+    potential_energy,
+    recursive_bias,
+    recursive_forward_dynamics,
+    recursive_gravity,
+    recursive_inverse_dynamics,
+)
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["dynamics_graph", "evaluate"]
+
+EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
+    "mass_matrix": composite_mass_matrix,
+    "coriolis_matrix": composite_coriolis_matrix,
+    "gravity_torque": recursive_gravity,
+    "bias": recursive_bias,
+    "inverse_dynamics": recursive_inverse_dynamics,
+    "forward_dynamics": recursive_forward_dynamics,
+    "kinetic_energy": kinetic_energy,
+    "potential_energy": potential_energy,
+}
+"""What computes each quantity, as a function of the table and of the joint vectors."""
+
+
+def evaluate(
+    quantity: str,
+    description: Description,
+    states: Mapping[str, ArrayLike],
+    tail: tuple[int, ...],
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return a quantity of ``EXPRESSIONS``, shape (..., *tail), at joint vectors by name, each (..., n).
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body.
+    ValueError, TypeError
+        A joint vector of another shape, or not numeric; ``out`` does not fit.
+    """
+    pattern, parameters = _pattern_of(description)
+    run = kernel(quantity, pattern, lambda: dynamics_graph(quantity, description, tuple(states)))
+    arrays = [joint_array(description, state, name) for name, state in states.items()]
+    return fill(run, parameters, arrays, tail, out, threads)
+
+
+def dynamics_graph(quantity: str, description: Description, states: tuple[str, ...]) -> Graph:
+    """Return the program of a quantity, parametric in the arm's numbers."""
+    table, parameters = InertialTable.parametric(description)
+    symbols = {name: joint_symbols(name, description.n) for name in states}
+    expression = EXPRESSIONS[quantity](table, *symbols.values())
+    return Graph.of(quantity, {"parameters": parameters, **symbols}, {"result": expression})
+
+
+@lru_cache(maxsize=512)
+def _pattern_of(description: Description) -> tuple[str, Array]:
+    return inertial_pattern(description)

@@ -1,0 +1,119 @@
+"""The regressor in numbers: torques are linear in the links' inertial parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.description.frames import carrying, world_to_frames
+
+__all__ = ["inertial_parameters", "regressor"]
+
+PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+"""Second moments in the order xx, yy, zz, xy, yz, xz."""
+
+
+def inertial_parameters(description: Description) -> Array:
+    """Return the links' inertial parameters, shape (10 n,), that :func:`regressor` is to be multiplied by.
+
+    Of each link its mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz about its DH frame's
+    origin, kg m^2, in the axes of that frame: m2, rx2, ry2, rz2, Ixx2, Iyy2, Izz2, Ixy2, Iyz2, Ixz2.
+    """
+    numbers = description.numbers
+    m, c = numbers.mass[:, None], numbers.com
+    square = np.sum(c * c, axis=-1)[:, None, None] * np.eye(3)
+    second = numbers.inertia + m[..., None] * (square - c[:, :, None] * c[:, None, :])
+    listed = np.stack([second[:, i, j] for i, j in PLACES], axis=-1)
+    return np.concatenate([m, m * c, listed], axis=-1).ravel()
+
+
+def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    """Return Y with tau = Y theta + armature qdd, theta of :func:`inertial_parameters`.
+
+    The force and moment that a link needs are linear in its parameters (Atkeson, An & Hollerbach, 1986, eq. 8); the
+    joints before it feel them by the principle of virtual work.
+
+    Parameters
+    ----------
+    description
+        The robot; its links' bodies do not matter.
+    q, qd, qdd
+        Joint values, rates and accelerations, shapes (..., n), rad, m and seconds; batch axes broadcast.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, 10 n); NaN where a state is not finite.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument of another shape, or not numeric.
+    """
+    n = description.n
+    states = [joint_array(description, x, name) for x, name in ((q, "q"), (qd, "qd"), (qdd, "qdd"))]
+    q, qd, qdd = np.broadcast_arrays(*states)
+    T = world_to_frames(description, q)
+    frames = np.moveaxis(T, -3, 0)
+    carriers = carrying(description.convention, frames)
+    prismatic = description.numbers.prismatic
+    omega, rate = np.zeros((2, *q.shape[:-1], 3))
+    a = np.broadcast_to(-description.numbers.gravity, omega.shape)  # an arm that accelerates upwards feels its weight
+    Y = np.zeros((*q.shape, 10 * n))
+    for i in range(n):
+        axis, at = carriers[i][..., :3, 2], carriers[i][..., :3, 3]
+        lever = frames[i + 1][..., :3, 3] - frames[i][..., :3, 3]
+        v, dv = (x[..., i, None] for x in (qd, qdd))
+        if prismatic[i]:
+            a = a + _swung(omega, rate, lever) + 2 * v * np.cross(omega, axis) + dv * axis
+        else:
+            # The joint's axis passes through a point of the link before; the link's own frame turns about it.
+            a = a + _swung(omega, rate, at - frames[i][..., :3, 3])
+            rate = rate + dv * axis + v * np.cross(omega, axis)
+            omega = omega + v * axis
+            a = a + _swung(omega, rate, frames[i + 1][..., :3, 3] - at)
+        force, moment = _needed(frames[i + 1][..., :3, :3], omega, rate, a)
+        for j in range(i + 1):
+            z, p = carriers[j][..., :3, 2], carriers[j][..., :3, 3]
+            effort = force
+            if not prismatic[j]:
+                arm = frames[i + 1][..., :3, 3] - p
+                effort = moment + np.cross(arm[..., None], force, axisa=-2, axisb=-2, axisc=-2)
+            Y[..., j, 10 * i : 10 * i + 10] = np.einsum("...k,...kp->...p", z, effort)
+    return Y
+
+
+def _swung(omega: Array, rate: Array, lever: Array) -> Array:
+    """Return how a point of a link accelerates against another at ``lever`` from it."""
+    swung: Array = np.cross(rate, lever) + np.cross(omega, np.cross(omega, lever))
+    return swung
+
+
+def _needed(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:
+    """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10)."""
+    w, dw, acceleration = (np.einsum("...ji,...j->...i", R, x) for x in (omega, rate, a))
+    force, moment = np.zeros((2, *w.shape, 10))
+    W = _cross_matrix(w)
+    force[..., :, 0] = acceleration
+    force[..., :, 1:4] = _cross_matrix(dw) + W @ W
+    moment[..., :, 1:4] = -_cross_matrix(acceleration)
+    moment[..., :, 4:] = _tensor_times(dw) + W @ _tensor_times(w)
+    return R @ force, R @ moment
+
+
+def _tensor_times(w: Array) -> Array:
+    """Return the matrix (..., 3, 6) that takes second moments to I w."""
+    matrix = np.zeros((*w.shape, 6))
+    for k, (i, j) in enumerate(PLACES):
+        matrix[..., i, k] = w[..., j]
+        matrix[..., j, k] = w[..., i]
+    return matrix
+
+
+def _cross_matrix(w: Array) -> Array:
+    """Return [w]x, shape (..., 3, 3)."""
+    matrix = np.zeros((*w.shape, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        matrix[..., j, i], matrix[..., i, j] = w[..., k], -w[..., k]
+    return matrix

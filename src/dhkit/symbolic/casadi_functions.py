@@ -1,0 +1,221 @@
+"""An arm's mechanics as CasADi functions, for optimizers: made when first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from dhkit.description import Description
+from dhkit.symbolic.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+from dhkit.symbolic.energies import kinetic_energy, lagrange_torque, potential_energy
+from dhkit.symbolic.forward_dynamics import solve_for_acceleration
+from dhkit.symbolic.frames import SymbolicTable, jacobian, joint_symbols
+from dhkit.symbolic.friction import Friction, friction_torque
+from dhkit.symbolic.inertial_table import InertialTable
+from dhkit.symbolic.payload import payload_moments
+from dhkit.symbolic.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["CasadiFunctions"]
+
+PAYLOAD = {"payload_mass": 1, "payload_com": 3, "payload_inertia": 6}
+"""Inputs of the payload layer, and how many numbers each is."""
+
+
+class CasadiFunctions:
+    """An arm's mechanics as ``casadi.Function`` objects with named inputs and outputs; differentiable, immutable.
+
+    q, qd, qdd and tau are n x 1, rad, m, seconds, N m and N. Functions can be called with symbols, in ``Opti`` and
+    ``nlpsol``, mapped, serialized, and turned into C by CasADi.
+
+    Parameters
+    ----------
+    description
+        The robot; dynamics need a body on every link.
+    friction
+        Friction of the joints in inverse and forward dynamics.
+    payload
+        Whether dynamics and energies take a load: ``payload_mass`` (kg), ``payload_com`` (3, m, in the tool's frame)
+        and ``payload_inertia`` (6: xx, yy, zz, xy, yz, xz about its centre of mass in the tool's axes, kg m^2).
+    wrench
+        Whether inverse and forward dynamics take a ``wrench`` (6): force (N) then moment (N m) that the environment
+        applies at the tool's origin, world axes.
+
+    Raises
+    ------
+    DescriptionError
+        By the functions of dynamics: a link without a body.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> tau = Arm.load("puma560").casadi.inverse_dynamics
+    >>> tau
+    Function(inverse_dynamics:(q[6],qd[6],qdd[6])->(tau[6]) SXFunction)
+    """
+
+    def __init__(
+        self, description: Description, friction: Friction | None = None, payload: bool = False, wrench: bool = False
+    ) -> None:
+        self._description = description
+        self._friction = friction
+        self._payload = payload
+        self._wrench = wrench
+
+    def layered(self, friction: Friction | None = None, payload: bool = False, wrench: bool = False) -> CasadiFunctions:
+        """Return the same arm's functions with these layers, and no others; see the class."""
+        return CasadiFunctions(self._description, friction, payload, wrench)
+
+    # Kinematics
+
+    @cached_property
+    def fk(self) -> casadi.Function:
+        """The tool in the world, q -> T, 4 x 4."""
+        table, q = SymbolicTable.of(self._description), self._q
+        return _function("fk", {"q": q}, {"T": table.world_to_tool(q)})
+
+    @cached_property
+    def jacobian(self) -> casadi.Function:
+        """The tool's Jacobian, q -> J, 6 x n: linear, then angular velocity, world axes."""
+        table, q = SymbolicTable.of(self._description), self._q
+        return _function("jacobian", {"q": q}, {"J": jacobian(table, q)})
+
+    # Dynamics
+
+    @cached_property
+    def mass_matrix(self) -> casadi.Function:
+        """The mass matrix, q -> M, n x n, drives included."""
+        return self._dynamics("mass_matrix", {"q": self._q}, {"M": composite_mass_matrix(self._table, self._q)})
+
+    @cached_property
+    def coriolis_matrix(self) -> casadi.Function:
+        """The Coriolis matrix, q, qd -> C, n x n, by Christoffel symbols."""
+        C = composite_coriolis_matrix(self._table, self._q, self._qd)
+        return self._dynamics("coriolis_matrix", {"q": self._q, "qd": self._qd}, {"C": C})
+
+    @cached_property
+    def gravity_torque(self) -> casadi.Function:
+        """What holds the arm at rest, q -> g, n x 1."""
+        return self._dynamics("gravity_torque", {"q": self._q}, {"g": recursive_gravity(self._table, self._q)})
+
+    @cached_property
+    def bias(self) -> casadi.Function:
+        """What a motion without acceleration takes, q, qd -> h = C qd + g, n x 1."""
+        h = recursive_bias(self._table, self._q, self._qd)
+        return self._dynamics("bias", {"q": self._q, "qd": self._qd}, {"h": h})
+
+    @cached_property
+    def inverse_dynamics(self) -> casadi.Function:
+        """Joint torques, q, qd, qdd -> tau, n x 1, with the layers' loads."""
+        tau = recursive_inverse_dynamics(self._table, self._q, self._qd, self._qdd) - self._load
+        inputs = {"q": self._q, "qd": self._qd, "qdd": self._qdd}
+        return self._dynamics("inverse_dynamics", inputs, {"tau": tau}, self._wrench_input)
+
+    @cached_property
+    def forward_dynamics(self) -> casadi.Function:
+        """Accelerations, q, qd, tau -> qdd, n x 1, with the layers' loads; NaN where M is singular."""
+        tau = joint_symbols("tau", self._description.n)
+        net = tau + self._load - recursive_bias(self._table, self._q, self._qd)
+        qdd = solve_for_acceleration(composite_mass_matrix(self._table, self._q), net)
+        inputs = {"q": self._q, "qd": self._qd, "tau": tau}
+        return self._dynamics("forward_dynamics", inputs, {"qdd": qdd}, self._wrench_input)
+
+    @cached_property
+    def kinetic_energy(self) -> casadi.Function:
+        """Kinetic energy, q, qd -> K, J."""
+        K = kinetic_energy(self._table, self._q, self._qd)
+        return self._dynamics("kinetic_energy", {"q": self._q, "qd": self._qd}, {"K": K})
+
+    @cached_property
+    def potential_energy(self) -> casadi.Function:
+        """Potential energy, q -> V, J, 0 for a mass at the world's origin."""
+        return self._dynamics("potential_energy", {"q": self._q}, {"V": potential_energy(self._table, self._q)})
+
+    @cached_property
+    def lagrange(self) -> casadi.Function:
+        """Lagrange's equations, q, qd, qdd -> tau = d/dt dL/dqd - dL/dq, n x 1, by differentiating L = K - V."""
+        tau = lagrange_torque(self._table, self._q, self._qd, self._qdd)
+        return self._dynamics("lagrange", {"q": self._q, "qd": self._qd, "qdd": self._qdd}, {"tau": tau})
+
+    # What they are made of
+
+    @cached_property
+    def _q(self) -> casadi.SX:
+        return joint_symbols("q", self._description.n)
+
+    @cached_property
+    def _qd(self) -> casadi.SX:
+        return joint_symbols("qd", self._description.n)
+
+    @cached_property
+    def _qdd(self) -> casadi.SX:
+        return joint_symbols("qdd", self._description.n)
+
+    @cached_property
+    def _load_symbols(self) -> dict[str, casadi.SX]:
+        return {name: joint_symbols(name, size) for name, size in PAYLOAD.items()} if self._payload else {}
+
+    @cached_property
+    def _wrench_input(self) -> dict[str, casadi.SX]:
+        return {"wrench": joint_symbols("wrench", 6)} if self._wrench else {}
+
+    @cached_property
+    def _table(self) -> InertialTable:
+        table = InertialTable.of(self._description)
+        if not self._payload:
+            return table
+        mass, com, inertia = self._load_symbols.values()
+        load = payload_moments(self._description, mass, com, inertia)
+        return table.with_load(load, -self._lifted(mass))
+
+    def _lifted(self, mass: casadi.SX) -> Any:
+        """Return the work of gravity on a mass from the world's origin to frame 0, J."""
+        numbers = self._description.numbers
+        return mass * float(numbers.gravity @ numbers.T_world_base[:3, 3])
+
+    @cached_property
+    def _load(self) -> casadi.SX:
+        """J^T wrench - friction, n x 1."""
+        import casadi
+
+        description = self._description
+        load = casadi.SX(description.n, 1)
+        if self._wrench:
+            J = jacobian(SymbolicTable.of(description), self._q)
+            load += J.T @ self._wrench_input["wrench"]
+        if self._friction is not None:
+            numbers = description.numbers
+            directions = [self._friction.direction(self._qd[i]) for i in range(description.n)]
+            coulomb = [(row[0], row[1]) for row in numbers.coulomb.tolist()]
+            load -= friction_torque(self._qd, numbers.viscous.tolist(), coulomb, directions)
+        return load
+
+    def _dynamics(
+        self,
+        name: str,
+        states: Mapping[str, casadi.SX],
+        outputs: Mapping[str, casadi.SX],
+        more: Mapping[str, casadi.SX] | None = None,
+    ) -> casadi.Function:
+        return _function(name, {**states, **self._load_symbols, **(more or {})}, outputs)
+
+    # Value semantics
+
+    def __reduce__(self) -> tuple[type[CasadiFunctions], tuple[Description, Friction | None, bool, bool]]:
+        return CasadiFunctions, (self._description, self._friction, self._payload, self._wrench)
+
+    def __repr__(self) -> str:
+        layers = [str(self._friction)] if self._friction is not None else []
+        layers += ["payload"] * self._payload + ["wrench"] * self._wrench
+        return f"<CasADi functions of {self._description.name}{': ' if layers else ''}{', '.join(layers)}>"
+
+
+def _function(name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]) -> casadi.Function:
+    import casadi
+
+    # Without "cse" CasADi would work out equal products twice.
+    expressions = [casadi.densify(casadi.SX(x)) for x in outputs.values()]
+    return casadi.Function(name, list(inputs.values()), expressions, list(inputs), list(outputs), {"cse": True})

@@ -1,0 +1,107 @@
+"""Kinetic and potential energy, and what follows from them alone: Lagrange's equations by differentiation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dhkit.symbolic.composite_bodies import link_velocities
+from dhkit.symbolic.inertial_table import InertialTable
+from dhkit.symbolic.joint_frames import stations
+from dhkit.symbolic.vectors import Scalar, Vector3, cross, dot
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = [
+    "kinetic_energy",
+    "lagrange_coriolis_matrix",
+    "lagrange_gravity_torque",
+    "lagrange_inverse_dynamics",
+    "lagrange_mass_matrix",
+    "lagrange_torque",
+    "potential_energy",
+]
+
+
+def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
+    """Return K, J, from the links' velocities; drives included.
+
+    Of each link half of m v^2 + w . (J w) + 2 v . (w x m c), v of the joint frame's origin (Siciliano et al., Robotics,
+    2009, section 7.1.1).
+    """
+    import casadi
+
+    made = stations(table, q)
+    twice: Scalar = casadi.SX(0)
+    for i, (station, (w, v)) in enumerate(zip(made, link_velocities(made, qd), strict=True)):
+        own = station.own
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = own.tensor
+        x, y, z = w
+        spinning = (yy + zz) * (x * x) + (xx + zz) * (y * y) + (xx + yy) * (z * z)
+        products = xy * (x * y) + xz * (x * z) + yz * (y * z)
+        carried = dot(v, cross(w, own.first))
+        twice += own.mass * dot(v, v) + spinning - 2 * products + 2 * carried + table.armature[i] * (qd[i] * qd[i])
+    return casadi.SX(twice / 2)
+
+
+def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
+    """Return V = -sum(m g . c), J, of the moving links; 0 where the world's origin is."""
+    import casadi
+
+    gravity: Vector3 = table.gravity
+    energy: Scalar = casadi.SX(table.potential)
+    height: Scalar = 0.0  # g . p of the joint's origin
+    for station in stations(table, q):
+        height = height + dot(gravity, station.lever)
+        gravity = station.to_link(station.to_approach(gravity))
+        energy -= station.own.mass * height + dot(gravity, station.own.first)
+    return casadi.SX(energy)
+
+
+def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
+    """Return M = d2K/dqd2, n x n."""
+    import casadi
+
+    qd = casadi.SX.sym("qd", table.n)
+    M: casadi.SX = casadi.hessian(kinetic_energy(table, q, qd), qd)[0]
+    return M
+
+
+def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
+    """Return the Christoffel C = (Mdot + A - A^T) / 2 with A = d(M qd)/dq, n x n.
+
+    Sum over k of (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2 (Siciliano et al. 2009, eq. 7.45).
+    """
+    import casadi
+
+    M = lagrange_mass_matrix(table, q)
+    rate = casadi.reshape(casadi.jtimes(casadi.vec(M), q, qd), table.n, table.n)
+    A = casadi.jacobian(M @ qd, q)
+    C: casadi.SX = (rate + A - A.T) / 2
+    return C
+
+
+def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
+    """Return g = dV/dq, n x 1."""
+    import casadi
+
+    g: casadi.SX = casadi.gradient(potential_energy(table, q), q)
+    return g
+
+
+def lagrange_inverse_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
+    """Return tau = M qdd + C qd + g, n x 1, from the matrices."""
+    M, C = lagrange_mass_matrix(table, q), lagrange_coriolis_matrix(table, q, qd)
+    tau: casadi.SX = M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
+    return tau
+
+
+def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
+    """Return tau = d/dt dL/dqd - dL/dq with L = K - V, n x 1: Lagrange's equations as they stand."""
+    import casadi
+
+    L = kinetic_energy(table, q, qd) - potential_energy(table, q)
+    momentum = casadi.gradient(L, qd)
+    along = casadi.vertcat(qd, qdd)
+    tau: casadi.SX = casadi.jtimes(momentum, casadi.vertcat(q, qd), along) - casadi.gradient(L, q)
+    return tau

@@ -1,0 +1,34 @@
+"""Readable equations: one collected form, printed as text, LaTeX, sympy objects, Python, C and MATLAB."""
+
+from dhkit.symbolic.equations.c_code import equations_c
+from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_text
+from dhkit.symbolic.equations.latex_document import latex_document
+from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
+from dhkit.symbolic.equations.notation import constants_of, generators_of, renamings, symbols_of
+from dhkit.symbolic.equations.python_code import equations_python
+from dhkit.symbolic.equations.quantities import QUANTITIES, Quantity, quantities
+from dhkit.symbolic.equations.sympy_objects import equations_sympy, sympy_object
+from dhkit.symbolic.equations.text import equations_text, plain_text
+
+__all__ = [
+    "QUANTITIES",
+    "Quantity",
+    "constant_latex",
+    "constants_of",
+    "displays",
+    "equations_c",
+    "equations_latex",
+    "equations_matlab",
+    "equations_python",
+    "equations_sympy",
+    "equations_text",
+    "generators_of",
+    "latex_document",
+    "latex_text",
+    "matlab_files",
+    "plain_text",
+    "quantities",
+    "renamings",
+    "symbols_of",
+    "sympy_object",
+]

@@ -1,0 +1,280 @@
+"""Equations in LaTeX (amsmath), which also converts to MathML without loss."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+
+from dhkit.symbolic.equations.collected import collected
+from dhkit.symbolic.equations.latex_document import escaped
+from dhkit.symbolic.equations.latex_names import latex_names
+from dhkit.symbolic.equations.latex_width import latex_width
+from dhkit.symbolic.equations.notation import (
+    Angle,
+    Notation,
+    angles_of,
+    entry_names,
+    generators_of,
+    notation,
+    renamings,
+    variables,
+)
+from dhkit.symbolic.equations.quantities import Quantity, check_length
+from dhkit.symbolic.equations.writing import Printer, decimal_text
+from dhkit.symbolic.ring import Element, Generator, Ring
+
+__all__ = ["LatexWriter", "constant_latex", "displays", "equations_latex", "latex_text"]
+
+LINE = 29.5
+"""What a line of an article's text holds, in em, of which some is kept for what the estimate of widths misses."""
+INDENT = r"\qquad "
+BREAK = "\n"
+"""Where a line may be broken, in front of a sign; outer ones are doubled."""
+FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2": r"\mathrm{atan2}"}
+ZEROS = 6
+"""Entries in a line that says that they are zero."""
+HEADS = {"tau": r"\tau"}
+WHOLE = {"M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
+"""Matrices and vectors with what they depend on, which also tells the vector g from the constant."""
+
+
+class LatexWriter:
+    """LaTeX; places where lines may be broken are marked."""
+
+    def __init__(self, names: Mapping[str, str], written: Notation) -> None:
+        self._names = names
+        self._notation = written
+
+    def symbol(self, name: str) -> str:  # noqa: D102 - see Writer
+        return self._names[self._notation(name)]
+
+    def variable(self, generator: Generator) -> str:  # noqa: D102
+        return variable_latex(generator.text)
+
+    def pi(self) -> str:  # noqa: D102
+        return r"\pi"
+
+    def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
+        inner = ", ".join(arguments).replace(BREAK, "")
+        if function == "sqrt":
+            return rf"\sqrt{{{inner}}}"
+        if function == "abs":
+            return rf"\left|{inner}\right|"
+        return f"{FUNCTIONS.get(function, chr(92) + function)}{_bracketed(inner)}"
+
+    def power(self, base: str, exponent: int) -> str:  # noqa: D102
+        function = re.match(r"(\\(?:sin|cos|tan))(?=[\\(])", base)
+        if function:
+            return f"{function[1]}^{{{exponent}}}{base[function.end() :]}"
+        return f"{base}^{{{exponent}}}" if not base.startswith("\\sqrt") else f"{_bracketed(base)}^{{{exponent}}}"
+
+    def brackets(self, inner: str) -> str:  # noqa: D102
+        return _bracketed(inner)
+
+    def product(self, coefficient: Fraction, above: Sequence[str], below: Sequence[str]) -> str:  # noqa: D102
+        decimal = decimal_text(coefficient)
+        number = _number(coefficient) if decimal is None else _scientific(decimal)
+        factors = list(above)
+        if below:
+            divisor = _without_brackets(below[0]) if len(below) == 1 else " ".join(below)
+            dividend = factors.pop(0) if factors else number
+            number = "" if dividend == number else number
+            factors[:0] = [rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}".replace(BREAK, "")]
+        if number and (number != "1" or not factors):
+            factors[:0] = [number + r"\,"] if decimal and factors else [number]
+        return _spaced(factors)
+
+    def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
+        signed = BREAK.join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
+        return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
+
+
+def variable_latex(text: str) -> str:
+    r"""Return a joint's variable in LaTeX: qdd1 is \ddot{q}_{1}, c23 is c_{23}."""
+    kind, number = re.fullmatch(r"(qdd|qd|q|s|c)(\d[\d_]*)", text).groups()  # type: ignore[union-attr]
+    symbol = {"qdd": r"\ddot{q}", "qd": r"\dot{q}"}.get(kind, kind)
+    return f"{symbol}_{{{number.replace('_', ',')}}}"
+
+
+def latex_text(element: Element) -> str:
+    r"""Return an element in LaTeX, in one line.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> print(latex_text(lagrangian(library_robot("planar2r")).M[1, 1]))
+    \tfrac{1}{3} m_{2} l_{2}^{2}
+    """
+    return _marked(element).replace(BREAK, "")
+
+
+def displays(quantities: Sequence[Quantity]) -> list[str]:
+    """Return displayed equations: a matrix where it fits a line, else entry by entry; then what c_{23} means.
+
+    Raises
+    ------
+    RingError
+        An entry is too long to be read.
+    """
+    check_length(quantities)
+    shown = [_matrix(quantity) or _entries(quantity) for quantity in quantities]
+    angles = angles_of(generators_of(_elements(quantities)))
+    return shown + ([_where(angles)] if angles else [])
+
+
+def equations_latex(quantities: Sequence[Quantity]) -> str:
+    """Return quantities in LaTeX, for a page that loads amsmath; see :func:`displays`."""
+    notes = [f"% {escaped(note)}" for note in renamings(_elements(quantities))]
+    return "\n".join([*displays(quantities), *notes]) + "\n"
+
+
+def constant_latex(ring: Ring, name: str) -> str:
+    """Return a constant's name in LaTeX."""
+    return _writer(ring).symbol(name)
+
+
+def _elements(quantities: Sequence[Quantity]) -> list[Element]:
+    return [element for quantity in quantities for element in quantity.elements.flat]
+
+
+def _marked(element: Element) -> str:
+    return Printer(element.ring.generators, _writer(element.ring)).sum(collected(element))
+
+
+@lru_cache(maxsize=64)
+def _writer(ring: Ring) -> LatexWriter:
+    written = notation(ring)
+    taken = {variable_latex(name) for name in variables(ring)} | {_head(name) for name in entry_names(ring.n)}
+    return LatexWriter(latex_names(written.names.values(), taken), written)
+
+
+def _matrix(quantity: Quantity) -> str:
+    """Return a matrix or a column in brackets, nothing where it is wider than a line or a mere number."""
+    if not quantity.elements.ndim:
+        return ""
+    table = quantity.elements.reshape(len(quantity.elements), -1)
+    if sum(len(element) for element in table.flat) > 40 * table.shape[1]:
+        return ""
+    rows = [[latex_text(element) for element in row] for row in table]
+    widths = [max(latex_width(row[k]) for row in rows) for k in range(table.shape[1])]
+    if sum(widths) + len(widths) + 6 > LINE:
+        return ""
+    body = " \\\\\n".join(" & ".join(row) for row in rows)
+    head = WHOLE.get(quantity.name) or HEADS[quantity.name]
+    return f"\\begin{{equation*}}\n{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}\n\\end{{equation*}}"
+
+
+def _entries(quantity: Quantity) -> str:
+    """Return entry by entry, broken over lines."""
+    lines: list[str] = []
+    entries = [(" = ".join(_head(name) for name in names), element) for names, element in quantity.entries]
+    room = LINE - max((latex_width(head) for head, _ in entries), default=0.0) - 1.5
+    for head, element in entries:
+        first, *more = _lines(_marked(element), room)
+        lines += [f"{head} &= {first}", *(f"&{INDENT}{line}" for line in more)]
+    zeros = [_head(name) for name in quantity.zeros]
+    if len(zeros) == 1:
+        lines.append(f"{zeros[0]} &= 0")
+    else:
+        rows = [" = ".join(zeros[k : k + ZEROS]) for k in range(0, len(zeros), ZEROS)]
+        lines += ["&" + row + " = 0" for row in rows]
+    body = " \\\\\n".join(lines)
+    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
+
+
+def _head(name: str) -> str:
+    letters, number = re.fullmatch(r"([A-Za-z]+)([\d_]*)", name).groups()  # type: ignore[union-attr]
+    return HEADS.get(letters, letters) + (f"_{{{number.replace('_', ',')}}}" if number else "")
+
+
+def _lines(marked: str, room: float) -> list[str]:
+    """Break a sum in front of terms, and inside those that are longer than a line."""
+    lines, line = [], ""
+    for term in _terms(marked):
+        whole = term.replace(BREAK, "")
+        if not line or latex_width(line + whole) <= room:
+            pieces = [whole] if latex_width(line + whole) <= room else term.split(BREAK)
+        elif latex_width(whole) <= room:
+            lines.append(line)
+            line, pieces = "", [whole]
+        else:
+            pieces = term.split(BREAK)
+        for piece in pieces:
+            if line and latex_width(line + piece) > room:
+                lines.append(line)
+                line = ""
+            line += piece
+    return [text.strip() for text in [*lines, line]]
+
+
+def _terms(marked: str) -> list[str]:
+    """Split a sum in front of the signs that stand in no brackets; other breaks stay marked."""
+    terms, depth = [], 0
+    for piece in marked.split(BREAK):
+        if depth == 0:
+            terms.append(piece)
+        else:
+            terms[-1] += BREAK + piece
+        depth += piece.count("(") - piece.count(")")
+    return terms
+
+
+def _where(angles: Sequence[Angle]) -> str:
+    """Return what the sines and cosines are of."""
+    own = [r"s_{i} = \sin(q_{i})", r"c_{i} = \cos(q_{i})"] if any(len(angle.joints) == 1 for angle in angles) else []
+    sums = [
+        f"{variable_latex(angle.name)} = \\{angle.function}({' + '.join(f'q_{{{j + 1}}}' for j in angle.joints)})"
+        for angle in angles
+        if len(angle.joints) > 1
+    ]
+    lines: list[str] = []
+    for definition in own + sums:
+        if lines and latex_width(f"{lines[-1]},{INDENT}{definition}") <= LINE:
+            lines[-1] += f",{INDENT}{definition}"
+        else:
+            lines.append(f"&{definition}")
+    return "\\begin{align*}\n" + ", \\\\\n".join(lines) + "\n\\end{align*}"
+
+
+def _spaced(factors: Sequence[str]) -> str:
+    """Return factors side by side, names of several letters a little apart."""
+    text = factors[0]
+    for before, factor in pairwise(factors):
+        is_word = any(name.startswith((r"\mathrm", r"\mathit")) for name in (before, factor))
+        text += (r"\, " if is_word else " ") + factor
+    return text
+
+
+def _number(value: Fraction) -> str:
+    if value.denominator == 1:
+        return str(value.numerator)
+    return rf"\tfrac{{{value.numerator}}}{{{value.denominator}}}"
+
+
+def _scientific(decimal: str) -> str:
+    mantissa, _, exponent = decimal.partition("e")
+    return rf"{mantissa}\times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def _bracketed(inner: str) -> str:
+    """Return brackets as large as what they hold, which lines may be broken in."""
+    if "\\bigl(" in inner:
+        return rf"\Bigl({inner}\Bigr)"
+    return rf"\bigl({inner}\bigr)" if "(" in inner or "frac" in inner else f"({inner})"
+
+
+def _without_brackets(text: str) -> str:
+    """Return what stands in brackets, if they are around all of a text."""
+    match = re.fullmatch(r"(?:\\[bB]igl)?\((.*?)(?:\\[bB]igr)?\)", text, re.DOTALL)
+    if match is None:
+        return text
+    depth = 0
+    for sign in re.findall(r"[()]", match[1]):
+        depth += 1 if sign == "(" else -1
+        if depth < 0:
+            return text
+    return match[1]

@@ -1,0 +1,34 @@
+"""A page of LaTeX around equations."""
+
+from __future__ import annotations
+
+import re
+
+__all__ = ["escaped", "latex_document"]
+
+PREAMBLE = r"""\documentclass[11pt]{article}
+\usepackage{amsmath}
+\allowdisplaybreaks
+\setcounter{MaxMatrixCols}{40}
+\begin{document}
+"""
+
+
+def latex_document(equations: str, title: str) -> str:
+    """Return a page of LaTeX that shows equations.
+
+    Parameters
+    ----------
+    equations
+        What :func:`equations_latex` returns.
+    title
+        Plain text.
+    """
+    return f"{PREAMBLE}\\section*{{{escaped(title)}}}\n{equations}\\end{{document}}\n"
+
+
+def escaped(text: str) -> str:
+    """Return plain text for LaTeX, printable ASCII alone."""
+    spelled = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    printable = re.sub(r"[^ -~]", "?", text)
+    return "".join(spelled.get(x, f"\\{x}" if x in "&%$#_{}" else x) for x in printable)

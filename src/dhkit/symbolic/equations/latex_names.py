@@ -1,0 +1,90 @@
+r"""Names in LaTeX: m_{2}, I_{xx,2}, \theta_{1}; no two names look alike."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+__all__ = ["greek", "latex_names", "literal"]
+
+LETTERS = """
+    alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi
+    omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega
+"""
+GREEK = frozenset(LETTERS.split())
+AXES = re.compile(r"([A-Za-z])([xyz]{2})(\d*)")
+MOMENT = re.compile(r"(r)([xyz])(\d+)")
+REGROUPED = re.compile(r"([MXYZ][XYZ]|Ia)(\d+)")
+HEAD = re.compile(r"([A-Za-z]*?)(\d*)")
+LETTER = re.compile(r"([A-Za-z])([a-z]?)(\d*)")
+
+
+def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
+    """Return for each name what it is in LaTeX.
+
+    Parameters
+    ----------
+    names
+        Names of constants.
+    taken
+        LaTeX that already means something: a name that would come out as it, or as another name does, is spelled
+        letter by letter.
+    """
+    listed = list(names)
+    used, written = set(taken), {}
+    counts: dict[str, int] = {}
+    for name in listed:
+        counts[nice(name)] = counts.get(nice(name), 0) + 1
+    for name in listed:
+        wanted = nice(name)
+        written[name] = wanted if counts[wanted] == 1 and wanted not in used else literal(name)
+    return written
+
+
+def nice(name: str) -> str:
+    """Return a name as it is typeset in books."""
+    if match := AXES.fullmatch(name):
+        letter, axes, number = match.groups()
+        return f"{letter}_{{{axes}{',' + number if number else ''}}}"
+    if match := MOMENT.fullmatch(name):
+        return "{}_{{{}{}}}".format(*match.groups())
+    if match := REGROUPED.fullmatch(name):
+        return r"\mathit{{{}}}_{{{}}}".format(*match.groups())
+    head, *subscripts = name.split("_")
+    if not head or not all(subscripts):
+        return literal(name)
+    letters, number = HEAD.fullmatch(head).groups() if HEAD.fullmatch(head) else ("", "")  # type: ignore[union-attr]
+    if not letters:
+        return literal(name)
+    base, below = _base(letters)
+    scripts = [below + number] if below + number else []
+    scripts += [_word(part) for part in subscripts]
+    return base + (f"_{{{','.join(scripts)}}}" if scripts else "")
+
+
+def greek(name: str) -> str | None:
+    """Return a Greek letter's command, or nothing."""
+    return f"\\{name}" if name in GREEK else None
+
+
+def literal(name: str) -> str:
+    """Return a name as it is typed, in upright letters."""
+    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+
+
+def _base(letters: str) -> tuple[str, str]:
+    """Split letters into a symbol and what stands below it: l and c of lc."""
+    if command := greek(letters):
+        return command, ""
+    if len(letters) == 1:
+        return letters, ""
+    if LETTER.fullmatch(letters):
+        return letters[0], letters[1]
+    return rf"\mathrm{{{letters}}}", ""
+
+
+def _word(part: str) -> str:
+    match = HEAD.fullmatch(part)
+    if match and greek(match[1]):
+        return greek(match[1]) + (f" {match[2]}" if match[2] else "")  # type: ignore[operator]
+    return part if len(part) == 1 or part.isdecimal() or LETTER.fullmatch(part) else rf"\mathrm{{{part}}}"

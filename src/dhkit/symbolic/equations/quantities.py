@@ -1,0 +1,105 @@
+"""What is printed: M, C, h, g, tau, K and V of a Lagrangian, entry by entry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dhkit.symbolic.equations.notation import entry_name
+from dhkit.symbolic.ring import Element, Elements, RingError
+
+if TYPE_CHECKING:
+    from dhkit.symbolic.lagrangian import Lagrangian
+
+__all__ = ["MOST_TERMS", "QUANTITIES", "Quantity", "check_length", "quantities"]
+
+QUANTITIES = {
+    "M": "mass matrix",
+    "C": "Coriolis matrix",
+    "h": "Coriolis and centrifugal torques",
+    "g": "gravity torques",
+    "tau": "joint torques",
+    "K": "kinetic energy",
+    "V": "potential energy",
+}
+"""What can be printed, with its name in words."""
+MOST_TERMS = 2_000
+"""Terms of an entry that people are asked to read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A matrix, a vector or a number, to be printed.
+
+    Attributes
+    ----------
+    name
+        One of :data:`QUANTITIES`.
+    elements
+        Shape (n, n), (n,) or ().
+    """
+
+    name: str
+    elements: Elements
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether entries stand for each other: those of the mass matrix do."""
+        return self.name == "M"
+
+    @property
+    def entries(self) -> Iterator[tuple[tuple[str, ...], Element]]:
+        """Entries that are not zero, each with its names, counted from 1: M12 and M21."""
+        for place, element in np.ndenumerate(self.elements):
+            if element and not (self.is_symmetric and place[0] > place[1]):
+                mirrored = [place] if not self.is_symmetric or place[0] == place[1] else [place, place[::-1]]
+                yield tuple(self.head(p) for p in mirrored), element
+
+    @property
+    def zeros(self) -> list[str]:
+        """The names of the entries that are zero."""
+        return [self.head(place) for place, element in np.ndenumerate(self.elements) if not element]
+
+    def head(self, place: tuple[int, ...]) -> str:
+        """Return an entry's name."""
+        return entry_name(self.name, place)
+
+
+def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
+    """Return quantities of a Lagrangian by name; several in one text stand apart by commas or spaces.
+
+    Raises
+    ------
+    ValueError
+        No such quantity, or none at all.
+    """
+    names = what.replace(",", " ").split() if isinstance(what, str) else list(what)
+    unknown = [name for name in names if name not in QUANTITIES]
+    if unknown or not names:
+        raise ValueError(f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}")
+    found = []
+    for name in dict.fromkeys(names):
+        array = np.empty(np.shape(getattr(lag, name)), dtype=object)
+        array[...] = getattr(lag, name)
+        found.append(Quantity(name, array))
+    return found
+
+
+def check_length(quantities: Sequence[Quantity]) -> None:
+    """Refuse what nobody could read.
+
+    Raises
+    ------
+    RingError
+        An entry has more than :data:`MOST_TERMS` terms.
+    """
+    for quantity in quantities:
+        for place, element in np.ndenumerate(quantity.elements):
+            if len(element) > MOST_TERMS:
+                raise RingError(
+                    f"{quantity.head(place)} has {len(element)} terms, more than the {MOST_TERMS} that text and LaTeX "
+                    "print; code (python, c, matlab) has no limit, and symbols='none' or the compact form is shorter"
+                )

@@ -1,0 +1,149 @@
+"""Equations as plain text, which people read and :func:`dhkit.expressions.parse` reads back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+
+from dhkit.symbolic.equations.collected import collected
+from dhkit.symbolic.equations.notation import Notation, angles_of, generators_of, notation, renamings
+from dhkit.symbolic.equations.quantities import Quantity, check_length
+from dhkit.symbolic.equations.writing import Printer, decimal_text
+from dhkit.symbolic.ring import Element, Generator
+
+__all__ = ["TextWriter", "equations_text", "plain_text"]
+
+WIDTH = 100
+"""Columns of a line."""
+INDENT = "      "
+SHOWN = 12
+"""Terms that are shown of an element too long to read."""
+READABLE = 2_000
+"""Terms of the longest element that is collected for a message."""
+
+
+class TextWriter:
+    """Text with ``*``, ``/`` and ``^``."""
+
+    def __init__(self, names: Notation) -> None:
+        self._names = names
+
+    def symbol(self, name: str) -> str:  # noqa: D102 - see Writer
+        return self._names(name)
+
+    def variable(self, generator: Generator) -> str:  # noqa: D102
+        return generator.text
+
+    def pi(self) -> str:  # noqa: D102
+        return "pi"
+
+    def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
+        return f"{function}({', '.join(arguments)})"
+
+    def power(self, base: str, exponent: int) -> str:  # noqa: D102
+        return f"{base}^{exponent}"
+
+    def brackets(self, inner: str) -> str:  # noqa: D102
+        return f"({inner})"
+
+    def product(self, coefficient: Fraction, above: Sequence[str], below: Sequence[str]) -> str:  # noqa: D102
+        decimal = decimal_text(coefficient)
+        if decimal is not None:
+            factors, divisors = [decimal, *above], list(below)
+        else:
+            factors = [str(coefficient.numerator), *above] if coefficient.numerator != 1 or not above else list(above)
+            divisors = [str(coefficient.denominator), *below] if coefficient.denominator != 1 else list(below)
+        return "*".join(factors) + "".join(f"/{divisor}" for divisor in divisors)
+
+    def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
+        signed = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
+        return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
+
+
+def plain_text(element: Element) -> str:
+    """Return an element as text; of one too long to be read the first terms and how many there are.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> plain_text(lagrangian(library_robot("planar2r")).M[0, 0])
+    'm1*l1^2/3 + m2*(l1^2 + l2^2/3 + l1*l2*c2)'
+    """
+    ring = element.ring
+    printer = Printer(ring.generators, TextWriter(notation(ring)))
+    if len(element) <= READABLE:
+        return printer.sum(collected(element))
+    first = dict(list(element.terms.items())[:SHOWN])
+    return f"{printer.sum(collected(ring.from_terms(first)))} + ... ({len(element)} terms)"
+
+
+def equations_text(quantities: Sequence[Quantity]) -> str:
+    """Return quantities as text, an entry after the other, and what the sines and cosines in them are of.
+
+    Raises
+    ------
+    RingError
+        An entry is too long to be read.
+    """
+    check_length(quantities)
+    blocks = ["\n".join(_entry_lines(quantity)) for quantity in quantities]
+    elements = [element for quantity in quantities for element in quantity.elements.flat]
+    angles = [f"{angle.name} = {angle.function}({angle.text})" for angle in angles_of(generators_of(elements))]
+    if angles:
+        blocks.append("\n".join(_filled("where ", angles)))
+    if notes := renamings(elements):
+        blocks.append("\n".join(f"note: {note}" for note in notes))
+    return "\n\n".join(blocks)
+
+
+def _entry_lines(quantity: Quantity) -> list[str]:
+    lines: list[str] = []
+    for heads, element in quantity.entries:
+        lines += _broken(f"{' = '.join(heads)} = ", plain_text(element))
+    if zeros := quantity.zeros:
+        lines += _filled("", [f"{head} =" for head in zeros], "0", separator=" ")
+    return lines
+
+
+def _broken(head: str, text: str) -> list[str]:
+    """Break a line in front of terms, and inside those that are longer than a line."""
+    lines, line = [], head
+    for term in _terms(text):
+        room = WIDTH - len(line)
+        if len(term) <= room:
+            line += term
+        elif len(INDENT) + len(term) <= WIDTH and line != head:
+            lines.append(line)
+            line = INDENT + term.lstrip()
+        else:
+            for piece in re.split(r"(?= [+-] )", term):
+                if len(line) + len(piece) > WIDTH:
+                    lines.append(line)
+                    line = INDENT + piece.lstrip()
+                else:
+                    line += piece
+    return [*lines, line]
+
+
+def _terms(text: str) -> list[str]:
+    """Split a sum in front of the signs that stand in no brackets."""
+    terms, depth = [""], 0
+    for piece in re.split(r"(?= [+-] )", text):
+        if depth == 0:
+            terms.append("")
+        terms[-1] += piece
+        depth += piece.count("(") - piece.count(")")
+    return [term for term in terms if term]
+
+
+def _filled(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
+    lines, line = [], head + words[0]
+    for word in [*words[1:], *([tail] if tail else [])]:
+        if len(line) + len(separator) + len(word) > WIDTH:
+            lines.append(line + separator.rstrip())
+            line = INDENT + word
+        else:
+            line += separator + word
+    return [*lines, line]

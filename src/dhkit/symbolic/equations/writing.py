@@ -1,0 +1,147 @@
+"""One walk over collected equations and over the expressions of constants, for every kind of output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from decimal import Context, Decimal
+from fractions import Fraction
+from typing import Generic, Protocol, TypeVar
+
+from dhkit.expressions import Atom, Expression
+from dhkit.symbolic.equations.collected import Powers, Product, is_reciprocal
+from dhkit.symbolic.ring import Generator
+
+__all__ = ["Printer", "Writer", "decimal_text", "is_name"]
+
+T = TypeVar("T")
+
+SHORT = 16
+"""Fractions of numbers up to this are printed as such (1/12), others as decimals where they end (0.4318)."""
+DIGITS = 1000
+
+
+class Writer(Protocol[T]):
+    """What a kind of output makes of each piece of an equation."""
+
+    def symbol(self, name: str) -> T:
+        """Return a constant by its name."""
+
+    def variable(self, generator: Generator) -> T:
+        """Return a joint's value, rate or acceleration, or a sine or cosine."""
+
+    def pi(self) -> T:
+        """Return the number pi."""
+
+    def call(self, function: str, arguments: Sequence[T]) -> T:
+        """Return a function of :data:`dhkit.expressions.FUNCTIONS`."""
+
+    def power(self, base: T, exponent: int) -> T:
+        """Return a power of a symbol, a variable, a call or brackets; the exponent is 2 or more."""
+
+    def brackets(self, inner: T) -> T:
+        """Return a sum as a factor."""
+
+    def product(self, coefficient: Fraction, above: Sequence[T], below: Sequence[T]) -> T:
+        """Return a number above 0 times factors, divided by others."""
+
+    def total(self, terms: Sequence[tuple[bool, T]]) -> T:
+        """Return the sum of terms, each with whether it is subtracted."""
+
+
+class Printer(Generic[T]):
+    """Writes collected sums of one ring.
+
+    Parameters
+    ----------
+    generators
+        Those of the ring.
+    writer
+        The kind of output.
+    constant
+        What a constant that is neither a name nor a reciprocal is written as, where that is not its meaning in full.
+    """
+
+    def __init__(
+        self, generators: Sequence[Generator], writer: Writer[T], constant: Callable[[Generator], T] | None = None
+    ) -> None:
+        self.writer = writer
+        self._constant = constant or (lambda generator: self._atom_like(generator))
+        self._is_below = [is_reciprocal(generator) for generator in generators]
+        self._generators = generators
+        self._written: dict[int, T] = {}
+
+    def sum(self, products: Iterable[Product]) -> T:
+        """Return a sum."""
+        terms = [(product.coefficient < 0, self.product(product)) for product in products]
+        return self.writer.total(terms or [(False, self.writer.product(Fraction(0), [], []))])
+
+    def product(self, product: Product) -> T:
+        """Return a product without its sign."""
+        writer = self.writer
+        above = self._powers(product.powers, below=False)
+        if product.factor:
+            above.append(writer.brackets(self.sum(product.factor)))
+        if len(product.motion) > 1:
+            above.append(writer.brackets(self.sum(product.motion)))
+        elif product.motion:
+            above += self._powers(product.motion[0].powers, below=False)
+        return writer.product(abs(product.coefficient), above, self._powers(product.powers, below=True))
+
+    def expression(self, expression: Expression) -> T:
+        """Return an expression of constants."""
+        writer, terms = self.writer, []
+        for monomial, coefficient in expression.terms:
+            above = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
+            below = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
+            terms.append((coefficient < 0, writer.product(abs(coefficient), above, below)))
+        return writer.total(terms or [(False, writer.product(Fraction(0), [], []))])
+
+    def atom(self, atom: Atom) -> T:
+        """Return a name, pi or a function."""
+        if atom.name == "group":
+            return self.writer.brackets(self.expression(atom.arguments[0]))
+        if atom.arguments:
+            return self.writer.call(atom.name, [self.expression(argument) for argument in atom.arguments])
+        return self.writer.pi() if atom.name == "pi" else self.writer.symbol(atom.name)
+
+    def _powers(self, powers: Powers, *, below: bool) -> list[T]:
+        return [self._power(self._generator(k), e) for k, e in powers if self._is_below[k] == below]
+
+    def _power(self, base: T, exponent: int) -> T:
+        return base if exponent == 1 else self.writer.power(base, exponent)
+
+    def _generator(self, place: int) -> T:
+        """Return a generator; of a reciprocal what it is the reciprocal of."""
+        if place not in self._written:
+            generator = self._generators[place]
+            if generator.kind != "constant":
+                self._written[place] = self.writer.variable(generator)
+            elif self._is_below[place] or is_name(generator):
+                self._written[place] = self._atom_like(generator)
+            else:
+                self._written[place] = self._constant(generator)
+        return self._written[place]
+
+    def _atom_like(self, generator: Generator) -> T:
+        meaning = generator.meaning
+        if meaning is None or is_name(generator):
+            return self.writer.symbol(generator.text)
+        if len(meaning.terms) == 1 and len(meaning.terms[0][0]) == 1 and meaning.terms[0][1] == 1:
+            return self.atom(meaning.terms[0][0][0][0])
+        return self.writer.brackets(self.expression(meaning))
+
+
+def decimal_text(value: Fraction) -> str | None:
+    """Return a rational's decimal, exactly; None of a short fraction, or where the decimal does not end."""
+    denominator = value.denominator
+    for prime in (2, 5):
+        while denominator % prime == 0:
+            denominator //= prime
+    if denominator != 1 or max(value.numerator, value.denominator) <= SHORT:
+        return None
+    return str(Context(prec=DIGITS).divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
+
+
+def is_name(generator: Generator) -> bool:
+    """Whether a constant is written by its name."""
+    return generator.meaning is None or generator.meaning.text in generator.meaning.symbols

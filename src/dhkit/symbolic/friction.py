@@ -1,0 +1,75 @@
+"""Joint friction: viscous, and dry friction that differs by direction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dhkit.symbolic.vectors import Scalar
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["Friction", "friction_torque"]
+
+
+@dataclass(frozen=True)
+class Friction:
+    """How dry friction changes with the direction of motion.
+
+    With width 0 it is a step, 0 at rest. Otherwise it is smooth: with s = v / sqrt(v^2 + width^2) the torque is
+    (c_pos - c_neg) / 2 s + (c_pos + c_neg) / 2 s^2, which tends to c_pos and c_neg far from 0 and takes energy at every
+    speed.
+
+    Raises
+    ------
+    ValueError
+        A width that is negative or not finite.
+    """
+
+    width: float = 0.0
+    """rad/s or m/s."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.width) and self.width >= 0):
+            raise ValueError(f"friction: width is {self.width!r}; expected a finite number, 0 or more")
+
+    def direction(self, speed: Scalar) -> Scalar:
+        """Return which way an expression goes: -1 to 1."""
+        import casadi
+
+        return smooth_direction(speed, self.width) if self.width else casadi.sign(speed)
+
+
+def smooth_direction(speed: Scalar, width: Scalar) -> Scalar:
+    """Return v / sqrt(v^2 + width^2)."""
+    import casadi
+
+    return speed / casadi.sqrt(speed * speed + width * width)
+
+
+def friction_torque(
+    qd: casadi.SX, viscous: Sequence[Scalar], coulomb: Sequence[tuple[Scalar, Scalar]], directions: Sequence[Scalar]
+) -> casadi.SX:
+    """Return the torques that friction takes, n x 1: viscous qd, and c_pos against positive, c_neg against negative.
+
+    Parameters
+    ----------
+    qd
+        Joint rates, n x 1.
+    viscous, coulomb
+        Joint side, of each joint; c_neg is at most 0.
+    directions
+        Of each joint -1 to 1; see :class:`Friction`.
+    """
+    import casadi
+
+    torques = []
+    for i, s in enumerate(directions):
+        positive, negative = coulomb[i]
+        dry = (positive - negative) / 2 * s + (positive + negative) / 2 * (s * s)
+        torques.append(viscous[i] * qd[i] + dry)
+    stacked: casadi.SX = casadi.vertcat(*torques)
+    return stacked

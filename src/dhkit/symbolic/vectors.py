@@ -1,0 +1,91 @@
+"""Three numbers at a time: floats, exact fractions or CasADi expressions, one text for all of them.
+
+Plain tuples in place of CasADi's matrices: a product with an exact 0 or 1 disappears before it becomes an expression.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+__all__ = ["Scalar", "Vector3", "about_x", "about_x_back", "about_z", "about_z_back", "cross", "dot", "plus", "times"]
+
+Scalar: TypeAlias = Any
+"""A float, a Fraction, or an expression (1 x 1)."""
+Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]
+
+NUMBER = (float, int)
+
+
+def plus(a: Vector3, b: Vector3) -> Vector3:
+    """Return a + b."""
+    return _sum(a[0], b[0]), _sum(a[1], b[1]), _sum(a[2], b[2])
+
+
+def times(k: Scalar, a: Vector3) -> Vector3:
+    """Return k a."""
+    return _product(k, a[0]), _product(k, a[1]), _product(k, a[2])
+
+
+def dot(a: Vector3, b: Vector3) -> Scalar:
+    """Return a . b."""
+    return _sum(_sum(_product(a[0], b[0]), _product(a[1], b[1])), _product(a[2], b[2]))
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Return a x b."""
+    return (
+        _difference(_product(a[1], b[2]), _product(a[2], b[1])),
+        _difference(_product(a[2], b[0]), _product(a[0], b[2])),
+        _difference(_product(a[0], b[1]), _product(a[1], b[0])),
+    )
+
+
+def about_z(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
+    """Return Rz a, for the angle's cosine and sine."""
+    return (*_turned(c, s, a[0], a[1]), a[2])
+
+
+def about_z_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
+    """Return Rz^T a."""
+    y, x = _turned(c, s, a[1], a[0])
+    return x, y, a[2]
+
+
+def about_x(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
+    """Return Rx a."""
+    return (a[0], *_turned(c, s, a[1], a[2]))
+
+
+def about_x_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
+    """Return Rx^T a."""
+    z, y = _turned(c, s, a[2], a[1])
+    return a[0], y, z
+
+
+def _turned(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    return _difference(_product(c, x), _product(s, y)), _sum(_product(s, x), _product(c, y))
+
+
+# CasADi drops zeros as well, but takes a hundred times as long to be asked.
+
+
+def _product(a: Scalar, b: Scalar) -> Scalar:
+    for x, y in ((a, b), (b, a)):
+        if isinstance(x, NUMBER):
+            if x == 0:
+                return x
+            if x == 1:
+                return y
+    return a * b
+
+
+def _sum(a: Scalar, b: Scalar) -> Scalar:
+    if isinstance(a, NUMBER) and a == 0:
+        return b
+    return a if isinstance(b, NUMBER) and b == 0 else a + b
+
+
+def _difference(a: Scalar, b: Scalar) -> Scalar:
+    if isinstance(b, NUMBER) and b == 0:
+        return a
+    return -b if isinstance(a, NUMBER) and a == 0 else a - b

@@ -1,0 +1,145 @@
+"""Our own kinematics and dynamics against Pinocchio's, over random states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from dhkit import dynamics, kinematics
+from dhkit.description import Array, Description
+from dhkit.errors import DescriptionError
+from dhkit.model import pinocchio_model
+from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error
+from dhkit.verification.reference import Reference
+from dhkit.verification.report import Agreement, VerificationReport
+from dhkit.verification.states import Motion, random_motions
+
+__all__ = ["Comparison", "largest", "verify", "worst"]
+
+FRAME_TOLERANCE = 1e-13
+"""Of positions over the reach (at least 1 m) and of rotation entries: some hundred roundings."""
+JACOBIAN_TOLERANCE = 1e-12
+"""Of Jacobian entries, the linear ones over the reach (at least 1 m)."""
+
+
+class Comparison(NamedTuple):
+    """A quantity, its error at each state, shape (N,), what is tolerated there, and how much of the state it takes."""
+
+    quantity: str
+    errors: Array
+    tolerance: Array | float
+    vectors: int = 1
+    """1: q alone; 2: qd too; 3: qdd too."""
+
+
+def verify(description: Description, samples: int = 1000, seed: int = 0) -> VerificationReport:
+    """Hold our kinematics and dynamics against Pinocchio's, computed from the URDF that dhkit writes.
+
+    Frames, Jacobians, M, C, C qd, g, inverse and forward dynamics, energies and the regressor, on random states inside
+    the limits. Dynamics need a body on every link; forward dynamics an M that is not singular.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    samples, seed
+        How many random states, from which seed.
+
+    Returns
+    -------
+    VerificationReport
+        The worst error of each quantity, and where; ``.ok``.
+
+    Raises
+    ------
+    ModelError
+        Pinocchio is not installed, or refuses the model.
+    ValueError
+        ``samples`` is below 1.
+    """
+    motion = random_motions(description, samples, seed)
+    reference = Reference(pinocchio_model(description), motion)
+    comparisons = list(_kinematics(description, reference))
+    notes: list[str] = []
+    missing = [joint.name for joint in description.joints if joint.body is None]
+    if missing:
+        notes.append(f"dynamics not compared: no body on {', '.join(missing)}")
+    else:
+        comparisons += _dynamics(description, reference, notes)
+    import pinocchio as pin
+
+    return VerificationReport(
+        robot=description.name,
+        reference=f"Pinocchio {pin.__version__}",
+        samples=samples,
+        seed=seed,
+        agreements=tuple(worst(comparison, motion) for comparison in comparisons),
+        notes=tuple(notes),
+    )
+
+
+def worst(comparison: Comparison, motion: Motion) -> Agreement:
+    """Return the state where the error is largest, measured by what is tolerated there; NaN is the largest."""
+    quantity, errors, tolerance, vectors = comparison
+    tolerances = np.broadcast_to(tolerance, errors.shape)
+    k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors / tolerances)))
+    state = (tuple(map(float, vector[k])) for vector in motion[:vectors])
+    return Agreement(quantity, float(errors[k]), float(tolerances[k]), *state)
+
+
+def _kinematics(description: Description, reference: Reference) -> Iterator[Comparison]:
+    q, reach = reference.motion.q, max(1.0, description.reach)
+    ours = np.concatenate(
+        [kinematics.frames(description, q), kinematics.forward_kinematics(description, q)[:, None]], axis=1
+    )
+    theirs = reference.frames([*(f"dh{i}" for i in range(description.n + 1)), "tool"])
+    yield Comparison("frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / reach, FRAME_TOLERANCE)
+    yield Comparison("frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), FRAME_TOLERANCE)
+    for frame in ("world", "tool"):
+        J = kinematics.jacobian(description, q, frame)
+        difference = J - reference.jacobian("tool", in_world=frame == "world")
+        error = np.maximum(largest(difference[:, :3]) / reach, largest(difference[:, 3:]))
+        yield Comparison(f"Jacobian ({frame})", error, JACOBIAN_TOLERANCE)
+
+
+def _dynamics(description: Description, reference: Reference, notes: list[str]) -> Iterator[Comparison]:
+    q, qd, qdd = reference.motion
+    M, C, g, tau = (
+        reference.mass_matrix(),
+        reference.coriolis_matrix(),
+        reference.gravity_torque(),
+        reference.inverse_dynamics(),
+    )
+    floors = Floors.of(description, M, qd, qdd, tau)
+    ours = dynamics.coriolis_matrix(description, q, qd)
+    products = np.einsum("nij,nj->ni", C, qd)
+    yield _relative("mass matrix M", dynamics.mass_matrix(description, q), M)
+    yield _relative("Coriolis matrix C", ours, C, floors.C, vectors=2)
+    yield _relative("C qd", np.einsum("nij,nj->ni", ours, qd), products, floors.h, vectors=2)
+    yield _relative("gravity torque g", dynamics.gravity_torque(description, q), g, floors.g)
+    yield _relative("bias C qd + g", dynamics.bias(description, q, qd), products + g, floors.bias, vectors=2)
+    inverse = dynamics.inverse_dynamics(description, q, qd, qdd)
+    yield _relative("inverse dynamics tau", inverse, tau, floors.tau, vectors=3)
+    try:
+        ours = dynamics.forward_dynamics(description, q, qd, tau)
+    except DescriptionError as error:
+        notes.append(f"forward dynamics not compared: {error}")
+    else:
+        apart = relative_error(ours, reference.forward_dynamics(tau), floors.qdd)
+        yield Comparison("forward dynamics qdd", apart, forward_tolerance(M), 3)
+    K, V = dynamics.kinetic_energy(description, q, qd), dynamics.potential_energy(description, q)
+    yield _relative("kinetic energy K", K, reference.kinetic_energy(), floors.h, vectors=2)
+    yield _relative("potential energy V", V, reference.potential_energy(), floors.g)
+    Y = dynamics.regressor(description, q, qd, qdd)
+    yield _relative("regressor Y", Y, reference.regressor(), vectors=3)
+
+
+def _relative(quantity: str, ours: Array, theirs: Array, floor: Array | float = 0.0, vectors: int = 1) -> Comparison:
+    return Comparison(quantity, relative_error(ours, theirs, floor), TOLERANCE, vectors)
+
+
+def largest(difference: Array) -> Array:
+    """Return the largest entry of each state, shape (N,)."""
+    return np.asarray(np.abs(difference).reshape(len(difference), -1).max(axis=1))

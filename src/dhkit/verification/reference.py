@@ -1,0 +1,138 @@
+"""Pinocchio's kinematics and dynamics at many states, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.model import PinocchioModel
+from dhkit.verification.states import Motion
+
+__all__ = ["Reference"]
+
+
+class Reference:
+    """A Pinocchio model asked at many states; every answer has the states as its first axis."""
+
+    def __init__(self, model: PinocchioModel, motion: Motion) -> None:
+        self.model = model
+        self.motion = motion
+        self._data = model.createData()
+
+    def frames(self, names: Sequence[str]) -> Array:
+        """Return frames in the world, shape (N, names, 4, 4)."""
+        import pinocchio as pin
+
+        ids = [self.model.getFrameId(name) for name in names]
+
+        def placements(q: Array, qd: Array, qdd: Array) -> Array:
+            pin.framesForwardKinematics(self.model, self._data, q)
+            return np.array([self._data.oMf[i].homogeneous for i in ids])
+
+        return self._each(placements, (len(ids), 4, 4))
+
+    def jacobian(self, name: str, *, in_world: bool) -> Array:
+        """Return a frame's Jacobian at its origin, in the world's axes or its own, shape (N, 6, n)."""
+        import pinocchio as pin
+
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED if in_world else pin.ReferenceFrame.LOCAL
+        frame = self.model.getFrameId(name)
+        return self._each(
+            lambda q, qd, qdd: pin.computeFrameJacobian(self.model, self._data, q, frame, axes), (6, self.n)
+        )
+
+    def mass_matrix(self) -> Array:
+        """Return M, shape (N, n, n)."""
+        import pinocchio as pin
+
+        M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
+        upper = np.triu(M)
+        symmetric: Array = upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill the upper triangle alone
+        return symmetric
+
+    def coriolis_matrix(self) -> Array:
+        """Return the Christoffel C, shape (N, n, n)."""
+        import pinocchio as pin
+
+        return self._each(lambda q, qd, qdd: pin.computeCoriolisMatrix(self.model, self._data, q, qd), (self.n, self.n))
+
+    def gravity_torque(self) -> Array:
+        """Return g, shape (N, n)."""
+        import pinocchio as pin
+
+        return self._each(lambda q, qd, qdd: pin.computeGeneralizedGravity(self.model, self._data, q), (self.n,))
+
+    def inverse_dynamics(self) -> Array:
+        """Return tau, shape (N, n)."""
+        import pinocchio as pin
+
+        return self._each(lambda q, qd, qdd: pin.rnea(self.model, self._data, q, qd, qdd), (self.n,))
+
+    def forward_dynamics(self, tau: Array) -> Array:
+        """Return the accelerations that torques (N, n) cause, shape (N, n)."""
+        import pinocchio as pin
+
+        torques = iter(tau)
+        return self._each(lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,))
+
+    def kinetic_energy(self) -> Array:
+        """Return K, shape (N,)."""
+        import pinocchio as pin
+
+        return self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
+
+    def potential_energy(self) -> Array:
+        """Return V, shape (N,)."""
+        import pinocchio as pin
+
+        return self._each(lambda q, qd, qdd: pin.computePotentialEnergy(self.model, self._data, q), ())
+
+    def regressor(self) -> Array:
+        """Return the torques' regressor in the parameters of each DH frame, shape (N, n, 10 n).
+
+        Pinocchio's parameters are those of its own joint frames, in its own order.
+        """
+        import pinocchio as pin
+
+        Y = self._each(
+            lambda q, qd, qdd: pin.computeJointTorqueRegressor(self.model, self._data, q, qd, qdd),
+            (self.n, 10 * self.n),
+        )
+        for i in range(self.n):
+            columns = slice(10 * i, 10 * i + 10)
+            Y[:, :, columns] = Y[:, :, columns] @ self._parameters(i)
+        return Y
+
+    def _parameters(self, i: int) -> Array:
+        """Return the matrix (10, 10) from the parameters of DH frame i + 1 to Pinocchio's of its link."""
+        import pinocchio as pin
+
+        pin.framesForwardKinematics(self.model, self._data, pin.neutral(self.model))
+        T = self._data.oMi[i + 1].inverse() * self._data.oMf[self.model.getFrameId(f"dh{i + 1}")]
+        R, p = T.rotation, T.translation
+        matrix = np.zeros((10, 10))
+        for k, unit in enumerate(np.eye(10)):
+            m, h, second = unit[0], unit[1:4], np.zeros((3, 3))
+            for value, (a, b) in zip(unit[4:], OURS, strict=True):
+                second[a, b] = second[b, a] = value
+            turned = R @ h
+            lever = 2 * (p @ turned) * np.eye(3) - np.outer(p, turned) - np.outer(turned, p)
+            second = R @ second @ R.T + lever + m * (p @ p * np.eye(3) - np.outer(p, p))
+            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in THEIRS)]
+        return matrix
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return int(self.model.nv)
+
+    def _each(self, answer: Callable[[Array, Array, Array], object], shape: tuple[int, ...]) -> Array:
+        # eigenpy hands a matrix of one column over as a vector.
+        return np.array([np.reshape(np.array(answer(*state)), shape) for state in zip(*self.motion, strict=True)])
+
+
+OURS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+THEIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Order of the second moments."""

@@ -1,0 +1,63 @@
+"""Random states to compare at."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dhkit.description import Array, Description
+
+__all__ = ["Motion", "random_motions", "random_states"]
+
+RATE, ACCELERATION = 3.0, 10.0
+"""rad/s or m/s where a joint has no speed limit; rad/s^2 or m/s^2."""
+
+
+class Motion(NamedTuple):
+    """Joint values, rates and accelerations, each of shape (samples, n), rad, m and seconds."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+def random_states(description: Description, samples: int, seed: int = 0) -> Array:
+    """Return random joint values, shape (samples, n): full turns, and strokes within the limits (1 m where none).
+
+    Raises
+    ------
+    ValueError
+        ``samples`` is below 1.
+    """
+    if samples < 1:
+        raise ValueError(f"samples is {samples}; expected 1 or more")
+    numbers = description.numbers
+    bounded = np.isfinite(numbers.lower) & np.isfinite(numbers.upper) & numbers.prismatic
+    lower = np.where(bounded, numbers.lower, np.where(numbers.prismatic, -1.0, -np.pi))
+    upper = np.where(bounded, numbers.upper, np.where(numbers.prismatic, 1.0, np.pi))
+    return np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
+
+
+def random_motions(description: Description, samples: int, seed: int = 0) -> Motion:
+    """Return random states inside the limits of position and speed, with accelerations up to 10 rad/s^2 or m/s^2.
+
+    Joints without limits make full turns or a metre, at 3 rad/s or m/s.
+
+    Raises
+    ------
+    ValueError
+        ``samples`` is below 1.
+    """
+    if samples < 1:
+        raise ValueError(f"samples is {samples}; expected 1 or more")
+    numbers, rng, shape = description.numbers, np.random.default_rng(seed), (samples, description.n)
+    limited = np.isfinite(numbers.lower) & np.isfinite(numbers.upper)
+    free = np.where(numbers.prismatic, 1.0, np.pi)
+    lower, upper = np.where(limited, numbers.lower, -free), np.where(limited, numbers.upper, free)
+    rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, RATE)
+    return Motion(
+        rng.uniform(lower, upper, shape),
+        rng.uniform(-rate, rate, shape),
+        rng.uniform(-ACCELERATION, ACCELERATION, shape),
+    )

@@ -1,0 +1,162 @@
+"""Somebody's URDF against a table: what agrees, what differs and how, and files that are not to be trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dhkit
+from dhkit import Arm
+from dhkit.cli import main
+from dhkit.description import asset, library_robot
+from dhkit.errors import ModelError
+from dhkit.model.foreign_urdf import MAX_BYTES, read_chain
+from dhkit.verification import verify_urdf
+
+pytestmark = pytest.mark.usefixtures("array_kernels")
+
+
+@pytest.mark.parametrize("name", dhkit.robots())
+def test_our_own_urdfs_agree(name, law):
+    report = verify_urdf(library_robot(name), asset(f"urdf/{name}.urdf"), samples=law.samples(1000))
+    for agreement in report.agreements:
+        law.holds(f"URDF, {agreement.quantity}", agreement.error, 1e-12, name)
+    assert not any("limits" in note for note in report.notes)
+
+
+def test_constant_differences_of_tool_and_base_are_said():
+    T = dhkit.pose((0.1, 0, 0.2), euler=(0, 0, 90), degrees=True)
+    puma, file = Arm.load("puma560"), asset("urdf/puma560.urdf")
+    report = verify_urdf(puma.with_tool(T).description, file, samples=20)
+    assert not report
+    assert any("constant tool" in note and "degrees" in note for note in report.notes)
+    report = verify_urdf(puma.with_base(T).description, file, samples=20)
+    assert any("constant base: the URDF's arm stands" in note and "(0, 0, -90)" in note for note in report.notes)
+
+
+def test_a_wrong_mass_and_a_wrong_length_are_found(tmp_path):
+    puma, text = library_robot("puma560"), asset("urdf/puma560.urdf").read_text()
+    file = tmp_path / "puma.urdf"
+    file.write_text(text.replace('value="17.4"', 'value="17.41"'))
+    report = verify_urdf(puma, file, samples=20)
+    wrong = {agreement.quantity for agreement in report.agreements if not agreement.ok}
+    assert wrong == {"mass matrix M", "gravity torque g", "inverse dynamics tau"}
+    file.write_text(text.replace("0.15005", "0.15"))
+    wrong = {a.quantity for a in verify_urdf(puma, file, samples=20).agreements if not a.ok}
+    assert "tool position" in wrong
+    assert "tool rotation" not in wrong
+
+
+SIMPLE = """<robot name="r"><link name="a"/>
+<link name="b"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="j" type="{kind}"><parent link="a"/><child link="b"/><axis xyz="{axis}"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>{more}</robot>"""
+
+
+def simple(kind="revolute", axis="0 0 1", more="") -> str:
+    return SIMPLE.format(kind=kind, axis=axis, more=more)
+
+
+def test_a_continuous_joint_is_one_number(tmp_path):
+    file = tmp_path / "c.urdf"
+    file.write_text(simple("continuous"))
+    arm = dhkit.Arm.from_dh([(0, 0, 0, 0)])
+    assert verify_urdf(arm.description, file, samples=5).ok
+
+
+def test_a_gripper_is_locked_and_a_tip_can_be_chosen(tmp_path):
+    branches = "".join(
+        f'<link name="f{k}"/><joint name="g{k}" type="prismatic"><parent link="b"/><child link="f{k}"/>'
+        '<axis xyz="1 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>'
+        for k in range(2)
+    )
+    file = tmp_path / "gripper.urdf"
+    file.write_text(simple(more=branches))
+    with pytest.raises(ModelError, match=r"chains end at f0, f1; choose one \(tip\)"):
+        read_chain(file)
+    chain = read_chain(file, "b")
+    assert (chain.joints, chain.kinds, chain.locked) == (("j",), "R", ("g0", "g1"))
+    assert verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, tip="b", samples=5).ok
+    with pytest.raises(ModelError, match="no link 'c'; it has a, b, f0, f1"):
+        read_chain(file, "c")
+
+
+BAD = {
+    "entities": ('<!DOCTYPE r [<!ENTITY x "y">]><robot name="&x;"/>', "document type or entities"),
+    "no xml": ("hello", "no XML"),
+    "truncated": (simple()[:200], "no XML"),
+    "another root": ("<sdf/>", "found <sdf>; expected <robot>"),
+    "deep": ("<robot>" + "<a>" * 100 + "</a>" * 100 + "</robot>", "nested more than 64 deep"),
+    "two parents": (
+        simple(more='<link name="c"/><joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint>'),
+        "link 'b' has two parents, by joints 'j' and 'k'",
+    ),
+    "cycle": (
+        simple(
+            more='<link name="c"/><link name="d"/><joint name="k" type="fixed"><parent link="c"/><child link="d"/>'
+            '</joint><joint name="l" type="fixed"><parent link="d"/><child link="c"/></joint>'
+        ),
+        "links c, d go round in a circle",
+    ),
+    "no such link": (simple().replace('child link="b"', 'child link="x"'), "joint 'j': no link 'x'"),
+    "same names": (simple(more='<link name="b"/>'), "two of one name"),
+    "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "<mass value>: found 'nan'"),
+    "no number": (simple().replace('ixx="1"', 'ixx="one"'), "<inertia ixx>: found 'one'"),
+    "zero axis": (simple(axis="0 0 0"), "expected a direction"),
+    "no mass": (simple().replace('<mass value="1"/>', ""), "without <mass>"),
+    "two trees": (simple(more='<link name="z"/>'), "2 links without a parent"),
+    "many joints": (
+        "<robot><link name='l0'/>"
+        + "".join(
+            f"<link name='l{k}'/><joint name='j{k}' type='fixed'><parent link='l{k - 1}'/><child link='l{k}'/></joint>"
+            for k in range(1, 4000)
+        )
+        + "</robot>",
+        "3999 joints; expected 500 at most",
+    ),
+    "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
+    "planar joint": (simple("planar"), "expected R"),
+    "sliding": (simple("prismatic"), "joints j are P; expected R as in"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_files_get_one_line(name, tmp_path, capsys):
+    text, message = BAD[name]
+    file = tmp_path / "bad.urdf"
+    file.write_text(text)
+    with pytest.raises(ModelError, match="bad.urdf: ") as caught:
+        verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=5)
+    assert "\n" not in str(caught.value)
+    assert message in str(caught.value)
+    with pytest.raises(SystemExit) as stopped:
+        main(["verify", "planar2r", "--urdf", str(file)])
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_other_encodings_and_missing_files(tmp_path):
+    file = tmp_path / "utf16.urdf"
+    file.write_bytes(simple().encode("utf-16"))
+    with pytest.raises(ModelError, match="not UTF-8"):
+        read_chain(file)
+    with pytest.raises(ModelError, match="No such file"):
+        read_chain(tmp_path / "none.urdf")
+
+
+def test_command(tmp_path, capsys):
+    file = tmp_path / "report.tex"
+    with pytest.raises(SystemExit) as stopped:
+        main(["verify", "planar2r", "--urdf", str(asset("urdf/planar2r.urdf")), "--samples", "5", "-o", str(file)])
+    assert stopped.value.code == 0
+    assert "tool position" in capsys.readouterr().out
+    assert file.read_text().startswith("% needs")
+    with pytest.raises(SystemExit) as stopped:
+        main(["verify", "puma560", "--urdf", str(asset("urdf/ur5.urdf")), "--samples", "5", "--json"])
+    assert stopped.value.code == 1
+    with pytest.raises(SystemExit) as stopped:
+        main(["verify", "planar2r", "-o", "x.pdf"])
+    assert stopped.value.code == 2
+    assert "ends in .md, .tex or .json" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="tolerance is nan"):
+        verify_urdf(library_robot("planar2r"), asset("urdf/planar2r.urdf"), tolerance=np.nan)
