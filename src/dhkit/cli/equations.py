@@ -1,0 +1,118 @@
+"""`dhkit equations`: an arm's equations of motion, to be read or to be run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dhkit.arm import Arm
+from dhkit.cli.equations_page import equations_page
+from dhkit.cli.output import print_json, say
+from dhkit.description import Description, write_atomically
+from dhkit.errors import DescriptionError
+from dhkit.symbolic.equations import (
+    Quantity,
+    equations_c,
+    equations_latex,
+    equations_matlab,
+    equations_python,
+    equations_text,
+    latex_document,
+    matlab_files,
+    quantities,
+)
+from dhkit.symbolic.exact_arm import Symbols
+from dhkit.symbolic.lagrangian import Lagrangian, lagrangian
+
+__all__ = ["FORMATS", "lagrangian_of", "run"]
+
+LARGEST_TITLE = 200
+
+Printed = Callable[[Lagrangian, Sequence[Quantity]], str]
+
+
+def lagrangian_of(description: Description, symbols: str, compact: bool) -> Lagrangian:
+    """Return the equations that are printed.
+
+    Raises
+    ------
+    DescriptionError
+        No such choice of symbols, or a link without a body.
+    """
+    known: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
+    if symbols not in known:
+        raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(known)}")
+    return lagrangian(description, known[symbols])
+
+
+def run(arm: Arm, *, what: str, form: str, symbols: str, compact: bool, output: Path | None, json: bool) -> None:
+    """Print equations, or write them to a file."""
+    if form not in FORMATS:
+        raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
+    lag = lagrangian_of(arm.description, symbols, compact)
+    listed = quantities(lag, what)
+    if output is not None:
+        files = _written(lag, listed, form, output)
+        if json:
+            print_json({"files": [str(file) for file in files]})
+        else:
+            say("\n".join(f"wrote {file}" for file in files))
+        return
+    text = FORMATS[form](lag, listed)
+    if json:
+        print_json(_facts(lag, listed, form, text))
+    else:
+        sys.stdout.write(text)
+
+
+def _written(lag: Lagrangian, listed: Sequence[Quantity], form: str, output: Path) -> list[Path]:
+    """Write a file, or for MATLAB a file a function into a folder; return their paths."""
+    if output.suffix == ".toml":
+        raise DescriptionError(f"{output}: equations would overwrite a robot file; expected another name")
+    if form == "matlab":
+        if not output.is_dir():
+            raise DescriptionError(f"{output}: no such folder; MATLAB wants a file for every function")
+        contents = {output / name: text for name, text in matlab_files(lag, listed).items()}
+    else:
+        if output.is_dir():
+            raise DescriptionError(f"{output} is a folder; expected the name of a file")
+        if not output.parent.is_dir():
+            raise DescriptionError(f"{output.parent}: no such folder")
+        contents = {output: FORMATS[form](lag, listed)}
+    for path, text in contents.items():
+        write_atomically(path, text)
+    return list(contents)
+
+
+def _text(lag: Lagrangian, listed: Sequence[Quantity]) -> str:
+    notes = "".join(f"note: {note}\n" for note in lag.notes)
+    return f"{equations_text(listed)}\n{notes}"
+
+
+def _latex(lag: Lagrangian, listed: Sequence[Quantity]) -> str:
+    return latex_document(equations_latex(listed), lag.description.name[:LARGEST_TITLE])
+
+
+FORMATS: Mapping[str, Printed] = {
+    "text": _text,
+    "latex": _latex,
+    "python": equations_python,
+    "c": equations_c,
+    "matlab": equations_matlab,
+    "html": equations_page,
+}
+"""What equations can be printed as."""
+
+
+def _facts(lag: Lagrangian, listed: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
+    return {
+        "robot": lag.description.name,
+        "what": [quantity.name for quantity in listed],
+        "format": form,
+        "text": text,
+        "terms": {quantity.name: [len(element) for element in quantity.elements.flat] for quantity in listed},
+        "constants": lag.constants,
+        "notes": list(lag.notes),
+    }

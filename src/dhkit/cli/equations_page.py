@@ -1,0 +1,122 @@
+"""An arm's equations of motion as one page of HTML with MathML: no script, nothing from the network."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+from dhkit.description import DHTable
+from dhkit.symbolic.equations import (
+    QUANTITIES,
+    Quantity,
+    constant_latex,
+    constants_of,
+    displays,
+    generators_of,
+    renamings,
+    symbols_of,
+)
+
+if TYPE_CHECKING:
+    from dhkit.symbolic.lagrangian import Lagrangian
+
+__all__ = ["equations_page", "mathml"]
+
+EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
+MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
+UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m", "d": "m", "g": "m/s²"}
+"""Of the symbols that we name ourselves, by their first letters."""
+LAW = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
+STYLE = """
+body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
+       max-width: 66rem; margin: 2.5rem auto; padding: 0 1.5rem; }
+h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
+.source, .note { color: #57606a; margin: .2rem 0; }
+.display { overflow-x: auto; overflow-y: hidden; padding: .5rem 0; }
+math { font-size: 1.08rem; font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math", math; }
+math[display="block"] { width: fit-content; margin: 0; } .display { padding-left: 1.2rem; }
+mtd { padding: .18em .45em; } mtable[columnspacing] mtd { padding: .25em 0; }
+mtd[columnalign="left"] { text-align: left; } mtd[columnalign="right"] { text-align: right; }
+/* Brackets of matrices as borders: without a font for mathematics a browser cannot stretch them. */
+mo.bracket { display: none; }
+mtable.matrix { border: solid currentColor; border-width: 0 1.5px; border-radius: .9em / 50%;
+                padding: .2em .5em; margin-left: .35em; }
+table { border-collapse: collapse; margin: .8rem 0; } caption { text-align: left; color: #57606a; }
+th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid #d8dee4; font-weight: normal; }
+th { color: #57606a; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+"""
+
+
+def mathml(latex: str) -> str:
+    """Return displayed LaTeX, of the kind that we print, as MathML."""
+    from latex2mathml.converter import convert
+
+    inner = EQUATION.fullmatch(latex)
+    converted: str = convert(inner[1] if inner else latex, display="block")
+    return MATRIX.sub(
+        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>', converted
+    )
+
+
+def equations_page(lag: Lagrangian, quantities: Sequence[Quantity]) -> str:
+    """Return a page: the robot's table, quantities, what the constants are worth, and notes."""
+    description = lag.description
+    body = [
+        f"<h1>{escape(description.name)}: equations of motion</h1>",
+        f'<p class="source">{escape(description.source)}</p>' if description.source else "",
+        f'<div class="display">{mathml(LAW)}</div>',
+        "<h2>Denavit-Hartenberg table</h2>",
+        DHTable.of(description)._repr_html_(),
+        *_sections(quantities),
+        *_constants(lag, quantities),
+        *(f'<p class="note">{escape(note)}</p>' for note in [*lag.notes, *_renamed(quantities)]),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(description.name)}: equations of motion</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
+    shown = displays(quantities)
+    for quantity, latex in zip(quantities, shown, strict=False):
+        yield f"<h2>{escape(QUANTITIES[quantity.name].capitalize())}</h2>"
+        yield f'<div class="display">{mathml(latex)}</div>'
+    for latex in shown[len(quantities) :]:
+        yield f'<h2>Sines and cosines</h2>\n<div class="display">{mathml(latex)}</div>'
+
+
+def _constants(lag: Lagrangian, quantities: Sequence[Quantity]) -> Iterator[str]:
+    """Yield a table of the constants that occur, with their values."""
+    elements = [element for quantity in quantities for element in quantity.elements.flat]
+    values = dict(lag.description.numbers.values) | lag.constants
+    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.constants])}
+    used = symbols_of(constants_of(generators_of(elements)))
+    names = sorted(used, key=lambda name: (order.get(name, len(order)), name))
+    if not names:
+        return
+    ring = elements[0].ring
+    yield "<h2>Constants</h2>\n<table>\n<tr><th></th><th>name</th><th>value</th><th>unit</th></tr>"
+    for name in names:
+        value = float(values.get(name, math.nan))
+        cells = f"<td>{mathml(constant_latex(ring, name))}</td><td>{escape(name)}</td>"
+        yield f'<tr>{cells}<td class="number">{value:.6g}</td><td>{_unit(lag, name)}</td></tr>'
+    yield "</table>"
+
+
+def _unit(lag: Lagrangian, name: str) -> str:
+    """Return the unit of a symbol that we named; the file's own parameters are in SI units."""
+    letters = re.match(r"Jm|[A-Za-z]", name)
+    if lag.arm.symbols != "inertial" or name in lag.description.parameters or not letters:
+        return "SI"
+    return UNITS.get(letters[0], "SI")
+
+
+def _renamed(quantities: Sequence[Quantity]) -> list[str]:
+    return renamings(element for quantity in quantities for element in quantity.elements.flat)
