@@ -185,7 +185,7 @@ def test_dhkits_inverse_kinematics_is_asked_the_same_way(monkeypatch):
     arm = Arm.load("planar2r")
     workload = Workload.of(arm, 6, 1, 0)
 
-    def ik(self, T, out=None, threads=1):
+    def ik(self, T, seed=None, out=None, threads=1):
         index = [int(np.argmin(np.abs(workload.T - pose).sum(axis=(1, 2)))) for pose in np.reshape(T, (-1, 4, 4))]
         q = np.full((len(index), 2, arm.n), np.nan) if out is None else out
         q[:, 0] = workload.q[index]
@@ -197,7 +197,7 @@ def test_dhkits_inverse_kinematics_is_asked_the_same_way(monkeypatch):
         task = contender.setup(workload)
         assert judge(workload, "ik", task) == Verdict(0.0, 1.0)
         task.prepare(3)()
-    assert dhkit_arm.new_output(arm.ik, workload.T).shape == (6, 2, arm.n)
+    assert dhkit_arm.new_output(arm.ik, [workload.T]).shape == (6, 2, arm.n)
 
 
 def test_an_interrupted_run_reports_what_it_measured():

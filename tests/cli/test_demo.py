@@ -36,7 +36,17 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
     assert "agrees with Pinocchio" in out
     assert "2 shoulder" in out
     assert "8 branches of one pose close FK to" in out
-    assert sorted(path.name for path in folder.iterdir()) == ["index.html", "meshes", "puma560.png", "puma560.urdf"]
+    assert "proved equal to Euler and Lagrange's equation" in out
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "equations.html",
+        "equations.tex",
+        "index.html",
+        "meshes",
+        "puma560.png",
+        "puma560.urdf",
+        "verification.md",
+    ]
+    assert "<math" in (folder / "equations.html").read_text("utf-8")
     assert ElementTree.parse(folder / "puma560.urdf").getroot().get("name") == "puma560"
     with Image.open(folder / "puma560.png") as picture:
         assert len(np.unique(np.asarray(picture.convert("L")))) > 50

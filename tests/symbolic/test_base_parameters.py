@@ -9,9 +9,9 @@ from hypothesis import given, settings
 import dhkit
 from dhkit.description import library_robot
 from dhkit.model import pinocchio_model
-from dhkit.symbolic.base_parameters import base_parameters
-from dhkit.symbolic.lagrangian import lagrangian
-from dhkit.symbolic.regressor import regressor
+from dhkit.symbolic.exact.base_parameters import base_parameters
+from dhkit.symbolic.exact.lagrangian import lagrangian
+from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.ring import RingError
 from exact_checks import errors, states
 from random_arms import arms

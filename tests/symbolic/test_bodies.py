@@ -23,8 +23,8 @@ from dhkit.symbolic import (
     recursive_gravity,
     recursive_inverse_dynamics,
 )
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.inertial_table import exact_moments
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.inertial_table import exact_moments
 from dynamics_reference import motions, tilted_arms
 from random_arms import random_body
 

@@ -11,7 +11,7 @@ from dhkit.expressions import parse
 from dhkit.symbolic.equations import equations_sympy, equations_text, plain_text, quantities
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.notation import notation
-from dhkit.symbolic.lagrangian import lagrangian
+from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.ring import Constant, Ring, RingError
 
 SMALL = [name for name in robots() if library_robot(name).n <= 4]

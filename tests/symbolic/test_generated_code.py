@@ -12,7 +12,7 @@ from dhkit.description import library_robot, read_robot
 from dhkit.symbolic.equations import equations_c, equations_matlab, equations_python, matlab_files, quantities
 from dhkit.symbolic.equations.programs import INPUTS, harmless, identifier
 from dhkit.symbolic.equations.python_code import FUNCTION_NAMES
-from dhkit.symbolic.lagrangian import lagrangian
+from dhkit.symbolic.exact.lagrangian import lagrangian
 
 TOLERANCE = 1e-12
 """Of the largest entry: code rounds in another order than the exact terms' sum."""

@@ -16,9 +16,9 @@ from dhkit import Arm
 from dhkit.description import Body, Description, from_dh, library_robot
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
-from dhkit.symbolic.base_parameters import base_parameters
-from dhkit.symbolic.exact_arm import exact_arm
-from dhkit.symbolic.lagrangian import lagrangian
+from dhkit.symbolic.exact.base_parameters import base_parameters
+from dhkit.symbolic.exact.exact_arm import exact_arm
+from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.textbook import MISTAKES, derive
 from exact_checks import errors
 from random_arms import arms

@@ -14,7 +14,7 @@ from dhkit.expressions import parse
 from dhkit.symbolic.equations import displays, equations_latex, latex_document, latex_text, quantities
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.latex_width import latex_width
-from dhkit.symbolic.lagrangian import lagrangian
+from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.ring import Constant, Ring
 
 LINES_OF_A_PAGE = 46

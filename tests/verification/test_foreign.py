@@ -125,7 +125,7 @@ def test_bad_files_get_one_line(name, tmp_path, capsys):
     text, message = BAD[name]
     file = tmp_path / "bad.urdf"
     file.write_text(text)
-    with pytest.raises(ModelError, match="bad.urdf: ") as caught:
+    with pytest.raises(ModelError, match=r"bad\.urdf: ") as caught:
         verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=5)
     assert "\n" not in str(caught.value)
     assert message in str(caught.value)

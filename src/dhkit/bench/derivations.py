@@ -17,7 +17,7 @@ from dhkit.bench.peers.sympy_mechanics import lagranges_equations
 from dhkit.description import write_robot
 from dhkit.dynamics import dynamics_graph
 from dhkit.symbolic import CasadiFunctions, derive, lagrangian, operation_count
-from dhkit.symbolic.exact_arm import exact_arm
+from dhkit.symbolic.exact.exact_arm import exact_arm
 
 __all__ = ["CASADI", "INVERSE_DYNAMICS", "PROOFS", "Derivation", "Operations", "derivations", "operations"]
 

@@ -13,15 +13,21 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
+from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
 from dhkit.cli.straight import Branches, Line, branches, straight_line
 from dhkit.cli.tour import tour
 from dhkit.description import Array, write_atomically
-from dhkit.errors import DescriptionError
+from dhkit.dynamics import dynamics_graph
+from dhkit.errors import DescriptionError, DhkitError
+from dhkit.symbolic import operation_count
+from dhkit.symbolic.equations import equations_latex, latex_document, readable
 from dhkit.verification import VerificationReport
 
 __all__ = ["run"]
 
+PRINTED = 5_000
+"""Terms of M, C and g that are printed; of longer ones M and g."""
 OWN = 1e-6
 """Share of the reach: an arm whose frames are all nearer to another's than this looks the same."""
 
@@ -48,7 +54,7 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
         seconds = time.perf_counter() - start
         stages.append({"stage": title, "result": result, "seconds": seconds})
         if not json:
-            say(f"  {title:<8} {seconds:6.2f} s   {result}")
+            say(f"  {title:<9} {seconds:6.2f} s   {result}")
 
     if not json:
         say(f"{arm.name}: {arm.description.source}", "bold")
@@ -57,6 +63,9 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
     stage("build", lambda: _build(arm, urdf))
     reports: list[VerificationReport] = []
     stage("verify", lambda: _verify(arm, 100 if quick else 1000, reports))
+    if reports:
+        write_atomically(folder / "verification.md", reports[0].markdown())
+    stage("equations", lambda: _equations(arm, folder))
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
     shown: list[Shown] = []
     stage("ik", lambda: _inverse(arm, shown))
@@ -85,6 +94,29 @@ def _verify(arm: Arm, samples: int, reports: list[VerificationReport]) -> str:
     worst = max(report.agreements, key=lambda agreement: agreement.error / agreement.tolerance)
     verdict = "agrees with" if report.ok else "DISAGREES with"
     return f"{verdict} {report.reference} in {samples} states: {worst.quantity} to {worst.error:.1e}"
+
+
+def _equations(arm: Arm, folder: Path) -> str:
+    """Derive by two routes, prove that they agree, and write the equations as LaTeX and as a page."""
+    try:
+        start = time.perf_counter()
+        lag = arm.lagrangian
+        if not (lag.prove_euler_lagrange() and lag.prove_skew_symmetry()):
+            return "the two derivations DISAGREE"
+        seconds = time.perf_counter() - start
+        entries = [*lag.M.flat, *lag.C.flat, *lag.g]
+        what = ("M", "C", "g") if sum(map(len, entries)) <= PRINTED else ("M", "g")
+        listed = readable(lag, what)
+        write_atomically(folder / "equations.tex", latex_document(equations_latex(listed), arm.name))
+        write_atomically(folder / "equations.html", equations_page(lag, listed))
+    except DhkitError as error:
+        return f"skipped: {error}"
+    operations = operation_count(dynamics_graph("inverse_dynamics", arm.description, ("q", "qd", "qdd")))
+    sums, products = operations.get("additions", 0), operations.get("multiplications", 0)
+    return (
+        f"M qdd + C qd + g proved equal to Euler and Lagrange's equation in {seconds:.2f} s; {folder / 'equations.html'}"
+        f" and .tex; inverse dynamics in {products} multiplications and {sums} additions"
+    )
 
 
 def _figure(arm: Arm, path: Path) -> str:

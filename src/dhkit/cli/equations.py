@@ -12,6 +12,7 @@ from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
 from dhkit.description import Description, write_atomically
 from dhkit.errors import DescriptionError
+from dhkit.symbolic import Lagrangian, Symbols, base_parameters, lagrangian
 from dhkit.symbolic.equations import (
     Quantity,
     equations_c,
@@ -22,9 +23,8 @@ from dhkit.symbolic.equations import (
     latex_document,
     matlab_files,
     quantities,
+    readable,
 )
-from dhkit.symbolic.exact_arm import Symbols
-from dhkit.symbolic.lagrangian import Lagrangian, lagrangian
 
 __all__ = ["FORMATS", "lagrangian_of", "run"]
 
@@ -33,7 +33,7 @@ LARGEST_TITLE = 200
 Printed = Callable[[Lagrangian, Sequence[Quantity]], str]
 
 
-def lagrangian_of(description: Description, symbols: str, compact: bool) -> Lagrangian:
+def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
     """Return the equations that are printed.
 
     Raises
@@ -44,15 +44,15 @@ def lagrangian_of(description: Description, symbols: str, compact: bool) -> Lagr
     known: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
     if symbols not in known:
         raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(known)}")
-    return lagrangian(description, known[symbols])
+    return base_parameters(description).lagrangian if base else lagrangian(description, known[symbols])
 
 
-def run(arm: Arm, *, what: str, form: str, symbols: str, compact: bool, output: Path | None, json: bool) -> None:
+def run(arm: Arm, *, what: str, form: str, symbols: str, base: bool, output: Path | None, json: bool) -> None:
     """Print equations, or write them to a file."""
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
-    lag = lagrangian_of(arm.description, symbols, compact)
-    listed = quantities(lag, what)
+    lag = lagrangian_of(arm.description, symbols, base)
+    listed = (quantities if form in ("python", "c", "matlab") else readable)(lag, what)
     if output is not None:
         files = _written(lag, listed, form, output)
         if json:

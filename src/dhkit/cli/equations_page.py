@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from dhkit.description import DHTable
 from dhkit.symbolic.equations import (
-    QUANTITIES,
     Quantity,
     constant_latex,
     constants_of,
@@ -21,7 +20,7 @@ from dhkit.symbolic.equations import (
 )
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.lagrangian import Lagrangian
+    from dhkit.symbolic.exact.lagrangian import Lagrangian
 
 __all__ = ["equations_page", "mathml"]
 
@@ -86,7 +85,7 @@ def equations_page(lag: Lagrangian, quantities: Sequence[Quantity]) -> str:
 def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
     shown = displays(quantities)
     for quantity, latex in zip(quantities, shown, strict=False):
-        yield f"<h2>{escape(QUANTITIES[quantity.name].capitalize())}</h2>"
+        yield f"<h2>{escape(quantity.title.capitalize())}</h2>"
         yield f'<div class="display">{mathml(latex)}</div>'
     for latex in shown[len(quantities) :]:
         yield f'<h2>Sines and cosines</h2>\n<div class="display">{mathml(latex)}</div>'

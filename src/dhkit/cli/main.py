@@ -203,16 +203,16 @@ def equations(
     symbols: Annotated[
         str, typer.Option(help="none: numbers; file: the file's parameters; inertial: every inertial parameter.")
     ] = "file",
-    compact: Annotated[bool, typer.Option("--compact", help="Base parameters, and sums of angles.")] = False,
+    base: Annotated[
+        bool, typer.Option("--base-parameters", help="The fewest inertial parameters, and what they stand for.")
+    ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
     json: Json = False,
 ) -> None:
     """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."""
     from dhkit.cli import equations as equations_command
 
-    equations_command.run(
-        Arm.load(robot), what=what, form=form, symbols=symbols, compact=compact, output=output, json=json
-    )
+    equations_command.run(Arm.load(robot), what=what, form=form, symbols=symbols, base=base, output=output, json=json)
 
 
 @app.command()

@@ -110,7 +110,8 @@ def _from_file(path: Path) -> Callable[..., None]:
 def _sources(derivation: str) -> str:
     here, own = Path(__file__).parent, Path(derivation)
     total = hashlib.sha256()
-    for folder in (here, here.parent / "symbolic", own):
+    symbolic = here.parent / "symbolic"
+    for folder in (here, symbolic / "differentiable", symbolic / "programs", own):
         for path in sorted(folder.glob("*.py")) if folder.is_dir() else [folder]:
             total.update(path.read_bytes())
     return total.hexdigest()

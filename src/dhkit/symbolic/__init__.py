@@ -1,11 +1,9 @@
 """An arm's mechanics as expressions: CasADi frames and Jacobians, straight-line programs, and their source text."""
 
-from dhkit.symbolic.base_parameters import BaseParameters, base_parameters
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.casadi_functions import CasadiFunctions
-from dhkit.symbolic.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
-from dhkit.symbolic.elements import Element, Elements, RingError
-from dhkit.symbolic.energies import (
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.casadi_functions import CasadiFunctions
+from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+from dhkit.symbolic.differentiable.energies import (
     kinetic_energy,
     lagrange_coriolis_matrix,
     lagrange_gravity_torque,
@@ -14,9 +12,8 @@ from dhkit.symbolic.energies import (
     lagrange_torque,
     potential_energy,
 )
-from dhkit.symbolic.exact_arm import ExactArm, Symbols, exact_arm
-from dhkit.symbolic.forward_dynamics import SINGULAR, recursive_forward_dynamics, solve_for_acceleration
-from dhkit.symbolic.frames import (
+from dhkit.symbolic.differentiable.forward_dynamics import SINGULAR, recursive_forward_dynamics, solve_for_acceleration
+from dhkit.symbolic.differentiable.frames import (
     ReferenceAxes,
     SymbolicTable,
     jacobian,
@@ -24,14 +21,17 @@ from dhkit.symbolic.frames import (
     joint_symbols,
     table_pattern,
 )
-from dhkit.symbolic.friction import Friction, friction_torque, smooth_direction
-from dhkit.symbolic.graph import Graph, Node, Variable
-from dhkit.symbolic.inertial_table import InertialTable, inertial_pattern, require_bodies
-from dhkit.symbolic.lagrangian import Lagrangian, Proof, lagrangian
-from dhkit.symbolic.operations import operation_count
-from dhkit.symbolic.printers import c_source, export_c, python_lines
-from dhkit.symbolic.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
-from dhkit.symbolic.regressor import Regressor
+from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
+from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern, require_bodies
+from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
+from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
+from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
+from dhkit.symbolic.exact.regressor import Regressor
+from dhkit.symbolic.programs.graph import Graph, Node, Variable
+from dhkit.symbolic.programs.operations import operation_count
+from dhkit.symbolic.programs.printers import c_source, export_c, python_lines
+from dhkit.symbolic.ring.elements import Element, Elements, RingError
 from dhkit.symbolic.textbook import MISTAKES, TextbookDerivation, derive
 
 __all__ = [

@@ -3,7 +3,7 @@
 Positions of the centres of mass, their velocities by differentiation, angular velocities as sums over the joints'
 axes, kinetic and potential energy of each link, the Lagrangian, and d/dt dL/dqd - dL/dq (Spong, Hutchinson &
 Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1). It shares the
-table with :mod:`dhkit.symbolic.composite`, and nothing else.
+table with :mod:`dhkit.symbolic.exact.composite`, and nothing else.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from dhkit.description import Description
-from dhkit.symbolic.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
 from dhkit.symbolic.ring import Element, Elements, Ring
 
 __all__ = ["MISTAKES", "LinkMotion", "TextbookDerivation", "derive"]
@@ -195,7 +195,7 @@ def derive(
     mistakes
         Names of :data:`MISTAKES`, made at every link, or ``NAME@2`` for link 2 alone.
     symbols
-        See :func:`dhkit.symbolic.exact_arm`.
+        See :func:`dhkit.symbolic.exact.exact_arm`.
 
     Raises
     ------

@@ -6,7 +6,7 @@ from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
 from dhkit.symbolic.equations.notation import constants_of, generators_of, renamings, symbols_of
 from dhkit.symbolic.equations.python_code import equations_python
-from dhkit.symbolic.equations.quantities import QUANTITIES, Quantity, quantities
+from dhkit.symbolic.equations.quantities import QUANTITIES, Quantity, quantities, readable
 from dhkit.symbolic.equations.sympy_objects import equations_sympy, sympy_object
 from dhkit.symbolic.equations.text import equations_text, plain_text
 
@@ -28,6 +28,7 @@ __all__ = [
     "matlab_files",
     "plain_text",
     "quantities",
+    "readable",
     "renamings",
     "symbols_of",
     "sympy_object",

@@ -105,7 +105,7 @@ def latex_text(element: Element) -> str:
     Examples
     --------
     >>> from dhkit.description import library_robot
-    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> from dhkit.symbolic.exact.lagrangian import lagrangian
     >>> print(latex_text(lagrangian(library_robot("planar2r")).M[1, 1]))
     \tfrac{1}{3} m_{2} l_{2}^{2}
     """
@@ -154,7 +154,7 @@ def _writer(ring: Ring) -> LatexWriter:
 
 def _matrix(quantity: Quantity) -> str:
     """Return a matrix or a column in brackets, nothing where it is wider than a line or a mere number."""
-    if not quantity.elements.ndim:
+    if not quantity.elements.ndim or quantity.labels:
         return ""
     table = quantity.elements.reshape(len(quantity.elements), -1)
     if sum(len(element) for element in table.flat) > 40 * table.shape[1]:
@@ -188,7 +188,8 @@ def _entries(quantity: Quantity) -> str:
 
 def _head(name: str) -> str:
     letters, number = re.fullmatch(r"([A-Za-z]+)([\d_]*)", name).groups()  # type: ignore[union-attr]
-    return HEADS.get(letters, letters) + (f"_{{{number.replace('_', ',')}}}" if number else "")
+    head = HEADS.get(letters, letters if len(letters) == 1 else rf"\mathit{{{letters}}}")
+    return head + (f"_{{{number.replace('_', ',')}}}" if number else "")
 
 
 def _lines(marked: str, room: float) -> list[str]:

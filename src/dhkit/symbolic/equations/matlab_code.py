@@ -10,7 +10,7 @@ from dhkit.symbolic.equations.programs import Entry, Function, Language, Program
 from dhkit.symbolic.equations.quantities import Quantity
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.lagrangian import Lagrangian
+    from dhkit.symbolic.exact.lagrangian import Lagrangian
 
 __all__ = ["equations_matlab", "matlab_files"]
 

@@ -17,12 +17,12 @@ import numpy as np
 
 from dhkit.symbolic.equations.collected import Product, collected, is_reciprocal
 from dhkit.symbolic.equations.notation import angles_of, constants_of, generators_of, symbols_of
-from dhkit.symbolic.equations.quantities import QUANTITIES, Quantity
+from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.equations.writing import Printer, is_name
 from dhkit.symbolic.ring import Element, Generator
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.lagrangian import Lagrangian
+    from dhkit.symbolic.exact.lagrangian import Lagrangian
 
 __all__ = ["INPUTS", "Entry", "Function", "Language", "Parameter", "Program", "harmless", "identifier", "program"]
 
@@ -112,7 +112,7 @@ class Function:
     @property
     def title(self) -> str:
         """What it computes, in words."""
-        return QUANTITIES[self.quantity.name]
+        return self.quantity.title
 
 
 @dataclass(frozen=True)

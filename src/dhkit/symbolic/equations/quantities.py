@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dhkit.symbolic.equations.notation import entry_name
+from dhkit.symbolic.equations.notation import entry_name, generators_of
+from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, Elements, RingError
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.lagrangian import Lagrangian
+    from dhkit.symbolic.exact.lagrangian import Lagrangian
 
-__all__ = ["MOST_TERMS", "QUANTITIES", "Quantity", "check_length", "quantities"]
+__all__ = ["MOST_TERMS", "QUANTITIES", "Quantity", "check_length", "quantities", "readable"]
 
 QUANTITIES = {
     "M": "mass matrix",
@@ -37,13 +38,21 @@ class Quantity:
     Attributes
     ----------
     name
-        One of :data:`QUANTITIES`.
+        One of :data:`QUANTITIES`, or ``definitions``.
     elements
         Shape (n, n), (n,) or ().
+    labels
+        What the entries of definitions are called.
     """
 
     name: str
     elements: Elements
+    labels: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The quantity in words."""
+        return QUANTITIES.get(self.name, "base parameters")
 
     @property
     def is_symmetric(self) -> bool:
@@ -65,11 +74,13 @@ class Quantity:
 
     def head(self, place: tuple[int, ...]) -> str:
         """Return an entry's name."""
-        return entry_name(self.name, place)
+        return self.labels[place[0]] if self.labels else entry_name(self.name, place)
 
 
 def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
-    """Return quantities of a Lagrangian by name; several in one text stand apart by commas or spaces.
+    """Return quantities of a Lagrangian by name, in the angles that make each entry shortest.
+
+    Several names in one text stand apart by commas or spaces.
 
     Raises
     ------
@@ -84,8 +95,26 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     for name in dict.fromkeys(names):
         array = np.empty(np.shape(getattr(lag, name)), dtype=object)
         array[...] = getattr(lag, name)
-        found.append(Quantity(name, array))
+        found.append(Quantity(name, shortened(lag.arm, array)))
     return found
+
+
+def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
+    """Return :func:`quantities`, and what the base parameters in them stand for.
+
+    Raises
+    ------
+    ValueError
+        No such quantity, or none at all.
+    """
+    found = quantities(lag, what)
+    used = {g.text for quantity in found for g in generators_of(quantity.elements.flat)}
+    labels = tuple(name for name in lag.definitions if name in used)
+    if not labels:
+        return found
+    elements = np.empty(len(labels), dtype=object)
+    elements[:] = [lag.definitions[name] for name in labels]
+    return [*found, Quantity("definitions", elements, labels)]
 
 
 def check_length(quantities: Sequence[Quantity]) -> None:
@@ -101,5 +130,5 @@ def check_length(quantities: Sequence[Quantity]) -> None:
             if len(element) > MOST_TERMS:
                 raise RingError(
                     f"{quantity.head(place)} has {len(element)} terms, more than the {MOST_TERMS} that text and LaTeX "
-                    "print; code (python, c, matlab) has no limit, and symbols='none' or the compact form is shorter"
+                    "print; code (python, c, matlab) has no limit, and symbols='none' or base parameters are shorter"
                 )

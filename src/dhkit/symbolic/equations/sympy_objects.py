@@ -63,7 +63,7 @@ def sympy_object(element: Element) -> Any:
     Examples
     --------
     >>> from dhkit.description import library_robot
-    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> from dhkit.symbolic.exact.lagrangian import lagrangian
     >>> sympy_object(lagrangian(library_robot("planar2r")).M[1, 1])
     l2**2*m2/3
     """

@@ -67,7 +67,7 @@ def plain_text(element: Element) -> str:
     Examples
     --------
     >>> from dhkit.description import library_robot
-    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> from dhkit.symbolic.exact.lagrangian import lagrangian
     >>> plain_text(lagrangian(library_robot("planar2r")).M[0, 0])
     'm1*l1^2/3 + m2*(l1^2 + l2^2/3 + l1*l2*c2)'
     """

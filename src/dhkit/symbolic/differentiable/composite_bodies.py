@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.inertial_table import InertialTable
-from dhkit.symbolic.joint_frames import Station, stations
-from dhkit.symbolic.vectors import Scalar, Vector3, cross, dot, plus, times
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.joint_frames import Station, stations
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot, plus, times
 
 if TYPE_CHECKING:
     import casadi

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.vectors import Scalar, Vector3, about_x, about_z, plus, times
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, about_z, plus, times
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.joint_frames import JointRow
+    from dhkit.symbolic.differentiable.joint_frames import JointRow
 
 __all__ = ["Moments", "regrouped"]
 

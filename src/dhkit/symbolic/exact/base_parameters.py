@@ -20,12 +20,12 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.expressions import Expression, exact, substitute
-from dhkit.symbolic import composite
-from dhkit.symbolic.composite import RigidBody, Step
-from dhkit.symbolic.exact_arm import ExactArm, ExactRow
-from dhkit.symbolic.lagrangian import Lagrangian, Proof, lagrangian
-from dhkit.symbolic.polynomials import Monomial
+from dhkit.symbolic.exact import composite
+from dhkit.symbolic.exact.composite import RigidBody, Step
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
+from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
+from dhkit.symbolic.ring.polynomials import Monomial
 
 __all__ = ["BaseParameters", "base_parameters"]
 
@@ -176,7 +176,8 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
         inertial=tuple(definitions),
     )
     bodies = [body(j) for j in range(1, arm.n + 1)]
-    return Lagrangian(short, composite.mass_matrix(short, bodies), composite.potential_energy(short, bodies))
+    M, V = composite.mass_matrix(short, bodies), composite.potential_energy(short, bodies)
+    return Lagrangian(short, M, V, dict(definitions))
 
 
 def _row(row: ExactRow, ring: Ring) -> ExactRow:

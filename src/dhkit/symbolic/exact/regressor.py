@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dhkit.symbolic.lagrangian import Lagrangian, Proof
+from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof
 from dhkit.symbolic.ring import Elements, RingError
 
 __all__ = ["Regressor", "regressor"]
@@ -53,7 +53,7 @@ def regressor(equations: Lagrangian) -> Regressor:
     Examples
     --------
     >>> from dhkit.description import library_robot
-    >>> from dhkit.symbolic.lagrangian import lagrangian
+    >>> from dhkit.symbolic.exact.lagrangian import lagrangian
     >>> found = regressor(lagrangian(library_robot("cart_pendulum"), "inertial"))
     >>> found.Y.shape, bool(found.prove())
     ((2, 20), True)

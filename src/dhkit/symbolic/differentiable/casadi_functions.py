@@ -7,14 +7,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from dhkit.description import Description
-from dhkit.symbolic.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
-from dhkit.symbolic.energies import kinetic_energy, lagrange_torque, potential_energy
-from dhkit.symbolic.forward_dynamics import solve_for_acceleration
-from dhkit.symbolic.frames import SymbolicTable, jacobian, joint_symbols
-from dhkit.symbolic.friction import Friction, friction_torque
-from dhkit.symbolic.inertial_table import InertialTable
-from dhkit.symbolic.payload import payload_moments
-from dhkit.symbolic.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
+from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleration
+from dhkit.symbolic.differentiable.frames import SymbolicTable, jacobian, joint_symbols
+from dhkit.symbolic.differentiable.friction import Friction, friction_torque
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.payload import payload_moments
+from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
 
 if TYPE_CHECKING:
     import casadi

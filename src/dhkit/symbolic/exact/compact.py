@@ -12,9 +12,9 @@ from itertools import islice, product
 
 import numpy as np
 
-from dhkit.symbolic.exact_arm import ExactArm
-from dhkit.symbolic.polynomials import Monomial
+from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
+from dhkit.symbolic.ring.polynomials import Monomial
 
 __all__ = ["parallel_runs", "shortened"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.composite_bodies import composite_mass_matrix
-from dhkit.symbolic.inertial_table import InertialTable
-from dhkit.symbolic.recursive import recursive_bias
+from dhkit.symbolic.differentiable.composite_bodies import composite_mass_matrix
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.recursive import recursive_bias
 
 if TYPE_CHECKING:
     import casadi

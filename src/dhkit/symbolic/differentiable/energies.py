@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.composite_bodies import link_velocities
-from dhkit.symbolic.inertial_table import InertialTable
-from dhkit.symbolic.joint_frames import stations
-from dhkit.symbolic.vectors import Scalar, Vector3, cross, dot
+from dhkit.symbolic.differentiable.composite_bodies import link_velocities
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.joint_frames import stations
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot
 
 if TYPE_CHECKING:
     import casadi

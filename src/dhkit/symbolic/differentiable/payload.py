@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dhkit.description import Convention, Description
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.vectors import Vector3, dot, plus
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.vectors import Vector3, dot, plus
 
 if TYPE_CHECKING:
     import casadi

@@ -11,10 +11,10 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description
 from dhkit.errors import DescriptionError
-from dhkit.symbolic.bodies import Moments, regrouped
-from dhkit.symbolic.frames import FOLDED
-from dhkit.symbolic.joint_frames import JointRow, joint_rows
-from dhkit.symbolic.vectors import Scalar, Vector3, about_x, plus
+from dhkit.symbolic.differentiable.bodies import Moments, regrouped
+from dhkit.symbolic.differentiable.frames import FOLDED
+from dhkit.symbolic.differentiable.joint_frames import JointRow, joint_rows
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, plus
 
 if TYPE_CHECKING:
     import casadi
@@ -28,7 +28,7 @@ class InertialTable:
 
     ``InertialTable.of`` takes an arm's own numbers. ``InertialTable.parametric`` keeps those that are 0, 1 or -1 and
     puts symbols for the rest: one derivation, and one compiled kernel, serve every arm of the same pattern.
-    Links hold their base parameters (:func:`dhkit.symbolic.bodies.regrouped`).
+    Links hold their base parameters (:func:`dhkit.symbolic.differentiable.bodies.regrouped`).
     """
 
     rows: tuple[JointRow, ...]

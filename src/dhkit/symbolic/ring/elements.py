@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from numpy.typing import NDArray
 
 from dhkit.errors import DhkitError
-from dhkit.symbolic.polynomials import Monomial
+from dhkit.symbolic.ring.polynomials import Monomial
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.ring import Ring
+    from dhkit.symbolic.ring.ring import Ring
 
 __all__ = ["Element", "Elements", "RingError", "Scalar", "translated"]
 

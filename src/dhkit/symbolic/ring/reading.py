@@ -6,11 +6,11 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, TypeAlias
 
 from dhkit.expressions import PI, Atom, Expression, cos, sin
-from dhkit.symbolic.elements import Element
+from dhkit.symbolic.ring.elements import Element
 
 if TYPE_CHECKING:
     from dhkit.expressions.exact import Monomial
-    from dhkit.symbolic.ring import Ring
+    from dhkit.symbolic.ring.ring import Ring
 
 __all__ = ["Direction", "is_exact", "read_angle", "read_expression", "reciprocal_text"]
 

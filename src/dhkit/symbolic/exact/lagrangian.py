@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
-from dhkit.symbolic import composite, equations
-from dhkit.symbolic.exact_arm import ExactArm, Symbols, exact_arm
+from dhkit.symbolic import equations
+from dhkit.symbolic.exact import composite
+from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.textbook import TextbookDerivation, derive
 
@@ -54,7 +56,7 @@ class Proof:
         return f"NOT TRUE: {self.statement}; entry {where} differs by {self.difference[place]}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Lagrangian:
     """An arm's equations of motion in the exact ring, made by composite bodies and Christoffel symbols.
 
@@ -69,6 +71,8 @@ class Lagrangian:
         Mass matrix, shape (n, n), kg m^2; reflected rotor inertia is part of it.
     V
         Potential energy, J; zero at the world's origin.
+    definitions
+        What the symbols stand for where they are base parameters, by name.
 
     Examples
     --------
@@ -83,6 +87,7 @@ class Lagrangian:
     arm: ExactArm
     M: Elements
     V: Element
+    definitions: Mapping[str, Element] = field(default_factory=dict)
 
     @property
     def description(self) -> Description:
@@ -164,7 +169,7 @@ class Lagrangian:
         **quantities
             Any of M, V, C, h, g, K, tau: elements of this one's ring. What is made of a replaced quantity follows it.
         """
-        other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V))
+        other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V), self.definitions)
         for name in quantities:
             if name not in ("C", "h", "g", "K", "tau"):
                 raise ValueError(f"no quantity {name!r}; expected M, V, C, h, g, K or tau")
@@ -172,22 +177,26 @@ class Lagrangian:
         return other
 
     def evaluate(
-        self, elements: Element | Elements, q: Array, qd: Array | None = None, qdd: Array | None = None
+        self,
+        elements: Element | Elements,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
     ) -> Array:
-        """Return the numbers of elements, shape (..., *elements.shape), at states (..., n)."""
+        """Return the numbers of elements, shape (..., *elements.shape); see :meth:`ExactArm.evaluate`."""
         return self.arm.evaluate(elements, q, qd, qdd)
 
     # Reading
 
     def text(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
-        """Return some of M, C, h, g, tau, K and V as text, entry by entry.
+        """Return some of M, C, h, g, tau, K and V as text, entry by entry, in the angles that make them shortest.
 
         Raises
         ------
         RingError
             An entry is too long to be read.
         """
-        return equations.equations_text(equations.quantities(self, what))
+        return equations.equations_text(equations.readable(self, what))
 
     def latex(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
         """Return some of M, C, h, g, tau, K and V in LaTeX, for a page that loads amsmath.
@@ -197,7 +206,7 @@ class Lagrangian:
         RingError
             An entry is too long to be read.
         """
-        return equations.equations_latex(equations.quantities(self, what))
+        return equations.equations_latex(equations.readable(self, what))
 
     def sympy(self, what: str | Sequence[str] = tuple(equations.QUANTITIES)) -> dict[str, Any]:
         """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
@@ -208,6 +217,9 @@ class Lagrangian:
         if size <= _SHOWN:
             return self.text()
         return f"{self.description.name}: M qdd + C qd + g = tau, M of {size} terms; .text(('g',)) prints a part"
+
+    def __repr__(self) -> str:
+        return f"<Lagrangian of {self.description.name}: {', '.join(self.arm.ring.constants[:12]) or 'in numbers'}>"
 
     def _repr_latex_(self) -> str | None:
         return self.latex() if sum(len(element) for element in self.M.flat) <= _SHOWN else None
@@ -237,6 +249,6 @@ class Lagrangian:
 
 
 def lagrangian(description: Description, symbols: Symbols = "file") -> Lagrangian:
-    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for ``symbols``."""
+    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact.exact_arm` for ``symbols``."""
     arm = exact_arm(description, symbols)
     return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.inertial_table import InertialTable
-from dhkit.symbolic.joint_frames import Station, stations
-from dhkit.symbolic.vectors import Scalar, Vector3, cross, plus, times
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.joint_frames import Station, stations
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, plus, times
 
 if TYPE_CHECKING:
     import casadi
@@ -84,7 +84,7 @@ def recursive_inverse_dynamics(
     """Return the joint torques of a motion by Newton's and Euler's equations, n x 1, N m and N; drives included.
 
     Luh, Walker & Paul 1980, with accelerations by U and base parameters (Khalil & Kleinfinger 1987), in the axes that
-    :class:`dhkit.symbolic.joint_frames.Station` chooses.
+    :class:`dhkit.symbolic.differentiable.joint_frames.Station` chooses.
     """
     import casadi
 

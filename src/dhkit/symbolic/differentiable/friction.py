@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.vectors import Scalar
+from dhkit.symbolic.differentiable.vectors import Scalar
 
 if TYPE_CHECKING:
     import casadi

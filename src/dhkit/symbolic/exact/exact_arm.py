@@ -8,14 +8,15 @@ from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Body, Convention, Description, Drive, Joint
+from dhkit.description import Array, Body, Convention, Description, Drive, Joint, joint_array
 from dhkit.description.parameters import resolved
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle, substitute
-from dhkit.symbolic.constants import Constants, value_of
-from dhkit.symbolic.reading import Direction
 from dhkit.symbolic.ring import Element, Elements, Ring
+from dhkit.symbolic.ring.constants import Constants, value_of
+from dhkit.symbolic.ring.reading import Direction
 
 __all__ = ["INERTIA_KEYS", "ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
 
@@ -107,15 +108,46 @@ class ExactArm:
         return self.description.convention is Convention.STANDARD
 
     def evaluate(
-        self, elements: Element | Elements, q: Array, qd: Array | None = None, qdd: Array | None = None
+        self,
+        elements: Element | Elements,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
     ) -> Array:
-        """Return elements' numbers, shape (..., *elements.shape), at states (..., n)."""
-        q = np.asarray(q, dtype=float)
-        values = self.ring.values(self.values, q, qd, qdd)
-        batch = np.broadcast_shapes(*(np.shape(x) for x in (q, qd, qdd) if x is not None))[:-1]
-        array = np.asarray(elements, dtype=object)
-        numbers = [np.broadcast_to(element.value(values), batch) for element in array.flat]
-        return np.stack(numbers, axis=-1).reshape(*batch, *array.shape) if numbers else np.zeros((*batch, *array.shape))
+        """Return the numbers of elements, also of those written in sums of angles, at states.
+
+        Parameters
+        ----------
+        elements
+            One, or an array of them.
+        q, qd, qdd
+            Joint values, rates and accelerations, shapes (..., n), rad, m and seconds; batch axes broadcast. Rates and
+            accelerations are 0 unless given.
+
+        Returns
+        -------
+        Array
+            Shape (..., *elements.shape), SI.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A joint vector of another shape, or not numeric.
+        """
+        named = (
+            ("q", q),
+            ("qd", np.zeros(self.n) if qd is None else qd),
+            ("qdd", np.zeros(self.n) if qdd is None else qdd),
+        )
+        states = np.broadcast_arrays(*(joint_array(self.description, state, name) for name, state in named))
+        batch = states[0].shape[:-1]
+        shape = () if isinstance(elements, Element) else np.shape(elements)
+        listed = [elements] if isinstance(elements, Element) else np.asarray(elements, dtype=object).ravel().tolist()
+        values = {ring: ring.values(self.values, *states) for ring in {element.ring for element in listed}}
+        numbers = np.empty((*batch, len(listed)))
+        for k, element in enumerate(listed):
+            numbers[..., k] = element.value(values[element.ring])
+        return numbers.reshape((*batch, *shape))
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from fractions import Fraction
 from dhkit.errors import ExpressionError
 from dhkit.expressions import PI, Atom, Expression, cos, sin, substitute
 from dhkit.expressions.exact import Monomial
-from dhkit.symbolic.reading import is_exact, reciprocal_text
-from dhkit.symbolic.ring import Constant
+from dhkit.symbolic.ring.reading import is_exact, reciprocal_text
+from dhkit.symbolic.ring.ring import Constant
 
 __all__ = ["Constants", "value_of"]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from dhkit.description import write_atomically
-from dhkit.symbolic.graph import Graph, Node
+from dhkit.symbolic.programs.graph import Graph, Node
 
 __all__ = ["c_source", "export_c", "python_lines"]
 

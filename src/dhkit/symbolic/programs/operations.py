@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from dhkit.symbolic.graph import Graph
+from dhkit.symbolic.programs.graph import Graph
 
 __all__ = ["operation_count"]
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dhkit.description import Convention, Description
-from dhkit.symbolic.bodies import Moments
-from dhkit.symbolic.vectors import Scalar, Vector3, about_x, about_x_back, about_z, about_z_back
+from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, about_x_back, about_z, about_z_back
 
 if TYPE_CHECKING:
     import casadi
 
-    from dhkit.symbolic.inertial_table import InertialTable
+    from dhkit.symbolic.differentiable.inertial_table import InertialTable
 
 __all__ = ["JointRow", "Station", "joint_rows", "stations"]
 

@@ -1,0 +1,1 @@
+"""Straight-line programs: read from expressions, counted, and printed as Python and C."""

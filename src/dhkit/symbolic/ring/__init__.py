@@ -1,0 +1,22 @@
+"""The exact ring: polynomials in sines, cosines and parameters, in a normal form that decides equality."""
+
+from dhkit.symbolic.ring.constants import Constants, value_of
+from dhkit.symbolic.ring.elements import Element, Elements, RingError, translated
+from dhkit.symbolic.ring.polynomials import Monomial
+from dhkit.symbolic.ring.reading import Direction
+from dhkit.symbolic.ring.ring import Constant, Generator, Ring, angle_name
+
+__all__ = [
+    "Constant",
+    "Constants",
+    "Direction",
+    "Element",
+    "Elements",
+    "Generator",
+    "Monomial",
+    "Ring",
+    "RingError",
+    "angle_name",
+    "translated",
+    "value_of",
+]
