@@ -61,6 +61,13 @@ def read(ring, text):
     """Return the element that a text stands for, by the parser of robot files and answers."""
     written = notation(ring).names
     names = {g.text: ring._element((g.kind, g.joint)) for g in ring.generators if g.kind != "constant"}
+    turning = [i for i in range(ring.n) if ring.kinds[i] == "R"]
+    for k, first in enumerate(turning):
+        s, c, joints = ring.sine(first), ring.cosine(first), str(first + 1)
+        for last in turning[k + 1 :]:
+            own, other = ring.sine(last), ring.cosine(last)
+            s, c, joints = s * other + c * own, c * other - s * own, joints + str(last + 1)
+            names |= {f"s{joints}": s, f"c{joints}": c}
     names |= {written[text]: ring.constant(text) for text in ring.constants if text in written}
     names_of_file = {after: before for before, after in written.items()}
     total = ring.zero
@@ -101,6 +108,22 @@ def test_text_reads_back_as_what_was_printed(name):
     lag = lagrangian(library_robot(name))
     for element in [*lag.M.flat, *lag.C.flat, *lag.g, lag.V]:
         assert read(lag.arm.ring, plain_text(element)) == element
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_what_is_printed_in_sums_of_angles_reads_back(name):
+    lag = lagrangian(library_robot(name))
+    printed = {
+        head: right
+        for line in re.sub(r"\n +", " ", lag.text(("M", "C", "g"))).splitlines()
+        if re.match(r"[MCg]\d", line)
+        for *heads, right in [line.split(" = ")]
+        for head in heads
+    }
+    for quantity in ("M", "C", "g"):
+        for place, element in np.ndenumerate(getattr(lag, quantity)):
+            head = quantity + "".join(str(k + 1) for k in place)
+            assert read(lag.arm.ring, printed[head]) == element
 
 
 @pytest.mark.parametrize(
@@ -177,13 +200,13 @@ def test_planar2r_prints_as_textbooks_write():
         "C21 = m2*l1*l2*s2*qd1/2",
         "C22 = 0",
         "",
-        "g1 = g*(m1*l1*c1/2 + m2*(l1*c1 + l2*(c1*c2 - s1*s2)/2))",
-        "g2 = m2*g*l2*(c1*c2 - s1*s2)/2",
+        "g1 = g*(m1*l1*c1/2 + m2*(l1*c1 + l2*c12/2))",
+        "g2 = m2*g*l2*c12/2",
         "",
         "h1 = -m2*l1*l2*s2*qd1*qd2 - m2*l1*l2*s2*qd2^2/2",
         "h2 = m2*l1*l2*s2*qd1^2/2",
         "",
-        "where c1 = cos(q1), s1 = sin(q1), c2 = cos(q2), s2 = sin(q2)",
+        "where c1 = cos(q1), c2 = cos(q2), s2 = sin(q2), c12 = cos(q1 + q2)",
     ]
 
 

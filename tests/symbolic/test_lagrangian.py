@@ -147,7 +147,7 @@ def _links_alone(lag):
 
 
 def test_planar2r_is_spongs():
-    """Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, 2006, section 7.3.2, planar elbow manipulator."""
+    """Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, 2006, section 7.4, planar elbow manipulator."""
     lag = lagrangian(library_robot("planar2r"))
     m1, m2, l1, l2, g, c1, c2, c12, s2, w1, w2 = _two_links(lag)
     lc1, lc2, I1, I2 = l1 * HALF, l2 * HALF, m1 * l1**2 * TWELFTH, m2 * l2**2 * TWELFTH

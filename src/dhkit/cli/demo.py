@@ -114,8 +114,8 @@ def _equations(arm: Arm, folder: Path) -> str:
     operations = operation_count(dynamics_graph("inverse_dynamics", arm.description, ("q", "qd", "qdd")))
     sums, products = operations.get("additions", 0), operations.get("multiplications", 0)
     return (
-        f"M qdd + C qd + g proved equal to Euler and Lagrange's equation in {seconds:.2f} s; {folder / 'equations.html'}"
-        f" and .tex; inverse dynamics in {products} multiplications and {sums} additions"
+        f"M qdd + C qd + g proved equal to Euler and Lagrange's equation in {seconds:.2f} s: "
+        f"{folder / 'equations.html'} and .tex; inverse dynamics in {products} multiplications and {sums} additions"
     )
 
 

@@ -120,5 +120,6 @@ def constants_of(generators: Iterable[Generator]) -> list[Generator]:
 
 def angles_of(generators: Iterable[Generator]) -> list[Angle]:
     """Return the sines and cosines among generators, joint by joint, cosines first."""
-    found = [Angle(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints]
+    # Entries in other angles have generators of their own of the same name.
+    found = {Angle(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
     return sorted(found, key=lambda angle: (len(angle.joints) > 1, angle.joints, angle.function))
