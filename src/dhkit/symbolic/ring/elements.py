@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Element", "Elements", "RingError", "Scalar", "translated"]
 
-MAX_TERMS = 400_000
-"""Terms of one element: some hundred times those of a PUMA's longest, a few hundred megabytes."""
+MAX_TERMS = 300_000
+"""Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
+MAX_PAIRS = 1_000_000
+"""Pairs of terms that one product may have: twelve times that Jaco's; seconds on sympy's rings."""
 
 
 class RingError(DhkitError):
@@ -60,7 +62,7 @@ class Element:
         if len(self.polynomial) == 0:
             return self
         factor = self._coerced(other)
-        if len(self.polynomial) * len(factor) > MAX_TERMS * 16:
+        if len(self.polynomial) * len(factor) > MAX_PAIRS:
             raise RingError(
                 f"a product of {len(self.polynomial)} by {len(factor)} terms: too long to be derived exactly; "
                 "fewer symbols (symbols='none'), or fewer joints (lock), make it shorter"
