@@ -19,8 +19,8 @@ __all__ = ["Element", "Elements", "RingError", "Scalar", "translated"]
 
 MAX_TERMS = 300_000
 """Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
-MAX_PAIRS = 1_000_000
-"""Pairs of terms that one product may have: twelve times that Jaco's; seconds on sympy's rings."""
+MAX_PAIRS = 500_000
+"""Pairs of terms that one product may have: six times that Jaco's; seconds on sympy's rings."""
 
 
 class RingError(DhkitError):
