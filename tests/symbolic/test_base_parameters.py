@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
-from dhkit.description import library_robot
+from dhkit.description import from_dh, library_robot, with_uniform_links
 from dhkit.model import pinocchio_model
 from dhkit.symbolic.exact.base_parameters import base_parameters
 from dhkit.symbolic.exact.lagrangian import lagrangian
@@ -99,3 +99,11 @@ def numeric_rank(description) -> int:
     size = np.linalg.norm(Y, axis=0)
     used = size > NOISE * size.max()
     return int(np.linalg.matrix_rank(Y[:, used] / size[used], tol=NOISE))
+
+
+def test_names_that_the_file_has_are_left_to_it():
+    description = from_dh([(0, 0, "M2", 0), (0, 0, "ZZ1", 0)], parameters={"M2": 0.3, "ZZ1": 0.2})
+    base = base_parameters(with_uniform_links(description))
+    assert base.names == ("ZZ1_", "MX1_", "MY1_", "ZZ2_", "MX2_", "MY2_")
+    assert base.prove()
+    assert max(errors(base.lagrangian, 5, ("M", "h", "g")).values()) <= 1e-12

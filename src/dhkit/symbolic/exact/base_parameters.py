@@ -18,7 +18,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Named
 from dhkit.expressions import Expression, exact, substitute
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.composite import RigidBody, Step
@@ -102,7 +102,7 @@ def base_parameters(description: Description) -> BaseParameters:
     definitions = _regrouped(full.arm)
     trial = _equations(full.arm, definitions)
     definitions = _independent(trial, definitions)
-    return BaseParameters(definitions, _equations(full.arm, definitions), full)
+    return BaseParameters(Named(definitions), _equations(full.arm, definitions), full)
 
 
 def _regrouped(arm: ExactArm) -> dict[str, Element]:
@@ -112,11 +112,18 @@ def _regrouped(arm: ExactArm) -> dict[str, Element]:
         moving, bodies[j] = _split(arm.ring, arm.ring.kinds[j], bodies[j])
         bodies[j - 1] = bodies[j - 1] + moving.moved(_at_rest(arm, j, steps[j]))
     definitions: dict[str, Element] = {}
+    end = _ending(arm)
     for j, body in enumerate(bodies, start=1):
-        definitions |= {f"{key}{j}": body.second[place] for key, place in SECOND.items()}
-        definitions |= {f"{key}{j}": body.moment[k] for key, k in MOMENT.items()}
-        definitions |= {f"M{j}": body.mass, f"Ia{j}": arm.armature[j - 1]}
+        definitions |= {f"{key}{j}{end}": body.second[place] for key, place in SECOND.items()}
+        definitions |= {f"{key}{j}{end}": body.moment[k] for key, k in MOMENT.items()}
+        definitions |= {f"M{j}{end}": body.mass, f"Ia{j}{end}": arm.armature[j - 1]}
     return {name: element for name, element in definitions.items() if element}
+
+
+def _ending(arm: ExactArm) -> str:
+    """Return what our names end in: an underscore where a parameter of the file has one of them."""
+    names = {f"{key}{j}" for key in (*SECOND, *MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
+    return "" if names.isdisjoint(arm.ring.constants) else "_"
 
 
 def _split(ring: Ring, kind: str, body: RigidBody) -> tuple[RigidBody, RigidBody]:
@@ -151,9 +158,10 @@ def _mapped(elements: Elements, ring: Ring, places: Mapping[int, Element]) -> El
 def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
     """Return the equations of motion with a symbol for each definition."""
     ring = Ring(arm.ring.kinds, [*_kept(arm), *(Constant(name) for name in definitions)])
+    end = _ending(arm)
 
     def named(name: str) -> Element:
-        return ring.constant(name) if name in definitions else ring.zero
+        return ring.constant(f"{name}{end}") if f"{name}{end}" in definitions else ring.zero
 
     def body(j: int) -> RigidBody:
         second = np.empty((3, 3), dtype=object)
@@ -177,7 +185,7 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
     )
     bodies = [body(j) for j in range(1, arm.n + 1)]
     M, V = composite.mass_matrix(short, bodies), composite.potential_energy(short, bodies)
-    return Lagrangian(short, M, V, dict(definitions))
+    return Lagrangian(short, M, V, Named(definitions))
 
 
 def _row(row: ExactRow, ring: Ring) -> ExactRow:
@@ -187,12 +195,12 @@ def _row(row: ExactRow, ring: Ring) -> ExactRow:
 
 def _kept(arm: ExactArm) -> list[Constant]:
     """Return the constants of table and gravity: those that are not, or hold, an inertial parameter."""
-    geometry = {*arm.gravity.flat, *arm.origin.flat}
+    geometry = [*arm.gravity, *arm.origin]
     for row in arm.rows:
-        geometry |= {row.a, row.d, *row.alpha, *row.theta}
-    inertial = {*arm.gear, *arm.rotor}
+        geometry += [row.a, row.d, *row.alpha, *row.theta]
+    inertial = [*arm.gear, *arm.rotor]
     for body in arm.bodies:
-        inertial |= {body.mass, *body.moment.flat, *body.second.flat}
+        inertial += [body.mass, *body.moment, *body.second.flat]
     names = _constants(inertial) - _constants(geometry)
     return [
         constant
@@ -201,7 +209,7 @@ def _kept(arm: ExactArm) -> list[Constant]:
     ]
 
 
-def _constants(elements: set[Element]) -> set[str]:
+def _constants(elements: Sequence[Element]) -> set[str]:
     return {
         generator.text
         for element in elements

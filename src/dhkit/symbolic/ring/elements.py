@@ -111,7 +111,8 @@ class Element:
         return NotImplemented
 
     def __hash__(self) -> int:
-        return hash(str(self))
+        # Equal elements may be written in two ways, with reciprocals or sums of angles.
+        return hash(self.ring)
 
     def _cleared(self) -> Element:
         """Return this times what its reciprocals are the reciprocals of: zero only together with this.
