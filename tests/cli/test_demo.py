@@ -82,10 +82,10 @@ def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["ok"]
-    assert [stage["stage"] for stage in report["stages"]] == ["build", "verify", "figure", "ik", "page"]
+    assert [stage["stage"] for stage in report["stages"]] == ["build", "verify", "equations", "figure", "ik", "page"]
     assert re.fullmatch(
         r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches",
-        report["stages"][3]["result"],
+        report["stages"][4]["result"],
     )
 
 

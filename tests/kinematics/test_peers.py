@@ -30,8 +30,8 @@ def away(ours, theirs):
     return max(gaps.min(axis=0).max(), gaps.min(axis=1).max())
 
 
-def solutions_of(contender, arm, q, T):
-    task = contender.setup(Workload(arm, q, T))
+def solutions_of(contender, arm, q):
+    task = contender.setup(Workload(arm, q, q, q))
     return task.answers(len(q))
 
 
@@ -43,7 +43,7 @@ def test_eaik_finds_the_same_solutions(name, law):
     T = arm.fk(q)
     solutions = arm.ik(T)
     contender = next(x for x in eaik.contenders() if x.name == eaik.SINGLE)
-    for k, theirs in enumerate(solutions_of(contender, arm, q, T)):
+    for k, theirs in enumerate(solutions_of(contender, arm, q)):
         ours = solutions.q[k][solutions.valid[k]]
         law.holds("distance of the sets of solutions to EAIK's", away(ours, theirs), SAME, (name, q[k]))
 
