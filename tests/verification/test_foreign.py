@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,7 +14,8 @@ from dhkit import Arm
 from dhkit.cli import main
 from dhkit.description import asset, library_robot
 from dhkit.errors import ModelError
-from dhkit.model.foreign_urdf import MAX_BYTES, read_chain
+from dhkit.model.foreign_urdf import read_chain
+from dhkit.model.urdf_checks import MAX_BYTES
 from dhkit.verification import verify_urdf
 
 pytestmark = pytest.mark.usefixtures("array_kernels")
@@ -100,10 +105,15 @@ BAD = {
     ),
     "no such link": (simple().replace('child link="b"', 'child link="x"'), "joint 'j': no link 'x'"),
     "same names": (simple(more='<link name="b"/>'), "two of one name"),
-    "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "<mass value>: found 'nan'"),
-    "no number": (simple().replace('ixx="1"', 'ixx="one"'), "<inertia ixx>: found 'one'"),
-    "zero axis": (simple(axis="0 0 0"), "expected a direction"),
-    "no mass": (simple().replace('<mass value="1"/>', ""), "without <mass>"),
+    "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "link 'b': <mass value>: found 'nan'"),
+    "no number": (simple().replace('ixx="1"', 'ixx="one"'), "link 'b': <inertia ixx>: found 'one'"),
+    "zero axis": (simple(axis="0 0 0"), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
+    "short axis": (simple(axis="0 1"), "joint 'j': <axis xyz> has 2 numbers; expected 3"),
+    "negative mass": (simple().replace('mass value="1"', 'mass value="-1"'), "link 'b': mass is -1"),
+    "no limit": (re.sub(r"<limit [^>]*>", "", simple()), "joint 'j' is revolute and has no <limit>"),
+    "mimic": (simple().replace("<limit", '<mimic joint="x"/><limit'), "joint 'j' follows another (mimic)"),
+    "hinge": (simple("hinge"), "joint 'j' is 'hinge'; expected revolute, continuous, prismatic or fixed"),
+    "no mass": (simple().replace('<mass value="1"/>', ""), "link 'b': <inertial> lacks mass"),
     "two trees": (simple(more='<link name="z"/>'), "2 links without a parent"),
     "many joints": (
         "<robot><link name='l0'/>"
@@ -115,7 +125,6 @@ BAD = {
         "3999 joints; expected 500 at most",
     ),
     "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
-    "planar joint": (simple("planar"), "expected R"),
     "sliding": (simple("prismatic"), "joints j are P; expected R as in"),
 }
 
@@ -133,6 +142,64 @@ def test_bad_files_get_one_line(name, tmp_path, capsys):
         main(["verify", "planar2r", "--urdf", str(file)])
     assert stopped.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "folder", "pipe"])
+def test_what_is_no_file_is_not_read(path, tmp_path):
+    path = tmp_path / path if path != "/dev/zero" else Path(path)
+    if path.name == "folder":
+        path.mkdir()
+    if path.name == "pipe":
+        os.mkfifo(path)
+    with pytest.raises(ModelError, match="a folder|not a regular file"):
+        read_chain(path)
+
+
+def changed(tmp_path, old, new, *, joint=None):
+    """Return how the Stanford arm differs from its URDF with one text replaced, behind a joint's name if given."""
+    text = asset("urdf/stanford.urdf").read_text()
+    start = text.index(f'<joint name="{joint}"') if joint else 0
+    assert old in text[start:]
+    file = tmp_path / "changed.urdf"
+    file.write_text(text[:start] + text[start:].replace(old, new, 1))
+    report = verify_urdf(library_robot("stanford"), file, samples=10)
+    return report.ok, " | ".join(report.notes[1:])
+
+
+def test_differences_are_said_joint_by_joint(tmp_path):
+    axis, other = '<axis xyz="0 0 1" />', '<axis xyz="0 0 -1" />'
+    assert changed(tmp_path, axis, other, joint="shoulder") == (
+        False,
+        "joint 2 (shoulder) moves the other way in the URDF",
+    )
+    assert changed(tmp_path, axis, other, joint="boom") == (False, "joint 3 (boom) moves the other way in the URDF")
+    ok, said = changed(tmp_path, 'rpy="-1.5707963267948966 0 0"', 'rpy="-1.5707963267948966 0.2 0"', joint="shoulder")
+    assert (ok, said) == (False, "joint 2 (shoulder): the URDF's zero is at 11.4592 degrees of the table's")
+    ok, said = changed(tmp_path, axis, '<axis xyz="1 0 0" />', joint="wrist_pitch")
+    assert (ok, said) == (False, "joint 5 (wrist_pitch): with all joints at zero its axis is turned by 90 degrees")
+
+
+def test_differences_are_said_link_by_link(tmp_path):
+    assert changed(tmp_path, '<mass value="5.01"', '<mass value="5.02"') == (
+        False,
+        "link 2 (shoulder): mass is 5.02 kg in the URDF, 5.01 kg in the table",
+    )
+    # The mass of the first link, which turns about the axis that its centre lies on, moves nothing.
+    ok, said = changed(tmp_path, '<mass value="9.29"', '<mass value="9.3"')
+    assert "link 1 (waist): mass is 9.3 kg" in said
+
+
+def test_axes_of_fixed_joints_and_limits_of_continuous_ones_do_not_matter(tmp_path):
+    assert changed(tmp_path, '<child link="tool" />', '<child link="tool" /><axis xyz="0 0 0"/>') == (True, "")
+    assert changed(tmp_path, 'type="revolute"', 'type="continuous"') == (True, "")
+
+
+def test_names_cannot_break_a_report(tmp_path):
+    file = tmp_path / "names.urdf"
+    file.write_text(simple().replace('name="j"', 'name="a&#10;b&#155;|&lt;c>"'))
+    report = verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=3)
+    assert "joints in order: a?b?|<c>" in str(report)
+    assert "a?b?\\|&lt;c>" in report.markdown()
 
 
 def test_other_encodings_and_missing_files(tmp_path):

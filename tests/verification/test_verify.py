@@ -131,6 +131,7 @@ def test_reports_for_people_and_papers():
     assert "a\\_note" in latex
     assert "\\mathrm{NaN}" in latex
     assert latex.count("{") == latex.count("}")
+    assert "\\scriptsize q = [0.1, 0.2]" in latex
     assert json.loads(json.dumps(report().json()))["agreements"][0]["ok"] is True
 
 

@@ -12,13 +12,17 @@ from dhkit.description import Array, Description, pose_parts
 from dhkit.errors import ModelError
 from dhkit.model.foreign_urdf import Chain, chain_model, read_chain
 from dhkit.verification.comparison import Comparison, largest, worst
+from dhkit.verification.differences import differences
 from dhkit.verification.measure import Floors, relative_error
 from dhkit.verification.reference import Reference
-from dhkit.verification.report import VerificationReport
+from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.states import random_motions
 
 __all__ = ["verify_urdf"]
 
+BASE_MOVED = "the arms differ by a constant base"
+ROUNDING = 1e-12
+"""m and rotation entries: what is below is no difference of two arms."""
 CLOSE = 1e-6
 """m and rotation entries: poses that differ by less from state to state differ by a constant transform."""
 
@@ -56,8 +60,8 @@ def verify_urdf(
     ValueError
         ``samples`` is below 1, or a tolerance that is not positive.
     """
-    if not tolerance > 0:
-        raise ValueError(f"tolerance is {tolerance}; expected a positive number")
+    if not 0 < tolerance < np.inf:
+        raise ValueError(f"tolerance is {tolerance}; expected a positive, finite number")
     chain = read_chain(path, tip)
     if chain.kinds != description.kinds:
         raise ModelError(
@@ -69,8 +73,11 @@ def verify_urdf(
     model.armature = np.array(description.numbers.armature)
     motion = random_motions(description, samples, seed)
     reference = Reference(model, motion)
-    notes = [f"joints in order: {', '.join(chain.joints)}; tool: {chain.tip}", *_limits(description, chain)]
+    notes = [f"joints in order: {', '.join(chain.joints)}; tool: {chain.tip}", *chain.notes]
+    notes += _limits(description, chain)
     comparisons = list(_tool(description, reference, chain.tip, tolerance, notes))
+    if not any(note.startswith(BASE_MOVED) for note in notes):
+        notes += differences(description, model, tolerance)
     if all(joint.body is not None for joint in description.joints):
         comparisons += _dynamics(description, reference, tolerance)
     else:
@@ -79,11 +86,11 @@ def verify_urdf(
 
     return VerificationReport(
         robot=description.name,
-        reference=f"{Path(path).name} in Pinocchio {pin.__version__}",
+        reference=f"{printable(Path(path).name)} in Pinocchio {pin.__version__}",
         samples=samples,
         seed=seed,
         agreements=tuple(worst(comparison, motion) for comparison in comparisons),
-        notes=tuple(notes),
+        notes=tuple(map(printable, notes)),
     )
 
 
@@ -95,7 +102,7 @@ def _tool(
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
-    if max(position.max(), rotation.max()) > tolerance:
+    if max(position.max(), rotation.max()) > max(tolerance, ROUNDING):
         notes += _constant_offset(ours, theirs)
     yield Comparison("tool position", position, tolerance)
     yield Comparison("tool rotation", rotation, tolerance)

@@ -39,7 +39,7 @@ def relative_error(ours: Array, reference: Array, floor: Array | float = 0.0) ->
         raise ValueError(f"shapes {ours.shape} and {reference.shape}; expected equal ones")
     difference = _largest(ours - reference)
     size = np.maximum(_largest(reference), floor)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         return np.where(difference == 0, 0.0, difference / size)
 
 
@@ -68,7 +68,7 @@ class Floors:
         inertia, rate = _largest(M), _largest(qd)
         g = np.full(len(M), weight)
         C, h = inertia * rate, inertia * rate**2
-        with np.errstate(divide="ignore"):
+        with np.errstate(all="ignore"):
             fastest = _largest(tau) / np.min(np.diagonal(M, axis1=-2, axis2=-1), axis=-1)
         return cls(g, C, h, g + h, g + h + inertia * _largest(qdd), fastest)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Agreement", "VerificationReport"]
+__all__ = ["Agreement", "VerificationReport", "printable"]
 
 MEASURE = (
     "Errors are largest differences of an entry at one state: of positions and linear Jacobians over the arm's reach "
@@ -105,15 +105,15 @@ class VerificationReport:
     def markdown(self) -> str:
         """Return the report as Markdown."""
         rows = [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]
-        table = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-        notes = [f"- {note}" for note in self.notes]
-        return "\n".join([f"# {self._title}", "", *table, "", *notes, *([""] if notes else []), MEASURE, ""])
+        table = ["| " + " | ".join(_plain(cell) for cell in row) + " |" for row in rows]
+        notes = [f"- {_plain(note)}" for note in self.notes]
+        return "\n".join([f"# {_plain(self._title)}", "", *table, "", *notes, *([""] if notes else []), MEASURE, ""])
 
     def latex(self) -> str:
         """Return a table for a paper's appendix: booktabs, with a caption that says what was measured."""
         rows = [
             f"{_escaped(agreement.quantity)} & ${_power(agreement.error)}$ & ${_power(agreement.tolerance)}$ & "
-            f"{'yes' if agreement.ok else 'no'} \\\\"
+            f"{'yes' if agreement.ok else 'no'} & \\scriptsize {_escaped(agreement.state)} \\\\"
             for agreement in self.agreements
         ]
         caption = f"{_escaped(self._title)}. {_escaped(' '.join([*self.notes, MEASURE]))}"
@@ -123,9 +123,9 @@ class VerificationReport:
                 "\\begin{table}",
                 "  \\centering",
                 f"  \\caption{{{caption}}}",
-                "  \\begin{tabular}{lccc}",
+                "  \\begin{tabular}{lcccp{0.42\\linewidth}}",
                 "    \\toprule",
-                "    quantity & worst error & at most & agrees \\\\",
+                "    quantity & worst error & at most & agrees & worst state \\\\",
                 "    \\midrule",
                 *(f"    {row}" for row in rows),
                 "    \\bottomrule",
@@ -149,11 +149,21 @@ class VerificationReport:
         ]
 
 
+def printable(text: str) -> str:
+    """Return text from a file with what would break a line or command a terminal replaced."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
 SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
     "\\": "\\textbackslash{}",
     "~": "\\textasciitilde{}",
     "^": "\\textasciicircum{}",
 }
+
+
+def _plain(text: str) -> str:
+    """Return text that Markdown does not take for a table's or HTML's."""
+    return text.replace("|", "\\|").replace("<", "&lt;")
 
 
 def _escaped(text: str) -> str:
