@@ -379,7 +379,7 @@ class Arm:
         return pinocchio_model(self._description)
 
     def verify(self, samples: int = 1000, seed: int = 0) -> VerificationReport:
-        """Hold our kinematics against Pinocchio's over random states; ``.ok`` says whether they agree."""
+        """Hold our kinematics and dynamics against Pinocchio's over random states; ``.ok`` says whether they agree."""
         from dhkit.verification import verify
 
         return verify(self._description, samples, seed)

@@ -47,8 +47,8 @@ def number_array(value: ArrayLike, name: str, shape: str) -> Array:
             raise TypeError
         return array.astype(float, copy=False)
     except (TypeError, ValueError):
-        kind = type(value).__name__
-        raise TypeError(f"{name}: found {kind} of other things; expected numbers, shape {shape}") from None
+        found = repr(value)[:60] if isinstance(value, str) else f"{type(value).__name__} of other things"
+        raise TypeError(f"{name}: found {found}; expected numbers, shape {shape}") from None
 
 
 def link_transforms(description: Description, q: ArrayLike) -> Array:

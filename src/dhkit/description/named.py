@@ -37,5 +37,8 @@ class Named(Mapping[str, V]):
     def __hash__(self) -> int:
         return hash(frozenset(self._items.items()))
 
+    def __reduce__(self) -> tuple[type[Named[V]], tuple[dict[str, V]]]:
+        return Named, (self._items,)
+
     def __repr__(self) -> str:
         return f"Named({self._items!r})"

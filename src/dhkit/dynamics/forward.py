@@ -93,11 +93,11 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
 
 def _failing(M: Array) -> Array:
     """Return, of each matrix (N, n, n), the last joint that feels no inertia, or -1; as ``solve_for_acceleration``."""
-    A, diagonal = M.copy(), np.diagonal(M, axis1=-2, axis2=-1).copy()
+    A, least = M.copy(), SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
     failing = np.full(len(M), -1)
     for k in reversed(range(M.shape[-1])):
         pivot = A[:, k, k].copy()
-        singular = (pivot <= SINGULAR * diagonal[:, k]) & (failing < 0)
+        singular = (pivot <= least) & (failing < 0)
         failing[singular] = k
         with np.errstate(all="ignore"):  # what comes behind a singular pivot is of no interest
             A -= A[:, :, k, None] * A[:, None, k, :] / pivot[:, None, None]

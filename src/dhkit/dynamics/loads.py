@@ -98,21 +98,12 @@ def external_torque(
     ValueError, TypeError
         As for :func:`friction_torque` and :func:`wrench_torque`; ``friction`` is neither a bool nor a Friction.
     """
-    model = _chosen(friction)
+    model = Friction.chosen(friction)
     push = None if wrench is None else wrench_torque(description, q, wrench, threads)
     if model is None:
         return push
     loss = friction_torque(description, qd, model, threads=threads)
     return -loss if push is None else push - loss
-
-
-def _chosen(friction: bool | Friction) -> Friction | None:
-    """Return what ``friction=`` means."""
-    if isinstance(friction, Friction):
-        return friction
-    if not isinstance(friction, bool | np.bool_):
-        raise TypeError(f"friction is {friction!r}; expected False, True or a Friction")
-    return Friction() if friction else None
 
 
 def _friction_graph(name: str, n: int, smooth: bool) -> Graph:

@@ -60,9 +60,9 @@ def evaluate(
     ValueError, TypeError
         A joint vector of another shape, or not numeric; ``out`` does not fit.
     """
+    arrays = [joint_array(description, state, name) for name, state in states.items()]
     pattern, parameters = _pattern_of(description)
     run = kernel(quantity, pattern, lambda: dynamics_graph(quantity, description, tuple(states)))
-    arrays = [joint_array(description, state, name) for name, state in states.items()]
     return fill(run, parameters, arrays, tail, out, threads)
 
 

@@ -81,6 +81,7 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
                 arm = frames[i + 1][..., :3, 3] - p
                 effort = moment + np.cross(arm[..., None], force, axisa=-2, axisb=-2, axisc=-2)
             Y[..., j, 10 * i : 10 * i + 10] = np.einsum("...k,...kp->...p", z, effort)
+    Y[~np.isfinite(q + qd + qdd).all(axis=-1)] = np.nan
     return Y
 
 

@@ -40,10 +40,14 @@ def fill(
     Raises
     ------
     ValueError
-        ``out`` has another shape, type or layout, or ``threads`` is below 1.
+        The batch axes do not broadcast, ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
     check_whole("threads", threads, 1)
-    batch = states[0].shape[:-1] if len(states) == 1 else np.broadcast_shapes(*(state.shape[:-1] for state in states))
+    shapes = [state.shape[:-1] for state in states]
+    try:
+        batch = shapes[0] if len(states) == 1 else np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ValueError(f"the arguments' batch axes {', '.join(map(str, shapes))} do not broadcast") from None
     out = result_array((*batch, *tail), out)
     if not out.size:
         return out

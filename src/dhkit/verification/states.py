@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.kernels import check_whole
 
 __all__ = ["Motion", "random_motions", "random_states"]
 
@@ -28,10 +29,10 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
     Raises
     ------
     ValueError
-        ``samples`` is below 1.
+        ``samples`` is no whole number from 1 on, or ``seed`` none from 0 on.
     """
-    if samples < 1:
-        raise ValueError(f"samples is {samples}; expected 1 or more")
+    check_whole("samples", samples, 1)
+    check_whole("seed", seed, 0)
     numbers = description.numbers
     bounded = np.isfinite(numbers.lower) & np.isfinite(numbers.upper) & numbers.prismatic
     lower = np.where(bounded, numbers.lower, np.where(numbers.prismatic, -1.0, -np.pi))
@@ -47,10 +48,10 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Mot
     Raises
     ------
     ValueError
-        ``samples`` is below 1.
+        ``samples`` is no whole number from 1 on, or ``seed`` none from 0 on.
     """
-    if samples < 1:
-        raise ValueError(f"samples is {samples}; expected 1 or more")
+    check_whole("samples", samples, 1)
+    check_whole("seed", seed, 0)
     numbers, rng, shape = description.numbers, np.random.default_rng(seed), (samples, description.n)
     limited = np.isfinite(numbers.lower) & np.isfinite(numbers.upper)
     free = np.where(numbers.prismatic, 1.0, np.pi)

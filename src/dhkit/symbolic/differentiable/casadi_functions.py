@@ -36,7 +36,7 @@ class CasadiFunctions:
     description
         The robot; dynamics need a body on every link.
     friction
-        Friction of the joints in inverse and forward dynamics.
+        Friction of the joints in inverse and forward dynamics: True for a step, or a :class:`Friction`.
     payload
         Whether dynamics and energies take a load: ``payload_mass`` (kg), ``payload_com`` (3, m, in the tool's frame)
         and ``payload_inertia`` (6: xx, yy, zz, xy, yz, xz about its centre of mass in the tool's axes, kg m^2).
@@ -48,6 +48,8 @@ class CasadiFunctions:
     ------
     DescriptionError
         By the functions of dynamics: a link without a body.
+    TypeError
+        A layer that is none.
 
     Examples
     --------
@@ -58,14 +60,23 @@ class CasadiFunctions:
     """
 
     def __init__(
-        self, description: Description, friction: Friction | None = None, payload: bool = False, wrench: bool = False
+        self,
+        description: Description,
+        friction: bool | Friction | None = None,
+        payload: bool = False,
+        wrench: bool = False,
     ) -> None:
+        for name, layer in (("payload", payload), ("wrench", wrench)):
+            if not isinstance(layer, bool):
+                raise TypeError(f"{name} is {layer!r}; expected True or False")
         self._description = description
-        self._friction = friction
+        self._friction = Friction.chosen(friction)
         self._payload = payload
         self._wrench = wrench
 
-    def layered(self, friction: Friction | None = None, payload: bool = False, wrench: bool = False) -> CasadiFunctions:
+    def layered(
+        self, friction: bool | Friction | None = None, payload: bool = False, wrench: bool = False
+    ) -> CasadiFunctions:
         """Return the same arm's functions with these layers, and no others; see the class."""
         return CasadiFunctions(self._description, friction, payload, wrench)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING
 
 from dhkit.symbolic.differentiable.composite_bodies import composite_mass_matrix
@@ -14,24 +15,25 @@ if TYPE_CHECKING:
 __all__ = ["SINGULAR", "recursive_forward_dynamics", "solve_for_acceleration"]
 
 SINGULAR = 1e-14
-"""Of a diagonal entry of M: a pivot below that is what rounding leaves of 0."""
+"""Of the largest diagonal entry of M: a pivot below that is what rounding leaves of 0."""
 
 
 def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
     """Return qdd of M qdd = torque, n x 1, by the factors L^T D L (Featherstone 2008, section 6.5, for a full matrix).
 
     D_i is the inertia that joint i feels while the joints behind it swing freely; where one is not above ``SINGULAR``
-    times M_ii all entries are NaN. Only the upper triangle of M is read.
+    times the largest M_ii all entries are NaN. Only the upper triangle of M is read.
     """
     import casadi
 
     n = M.shape[0]
+    least = SINGULAR * reduce(casadi.fmax, [M[k, k] for k in range(n)])
     pivots, regular = [casadi.SX(0)] * n, casadi.SX(1)
     A = [[M[min(i, j), max(i, j)] for j in range(n)] for i in range(n)]
     b = [torque[i] for i in range(n)]
     factors = [[casadi.SX(0)] * n for _ in range(n)]
     for k in reversed(range(n)):
-        regular = casadi.logic_and(regular, A[k][k] > SINGULAR * M[k, k])
+        regular = casadi.logic_and(regular, A[k][k] > least)
         pivots[k] = 1 / A[k][k]
         for i in range(k):
             factors[k][i] = A[k][i] * pivots[k]

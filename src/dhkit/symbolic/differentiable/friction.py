@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 from dhkit.symbolic.differentiable.vectors import Scalar
@@ -13,6 +14,10 @@ if TYPE_CHECKING:
     import casadi
 
 __all__ = ["Friction", "friction_torque"]
+
+
+NARROWEST = 1e-9
+"""rad/s or m/s: squares of speeds and widths then neither vanish nor overflow."""
 
 
 @dataclass(frozen=True)
@@ -26,15 +31,31 @@ class Friction:
     Raises
     ------
     ValueError
-        A width that is negative or not finite.
+        A width that is not 0 and below 1e-9, or not finite.
     """
 
     width: float = 0.0
     """rad/s or m/s."""
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.width) and self.width >= 0):
-            raise ValueError(f"friction: width is {self.width!r}; expected a finite number, 0 or more")
+        known = isinstance(self.width, Real) and math.isfinite(self.width)
+        if not known or (self.width != 0 and self.width < NARROWEST):
+            raise ValueError(f"friction: width is {self.width!r}; expected 0, or a finite number from {NARROWEST:g} on")
+
+    @classmethod
+    def chosen(cls, friction: bool | Friction | None) -> Friction | None:
+        """Return what an argument ``friction=`` means: nothing, a step for True, or itself.
+
+        Raises
+        ------
+        TypeError
+            Something else.
+        """
+        if friction is None or isinstance(friction, Friction):
+            return friction
+        if type(friction).__name__ not in ("bool", "bool_"):
+            raise TypeError(f"friction is {friction!r}; expected False, True or a Friction")
+        return cls() if friction else None
 
     def direction(self, speed: Scalar) -> Scalar:
         """Return which way an expression goes: -1 to 1."""
