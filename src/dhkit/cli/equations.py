@@ -42,6 +42,8 @@ def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrang
         No such choice of symbols, or a link without a body.
     """
     known: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
+    if base and symbols not in ("file", "inertial"):
+        raise DescriptionError(f"--symbols {symbols}: base parameters are made of symbols; leave one of the two out")
     if symbols not in known:
         raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(known)}")
     return base_parameters(description).lagrangian if base else lagrangian(description, known[symbols])

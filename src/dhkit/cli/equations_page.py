@@ -26,7 +26,19 @@ __all__ = ["equations_page", "mathml"]
 
 EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
 MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
-UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m", "d": "m", "g": "m/s²"}
+UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m", "d": "m", "g": "m/s²"} | {
+    "M": "kg",
+    "MX": "kg m",
+    "MY": "kg m",
+    "MZ": "kg m",
+    "Ia": "kg m²",
+    "XX": "kg m²",
+    "XY": "kg m²",
+    "XZ": "kg m²",
+    "YY": "kg m²",
+    "YZ": "kg m²",
+    "ZZ": "kg m²",
+}
 """Of the symbols that we name ourselves, by their first letters."""
 LAW = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
 STYLE = """
@@ -94,24 +106,23 @@ def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
 def _constants(lag: Lagrangian, quantities: Sequence[Quantity]) -> Iterator[str]:
     """Yield a table of the constants that occur, with their values."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
-    values = dict(lag.description.numbers.values) | lag.constants
-    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.constants])}
-    used = symbols_of(constants_of(generators_of(elements)))
-    names = sorted(used, key=lambda name: (order.get(name, len(order)), name))
+    values = dict(lag.description.numbers.values) | lag.arm.parameters
+    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
+    rings = {name: x.ring for x in elements for name in symbols_of(constants_of(generators_of([x])))}
+    names = sorted(rings, key=lambda name: (order.get(name, len(order)), name))
     if not names:
         return
-    ring = elements[0].ring
     yield "<h2>Constants</h2>\n<table>\n<tr><th></th><th>name</th><th>value</th><th>unit</th></tr>"
     for name in names:
         value = float(values.get(name, math.nan))
-        cells = f"<td>{mathml(constant_latex(ring, name))}</td><td>{escape(name)}</td>"
+        cells = f"<td>{mathml(constant_latex(rings[name], name))}</td><td>{escape(name)}</td>"
         yield f'<tr>{cells}<td class="number">{value:.6g}</td><td>{_unit(lag, name)}</td></tr>'
     yield "</table>"
 
 
 def _unit(lag: Lagrangian, name: str) -> str:
     """Return the unit of a symbol that we named; the file's own parameters are in SI units."""
-    letters = re.match(r"Jm|[A-Za-z]", name)
+    letters = re.match(r"Jm|Ia|M[XYZ]|[XYZ]{2}|[A-Za-z]", name)
     if lag.arm.symbols != "inertial" or name in lag.description.parameters or not letters:
         return "SI"
     return UNITS.get(letters[0], "SI")

@@ -203,6 +203,8 @@ def derive(
         A link has no body.
     ValueError
         No such mistake, or no such link.
+    TypeError
+        Mistakes that are no names.
 
     Examples
     --------
@@ -211,8 +213,12 @@ def derive(
     >>> print(derive(library_robot("planar2r")).g[1] - wrong.g[1] == -2 * wrong.g[1])
     True
     """
+    if isinstance(mistakes, str):
+        raise TypeError(f"mistakes is {mistakes!r}; expected a set of names, as in {{{mistakes!r}}}")
     made = frozenset(mistakes)
     for mistake in made:
+        if not isinstance(mistake, str):
+            raise TypeError(f"mistake {mistake!r}: expected a name")
         _check(mistake, description)
     arm = exact_arm(description, symbols)
     return TextbookDerivation(arm, tuple(_links(arm, made)), made)
@@ -241,7 +247,9 @@ def _links(arm: ExactArm, mistakes: frozenset[str]) -> Iterable[LinkMotion]:
         R_own, p_own = _transform(arm, row)
         R, p = R_before @ R_own, p_before + R_before @ p_own
         axes.append((R_before if arm.is_standard else R)[:, 2])
-        yield _Link(arm, mistakes, i, R_own, R, p_before, p).motion(axes)
+        # What a student turns by the joint's own angle alone: the link from its joint on.
+        alone = p_before + p_own if arm.is_standard else p
+        yield _Link(arm, mistakes, i, R_own, R, p_before, p, alone).motion(axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,6 +263,8 @@ class _Link:
     R: Elements
     before: Elements
     origin: Elements
+    alone: Elements
+    """The frame's origin if frame i - 1 were not turned."""
 
     def has(self, mistake: str) -> bool:
         return has(self.mistakes, mistake, self.i)
@@ -283,15 +293,19 @@ class _Link:
 
     @property
     def end(self) -> Elements:
-        """The far end of the link, in its own frame: its origin, or (modified) the next frame's; the last has none."""
+        """The far end of the link, in its own frame: its origin, or (modified) the next one's; the last's: the tool."""
         ring, following = self.arm.ring, self.i + 1
-        if self.arm.is_standard or following == self.arm.n:
+        if following == self.arm.n:
+            return self.arm.tool
+        if self.arm.is_standard:
             return np.array([ring.zero] * 3, dtype=object)
         return _transform(self.arm, self.arm.rows[following])[1]
 
     def place(self, mistake: str) -> Elements:
         """Return where the centre of mass is, in frame 0."""
-        return self.origin + (self.R_own if self.has(mistake) else self.R) @ self.com  # type: ignore[no-any-return]
+        if self.has(mistake):
+            return self.alone + self.R_own @ self.com  # type: ignore[no-any-return]
+        return self.origin + self.R @ self.com  # type: ignore[no-any-return]
 
     def velocity(self) -> Elements:
         """Differentiate the position, and resolve it in the link's axes, where it is shortest."""
@@ -317,7 +331,7 @@ class _Link:
         if self.has("inertia_doubled"):
             tensor = 2 * tensor
         if self.has("inertia_axes"):
-            tensor = np.roll(tensor, (1, 1), (0, 1))
+            tensor = np.roll(tensor, (-1, -1), (0, 1))
         if self.has("inertia_about_joint"):
             lever = self.com - self.R.T @ (self.joint - self.origin)
             tensor = tensor + point_inertia(lever, self.mass * lever)

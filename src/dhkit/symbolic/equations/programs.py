@@ -144,9 +144,9 @@ class Program:
 def program(lag: Lagrangian, quantities: Sequence[Quantity], language: Language) -> Program:
     """Return quantities as functions in a language."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
-    values = dict(lag.description.numbers.values) | lag.constants
+    values = dict(lag.description.numbers.values) | lag.arm.parameters
     constants = constants_of(generators_of(elements))
-    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.constants])}
+    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
     names = sorted(symbols_of(constants), key=lambda name: (order.get(name, len(order)), name))
     identifiers = _identifiers(names)
     code = _Code(language, identifiers)

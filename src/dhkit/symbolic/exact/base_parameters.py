@@ -31,6 +31,8 @@ __all__ = ["BaseParameters", "base_parameters"]
 
 SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
+MAX_TERMS = 60_000
+"""Terms of M in all inertial parameters: three times a Jaco's, a minute on sympy's rings."""
 MOST = 3
 """Parameters that one may depend on: a sliding joint's moment on two of the link that it slides in, and a mass."""
 TRIES = 200
@@ -88,6 +90,8 @@ def base_parameters(description: Description) -> BaseParameters:
     ------
     DescriptionError
         A link has no body.
+    RingError
+        The equations are too long, or a parameter depends on others by no polynomial.
 
     Examples
     --------
@@ -99,6 +103,8 @@ def base_parameters(description: Description) -> BaseParameters:
     True
     """
     full = lagrangian(description, "inertial")
+    if (terms := sum(len(element) for element in full.M.flat)) > MAX_TERMS:
+        raise RingError(f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}")
     definitions = _regrouped(full.arm)
     trial = _equations(full.arm, definitions)
     definitions = _independent(trial, definitions)
@@ -179,6 +185,8 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
         rotor=tuple(named(f"Ia{j}") for j in range(1, arm.n + 1)),
         gravity=_mapped(arm.gravity, ring, {}),
         origin=_mapped(arm.origin, ring, {}),
+        tool=_mapped(arm.tool, ring, {}),
+        parameters=arm.parameters | {name: float(element.value(numbers)) for name, element in definitions.items()},
         values={text: arm.values[text] for text in ring.constants if text in arm.values}
         | {name: float(element.value(numbers)) for name, element in definitions.items()},
         inertial=tuple(definitions),
@@ -195,7 +203,7 @@ def _row(row: ExactRow, ring: Ring) -> ExactRow:
 
 def _kept(arm: ExactArm) -> list[Constant]:
     """Return the constants of table and gravity: those that are not, or hold, an inertial parameter."""
-    geometry = [*arm.gravity, *arm.origin]
+    geometry = [*arm.gravity, *arm.origin, *arm.tool]
     for row in arm.rows:
         geometry += [row.a, row.d, *row.alpha, *row.theta]
     inertial = [*arm.gear, *arm.rotor]

@@ -71,8 +71,12 @@ class ExactArm:
         Free-fall acceleration in frame 0, shape (3,).
     origin
         Frame 0's origin in the axes of frame 0, seen from the world's origin, shape (3,).
+    tool
+        The tool's origin in frame n, shape (3,).
     values
         Value of every constant of the ring.
+    parameters
+        Value of every symbol that the constants are made of.
     notes
         What is a symbol though it is a number.
     inertial
@@ -88,7 +92,9 @@ class ExactArm:
     rotor: tuple[Element, ...]
     gravity: Elements
     origin: Elements
+    tool: Elements
     values: dict[str, float]
+    parameters: dict[str, float]
     notes: tuple[str, ...]
     inertial: tuple[str, ...] = ()
 
@@ -199,7 +205,8 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
     placement = description.base.placement
     xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
 
-    expressions = [*gravity, *xyz]
+    tool = [naming.known(x) for x in description.tool.placement.xyz]
+    expressions = [*gravity, *xyz, *tool]
     angles = [*rpy]
     for link in links:
         expressions += [
@@ -224,7 +231,9 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
         tuple(ring.read(link.rotor) for link in links),
         rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
         rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),
+        np.array([ring.read(x) for x in tool], dtype=object),
         {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+        {name: float(naming.values[name]) for name in _symbols(constants)},
         tuple(constants.notes),
         tuple(naming.inertial),
     )
@@ -308,6 +317,15 @@ class _Naming:
             gear = gear if gear == ONE else self.symbol(f"G{i}", substitute(drive.gear, self.values))
             rotor = self.inertial_symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
         return _Link(row, mass, tuple(x / mass for x in moments), None, second, gear, rotor)
+
+
+def _symbols(constants: Constants) -> list[str]:
+    """Return the names that constants are made of, in their order."""
+    names: dict[str, None] = {}
+    for constant in constants.found.values():
+        own = [constant.text] if constant.meaning is None else sorted(constant.meaning.symbols)
+        names |= dict.fromkeys(own)
+    return list(names)
 
 
 def _with_bodies(description: Description) -> list[tuple[Joint, Body]]:

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
 from dhkit.symbolic import equations
+from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
-from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.ring import Element, Elements, RingError
 from dhkit.symbolic.textbook import TextbookDerivation, derive
 
 __all__ = ["Lagrangian", "Proof", "lagrangian"]
@@ -106,8 +107,9 @@ class Lagrangian:
 
     @property
     def constants(self) -> dict[str, float]:
-        """The symbols and what they are worth, SI."""
-        return dict(self.arm.values)
+        """The symbols as they are printed, and what they are worth, SI."""
+        names = notation(self.arm.ring).names
+        return {names.get(name, name): value for name, value in self.arm.parameters.items()}
 
     # Quantities
 
@@ -168,11 +170,17 @@ class Lagrangian:
         ----------
         **quantities
             Any of M, V, C, h, g, K, tau: elements of this one's ring. What is made of a replaced quantity follows it.
+
+        Raises
+        ------
+        ValueError
+            No such quantity, another shape, or entries that are no elements of this ring.
         """
+        for name, given in quantities.items():
+            if name not in equations.QUANTITIES:
+                raise ValueError(f"no quantity {name!r}; expected {', '.join(equations.QUANTITIES)}")
+            _check_like(name, given, getattr(self, name))
         other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V), self.definitions)
-        for name in quantities:
-            if name not in ("C", "h", "g", "K", "tau"):
-                raise ValueError(f"no quantity {name!r}; expected M, V, C, h, g, K or tau")
         vars(other).update(quantities)
         return other
 
@@ -244,8 +252,24 @@ class Lagrangian:
             A derivation of the same description with the same symbols, perhaps with mistakes; the right one unless
             given.
         """
+        if self.arm.inertial and not self.arm.bodies:
+            raise RingError(
+                "base parameters: prove the full equations (base.full), and that both are equal (base.prove())"
+            )
         route = other or derive(self.description, symbols=self.arm.symbols)
+        if route.arm.ring != self.arm.ring:
+            raise RingError(
+                f"the other derivation is of {route.arm.description.name} with symbols {route.arm.symbols!r}; expected "
+                f"{self.description.name} with {self.arm.symbols!r}"
+            )
         return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - route.tau)
+
+
+def _check_like(name: str, given: Any, own: Any) -> None:
+    listed = [given] if isinstance(given, Element) else list(np.ravel(np.asarray(given, dtype=object)))
+    ring = next(iter(np.ravel(np.asarray(own, dtype=object)))).ring if not isinstance(own, Element) else own.ring
+    if np.shape(given) != np.shape(own) or not all(isinstance(x, Element) and x.ring == ring for x in listed):
+        raise ValueError(f"{name}: expected an array of shape {np.shape(own)} of elements of these equations' ring")
 
 
 def lagrangian(description: Description, symbols: Symbols = "file") -> Lagrangian:

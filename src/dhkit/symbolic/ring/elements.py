@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import NDArray
 
 from dhkit.errors import DhkitError
+from dhkit.expressions import exact
 from dhkit.symbolic.ring.polynomials import Monomial
 
 if TYPE_CHECKING:
@@ -19,6 +22,7 @@ __all__ = ["Element", "Elements", "RingError", "Scalar", "translated"]
 
 MAX_TERMS = 300_000
 """Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
+TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
 MAX_PAIRS = 500_000
 """Pairs of terms that one product may have: six times that Jaco's; seconds on sympy's rings."""
 
@@ -27,7 +31,7 @@ class RingError(DhkitError):
     """An expression that the exact ring does not have, or one too long for it."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class Element:
     """An element of a ring, in normal form."""
 
@@ -37,7 +41,7 @@ class Element:
     # Arithmetic
 
     def __add__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
+        if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self.polynomial + self._coerced(other))
 
@@ -47,32 +51,26 @@ class Element:
         return Element(self.ring, -self.polynomial)
 
     def __sub__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
+        if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self.polynomial - self._coerced(other))
 
     def __rsub__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
+        if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self._coerced(other) - self.polynomial)
 
     def __mul__(self, other: Scalar) -> Element:
-        if not isinstance(other, Element | int | Fraction):
+        if not isinstance(other, Element | Real):
             return NotImplemented
         if len(self.polynomial) == 0:
             return self
         factor = self._coerced(other)
         if len(self.polynomial) * len(factor) > MAX_PAIRS:
-            raise RingError(
-                f"a product of {len(self.polynomial)} by {len(factor)} terms: too long to be derived exactly; "
-                "fewer symbols (symbols='none'), or fewer joints (lock), make it shorter"
-            )
+            raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {TOO_LONG}")
         product = Element(self.ring, self.polynomial * factor).reduced()
         if len(product.polynomial) > MAX_TERMS:
-            raise RingError(
-                f"an expression of {len(product.polynomial)} terms, beyond {MAX_TERMS}: too long to be derived exactly;"
-                " fewer symbols (symbols='none'), or fewer joints (lock), make it shorter"
-            )
+            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {MAX_TERMS}: {TOO_LONG}")
         return product
 
     __rmul__ = __mul__
@@ -88,7 +86,12 @@ class Element:
             if other.ring != self.ring:
                 raise RingError("elements of two rings; derive both from one description and with equal symbols")
             return other.polynomial
-        return self.ring.polynomials.constant(other)
+        return self.ring.polynomials.constant(_rational(other))
+
+    def __truediv__(self, other: Scalar) -> Element:
+        if isinstance(other, Element) or not isinstance(other, Real):
+            return NotImplemented
+        return self * (1 / _rational(other))
 
     def reduced(self) -> Element:
         """Return the normal form under the ring's relations."""
@@ -106,8 +109,10 @@ class Element:
         return len(self.polynomial) > 0
 
     def __eq__(self, other: object) -> bool:
-        if isinstance(other, Element | int | Fraction):
-            return (self - other).is_zero
+        if isinstance(other, Element) and other.ring != self.ring:
+            return False
+        if isinstance(other, Element | Real):
+            return Element(self.ring, self.polynomial - self._coerced(other)).is_zero  # type: ignore[arg-type]
         return NotImplemented
 
     def __hash__(self) -> int:
@@ -132,10 +137,15 @@ class Element:
 
     # Reading
 
-    @property
+    @cached_property
     def terms(self) -> Mapping[Monomial, Fraction]:
         """The coefficients by monomial, exponents in the order of the ring's generators."""
         return self.ring.polynomials.terms(self.polynomial)
+
+    @cached_property
+    def _products(self) -> list[tuple[float, list[tuple[int, int]]]]:
+        """Of each term its coefficient, and its generators with their exponents."""
+        return [(float(c), [(k, e) for k, e in enumerate(m) if e]) for m, c in self.terms.items()]
 
     def __len__(self) -> int:
         return len(self.polynomial)
@@ -150,6 +160,11 @@ class Element:
 
     def __repr__(self) -> str:
         return f"Element({self})"
+
+    def _repr_latex_(self) -> str:
+        from dhkit.symbolic.equations import latex_text
+
+        return f"${latex_text(self)}$"
 
     # Calculus
 
@@ -184,11 +199,10 @@ class Element:
     def value(self, values: Sequence[Any]) -> Any:
         """Return the number, or array (...), at values of the generators; see :meth:`Ring.values`."""
         total: Any = 0.0
-        for monomial, coefficient in self.terms.items():
-            product: Any = float(coefficient)
-            for k, exponent in enumerate(monomial):
-                if exponent:
-                    product = product * (values[k] if exponent == 1 else values[k] ** exponent)
+        for coefficient, powers in self._products:
+            product: Any = coefficient
+            for k, exponent in powers:
+                product = product * (values[k] if exponent == 1 else values[k] ** exponent)
             total = total + product
         return total
 
@@ -196,7 +210,7 @@ class Element:
 Elements: TypeAlias = NDArray[Any]
 """An array whose entries are elements of one ring."""
 
-Scalar: TypeAlias = "Element | int | Fraction"
+Scalar: TypeAlias = "Element | int | float | Fraction"
 
 
 def _without(element: Element, place: int, divisor: Any) -> Element:
@@ -207,6 +221,20 @@ def _without(element: Element, place: int, divisor: Any) -> Element:
     lowered = {(*m[:place], m[place] - 1, *m[place + 1 :]): c for m, c in with_it.items()}
     product = ring.polynomials.from_terms(rest) * divisor
     return Element(ring, product + ring.polynomials.from_terms(lowered)).reduced()
+
+
+def _rational(number: Any) -> Fraction:
+    """Return a number as the rational that it was written for: 1e-9 is 1/10^9.
+
+    Raises
+    ------
+    ExpressionError
+        It is not finite.
+    """
+    if isinstance(number, int | Fraction):
+        return Fraction(number)
+    rational = exact(number).rational
+    return Fraction(0) if rational is None else rational
 
 
 def _from_terms(ring: Ring, terms: Mapping[Monomial, Fraction]) -> Element:
