@@ -134,3 +134,16 @@ def test_a_browser_shows_the_page(dhkit, tmp_path, chromium):
 def test_listing_commands_needs_no_sympy():
     code = "import sys, dhkit.cli; sys.exit('sympy' in sys.modules or 'latex2mathml' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_base_parameters_on_every_kind_of_paper(dhkit, tmp_path):
+    for form in ("text", "latex", "html", "python", "c"):
+        status, out, err = dhkit("planar2r", "--what", "M,g", "--base-parameters", "--format", form)
+        assert (status, err) == (0, "")
+        assert "MX" in out
+    assert "l_{1} (m_{1} + m_{2})" in dhkit("planar2r", "--base-parameters", "--what", "g", "--format", "latex")[1]
+    status, _, err = dhkit("planar2r", "--base-parameters", "--symbols", "none")
+    assert (status, err) == (
+        2,
+        "dhkit: --symbols none: base parameters are made of symbols; leave one of the two out\n",
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +16,7 @@ from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.ring import RingError
 from exact_checks import errors, states
-from random_arms import arms
+from random_arms import arms, random_body
 
 
 def in_general_position(description) -> bool:
@@ -106,4 +108,19 @@ def test_names_that_the_file_has_are_left_to_it():
     base = base_parameters(with_uniform_links(description))
     assert base.names == ("ZZ1_", "ZZ2_", "MX2_", "MY2_")
     assert base.prove()
+    assert max(errors(base.lagrangian, 5, ("M", "h", "g")).values()) <= 1e-12
+
+
+@pytest.mark.parametrize(
+    ("kinds", "twists"),
+    [("RP", (20, 0)), ("RPR", (30, 0, 0)), ("RPR", ("beta", 0, 0)), ("RRP", (0, 20, 0)), ("PRP", (20, 30, 0))],
+)
+def test_sliding_joints_behind_any_twist(kinds, twists):
+    rows = [(0, 0.2, 0.3, twist) for twist in twists]
+    bare = from_dh(rows, kinds=kinds, angle="deg", parameters={"beta": 0.3})
+    rng = np.random.default_rng(0)
+    arm = replace(bare, joints=tuple(replace(joint, body=random_body(rng)) for joint in bare.joints))
+    base = base_parameters(arm)
+    assert base.prove()
+    assert len(base) == numeric_rank(arm)
     assert max(errors(base.lagrangian, 5, ("M", "h", "g")).values()) <= 1e-12

@@ -13,12 +13,13 @@ from hypothesis import given, settings
 
 import dhkit
 from dhkit import Arm
-from dhkit.description import Body, Description, from_dh, library_robot
+from dhkit.description import Body, Convention, Description, Placement, Tool, from_dh, library_robot, with_uniform_links
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
 from dhkit.symbolic.exact.base_parameters import base_parameters
 from dhkit.symbolic.exact.exact_arm import exact_arm
 from dhkit.symbolic.exact.lagrangian import lagrangian
+from dhkit.symbolic.ring import RingError
 from dhkit.symbolic.textbook import MISTAKES, derive
 from exact_checks import errors
 from random_arms import arms
@@ -365,3 +366,67 @@ def test_results_are_pickled():
         assert type(again) is type(value)
     again = pickle.loads(pickle.dumps(lagrangian(description)))
     assert again.prove_euler_lagrange()
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_mean_the_same_in_both_conventions(mistake):
+    """The same two rods in both tables: frames lie at the links' far ends, or at their joints."""
+    standard = library_robot("planar2r")
+    first, second = standard.joints
+    l1, l2 = first.a, second.a
+
+    def moved(joint, length):
+        return replace(joint.body, com=(length / 2, exact(0), exact(0)))
+
+    joints = (
+        replace(first, a=exact(0), body=moved(first, l1)),
+        replace(second, a=l1, body=moved(second, l2)),
+    )
+    tool = Tool(Placement((l2, exact(0), exact(0))))
+    modified = replace(standard, convention=Convention.MODIFIED, joints=joints, tool=tool)
+    q, qd, qdd = (np.random.default_rng(k).normal(size=(4, 2)) for k in range(3))
+    torques = []
+    for description in (standard, modified):
+        wrong = derive(description, {mistake})
+        torques.append(wrong.arm.evaluate(wrong.tau, q, qd, qdd))
+    assert np.abs(torques[0] - torques[1]).max() < 1e-12
+
+
+def test_the_heights_that_students_write():
+    ring = lagrangian(library_robot("planar2r")).arm.ring
+    l1, l2, m2, g = (ring.constant(name) for name in ("l1", "l2", "m2", "g"))
+    s1, s2 = ring.sine(0), ring.sine(1)
+    s12 = s1 * ring.cosine(1) + ring.cosine(0) * s2
+
+    def height(mistake):
+        return derive(library_robot("planar2r"), {mistake}).links[1].V
+
+    assert height("height_relative_angle") == m2 * g * (l1 * s1 + l2 * s2 / 2)
+    assert height("height_at_joint") == m2 * g * l1 * s1
+    assert height("height_at_end") == height("com_at_end") == m2 * g * (l1 * s1 + l2 * s12)
+
+
+def test_wrong_arguments_are_said():
+    lag = lagrangian(library_robot("planar2r"))
+    with pytest.raises(TypeError, match="mistakes is 'omega_relative'; expected a set of names"):
+        derive(lag.description, "omega_relative")
+    with pytest.raises(TypeError, match="mistake 1: expected a name"):
+        derive(lag.description, {1})
+    with pytest.raises(RingError, match="is of planar3r with symbols 'file'; expected planar2r"):
+        lag.prove_euler_lagrange(derive(library_robot("planar3r")))
+    with pytest.raises(ValueError, match=r"M: expected an array of shape \(2, 2\) of elements"):
+        lag.replaced(M=np.eye(2))
+    with pytest.raises(ValueError, match="no quantity 'N'"):
+        lag.replaced(N=lag.M)
+    base = base_parameters(lag.description).lagrangian
+    with pytest.raises(RingError, match="base parameters: prove the full equations"):
+        base.prove_euler_lagrange()
+    assert lag.M[0, 0] != base.M[0, 0]
+    assert lag.M[1, 1] * 0.5 == lag.M[1, 1] / 2 == lag.M[1, 1] * Fraction(1, 2)
+
+
+def test_constants_are_those_that_are_printed():
+    arm = from_dh([(0, 0, 0.3, "beta"), (0, 0, 0.2, 0)], parameters={"beta": 0.3})
+    lag = lagrangian(with_uniform_links(arm))
+    assert {str(symbol) for symbol in lag.sympy("g")["g"].free_symbols} <= {"q1", "q2", *lag.constants}
+    assert lag.constants["beta"] == 0.3

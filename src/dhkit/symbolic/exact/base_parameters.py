@@ -10,10 +10,11 @@ full ones can be proved by substitution.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import combinations, islice
 
 import numpy as np
@@ -102,13 +103,29 @@ def base_parameters(description: Description) -> BaseParameters:
     >>> bool(base.prove())
     True
     """
-    full = lagrangian(description, "inertial")
-    if (terms := sum(len(element) for element in full.M.flat)) > MAX_TERMS:
-        raise RingError(f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}")
-    definitions = _regrouped(full.arm)
-    trial = _equations(full.arm, definitions)
-    definitions = _independent(trial, definitions)
-    return BaseParameters(Named(definitions), _equations(full.arm, definitions), full)
+    needed: tuple[Expression, ...] = ()
+    for _ in range(description.n):
+        full = lagrangian(description, "inertial", needed)
+        if (terms := sum(len(element) for element in full.M.flat)) > MAX_TERMS:
+            raise RingError(
+                f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}"
+            )
+        definitions = _regrouped(full.arm)
+        try:
+            definitions = _independent(_equations(full.arm, definitions), definitions)
+        except _MissingReciprocalError as missing:
+            needed = (*needed, missing.reciprocal)
+            continue
+        return BaseParameters(Named(definitions), _equations(full.arm, definitions), full)
+    raise RingError(f"{description.name}: base parameters were not found")
+
+
+class _MissingReciprocalError(Exception):
+    """A parameter depends on another by a fraction whose reciprocal the ring has not."""
+
+    def __init__(self, reciprocal: Expression) -> None:
+        super().__init__(str(reciprocal))
+        self.reciprocal = reciprocal
 
 
 def _regrouped(arm: ExactArm) -> dict[str, Element]:
@@ -313,6 +330,7 @@ class _Regressor:
         places = [self.names.index(other) for other in support]
         touching = [k for k, row in enumerate(self.rows) if not row.keys().isdisjoint(support)]
         touching.sort(key=lambda k: sum(len(entry) for entry in self.rows[k].values()))
+        fractions: tuple[list[Element], Element] | None = None
         for chosen in islice(combinations(touching, len(support)), TRIES):
             if abs(np.linalg.det(self.numbers[np.ix_(chosen, places)])) < DEPENDENT:
                 continue
@@ -325,7 +343,25 @@ class _Regressor:
             quotients = [polynomials.quotient(part.polynomial, whole.polynomial) for part in parts]
             if all(quotient is not None for quotient in quotients):
                 return {other: Element(ring, x) for other, x in zip(support, quotients, strict=True)}
-        raise RingError(f"{name} depends on {', '.join(support)} by no polynomial; base parameters were not found")
+            fractions = fractions or (parts, whole)
+        if fractions is None:
+            raise RingError(f"{name} depends on {', '.join(support)}, but not exactly; base parameters were not found")
+        parts, whole = fractions
+        inverse = 1 / _expression(whole)
+        try:
+            factor = ring.read(inverse)
+        except RingError:
+            raise _MissingReciprocalError(inverse) from None
+        return {other: part * factor for other, part in zip(support, parts, strict=True)}
+
+
+def _expression(element: Element) -> Expression:
+    """Return an element of constants as an expression in the parameters."""
+    meanings = {k: g.meaning or Expression.symbol(g.text) for k, g in enumerate(element.ring.generators)}
+    return Expression.sum(
+        reduce(operator.mul, (meanings[k] ** e for k, e in enumerate(monomial) if e), Expression.number(coefficient))
+        for monomial, coefficient in element.terms.items()
+    )
 
 
 def _somewhere(ring: Ring) -> list[float]:
@@ -339,6 +375,9 @@ def _somewhere(ring: Ring) -> list[float]:
         if constant.text.startswith("cos(") and constant.meaning is not None:
             angle = rng.uniform(0.2, 1.4)
             known[constant.text], known[f"sin{constant.text[3:]}"] = math.cos(angle), math.sin(angle)
+        elif constant.reciprocal_of is not None:
+            so_far = [known.get(generator.text, 1.0) for generator in ring.generators]
+            known[constant.text] = 1 / float(ring.read(constant.reciprocal_of).value(so_far))
         else:
             known[constant.text] = float(substitute(constant.meaning or Expression.symbol(constant.text), values))
     return [known.get(generator.text, 1.0) for generator in ring.generators]

@@ -172,7 +172,7 @@ class _Link:
 
 
 @lru_cache(maxsize=32)
-def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
+def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> ExactArm:
     """Return a description in a ring of its own; the same one each time, so that results can be compared.
 
     Parameters
@@ -183,6 +183,8 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
         ``"none"``: numbers only. ``"file"``: the file's parameters, those that are not made of others. ``"inertial"``:
         each link's mass ``m2``, first moments ``rx2 ry2 rz2`` and second moments about its frame's origin ``Ixx2`` ...
         ``Ixz2``, its drive's ``Jm2`` and ``G2``, lengths ``a2 d2`` where they are not zero, and gravity ``g``.
+    needed
+        Expressions whose constants the ring shall have too.
 
     Raises
     ------
@@ -206,7 +208,7 @@ def exact_arm(description: Description, symbols: Symbols = "file") -> ExactArm:
     xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
 
     tool = [naming.known(x) for x in description.tool.placement.xyz]
-    expressions = [*gravity, *xyz, *tool]
+    expressions = [*gravity, *xyz, *tool, *needed]
     angles = [*rpy]
     for link in links:
         expressions += [

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.expressions import Expression
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact import composite
@@ -272,7 +273,7 @@ def _check_like(name: str, given: Any, own: Any) -> None:
         raise ValueError(f"{name}: expected an array of shape {np.shape(own)} of elements of these equations' ring")
 
 
-def lagrangian(description: Description, symbols: Symbols = "file") -> Lagrangian:
-    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact.exact_arm` for ``symbols``."""
-    arm = exact_arm(description, symbols)
+def lagrangian(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> Lagrangian:
+    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for the arguments."""
+    arm = exact_arm(description, symbols, needed)
     return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))
