@@ -94,7 +94,7 @@ class LinkMotion:
     V: Element
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TextbookDerivation:
     """A derivation of an arm's equations of motion, step by step.
 
@@ -111,6 +111,10 @@ class TextbookDerivation:
     arm: ExactArm
     links: tuple[LinkMotion, ...]
     mistakes: frozenset[str] = field(default=frozenset())
+
+    def __repr__(self) -> str:
+        made = ", ".join(sorted(self.mistakes)) or "no mistakes"
+        return f"<TextbookDerivation of {self.arm.description.name}: {made}>"
 
     @cached_property
     def rotors(self) -> Element:

@@ -41,7 +41,7 @@ DEPENDENT = 1e-9
 """What is left of a column of unit length, others taken off, where it depends on them; roundings leave 1e-14."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BaseParameters:
     """The fewest combinations of inertial parameters that decide an arm's torques.
 
@@ -70,6 +70,9 @@ class BaseParameters:
 
     def __len__(self) -> int:
         return len(self.definitions)
+
+    def __repr__(self) -> str:
+        return f"<BaseParameters of {self.full.description.name}: {', '.join(self.names)}>"
 
     def prove(self) -> Proof:
         """Decide whether the equations in base parameters are the full ones, by putting the definitions in.

@@ -27,7 +27,7 @@ _SHOWN = 200
 """Terms of a mass matrix that is shown unasked."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Proof:
     """A statement, decided in the exact ring: true if the difference of its two sides is zero, which is kept.
 
@@ -44,6 +44,9 @@ class Proof:
 
     def __bool__(self) -> bool:
         return all(element.is_zero for element in self.difference.flat)
+
+    def __repr__(self) -> str:
+        return f"<Proof: {self}>"
 
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:

@@ -12,7 +12,7 @@ from dhkit.symbolic.ring import Elements, RingError
 __all__ = ["Regressor", "regressor"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Regressor:
     """Torques as a matrix times inertial parameters (Khosla & Kanade, 1985; Atkeson, An & Hollerbach, 1986).
 
@@ -30,6 +30,9 @@ class Regressor:
     lagrangian: Lagrangian
     names: tuple[str, ...]
     Y: Elements
+
+    def __repr__(self) -> str:
+        return f"<Regressor of {self.lagrangian.description.name}: {' x '.join(map(str, self.Y.shape))}>"
 
     @property
     def theta(self) -> Elements:
