@@ -105,7 +105,7 @@ def test_any_arm_with_some_joints_held(law, arm, data):
 
 
 def near_parallel(arm, held) -> bool:
-    """Whether neighbouring axes of the shorter table nearly point along each other, with the joints held where they are.
+    """Whether neighbouring axes of the shorter table nearly point along each other, joints held where they are.
 
     Below 1e-10 the table takes them for parallel, which misses by as much times the lever.
     """

@@ -19,8 +19,9 @@ from dhkit.expressions import exact
 from dhkit.symbolic.exact.base_parameters import base_parameters
 from dhkit.symbolic.exact.exact_arm import exact_arm
 from dhkit.symbolic.exact.lagrangian import lagrangian
+from dhkit.symbolic.mistakes import MISTAKES
 from dhkit.symbolic.ring import RingError
-from dhkit.symbolic.textbook import MISTAKES, derive
+from dhkit.symbolic.textbook import derive
 from exact_checks import errors
 from random_arms import arms
 

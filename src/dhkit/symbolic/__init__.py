@@ -28,11 +28,12 @@ from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.exact.regressor import Regressor
+from dhkit.symbolic.mistakes import MISTAKES
 from dhkit.symbolic.programs.graph import Graph, Node, Variable
 from dhkit.symbolic.programs.operations import operation_count
 from dhkit.symbolic.programs.printers import c_source, export_c, python_lines
 from dhkit.symbolic.ring.elements import Element, Elements, RingError
-from dhkit.symbolic.textbook import MISTAKES, TextbookDerivation, derive
+from dhkit.symbolic.textbook import TextbookDerivation, derive
 
 __all__ = [
     "MISTAKES",

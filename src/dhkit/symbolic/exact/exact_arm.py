@@ -5,27 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Body, Convention, Description, Drive, Joint, joint_array
-from dhkit.description.parameters import resolved
+from dhkit.description import Array, Body, Convention, Description, Joint, joint_array
 from dhkit.errors import DescriptionError
-from dhkit.expressions import Expression, exact, exact_angle, substitute
+from dhkit.expressions import Expression, exact_angle
+from dhkit.symbolic.exact.naming import INERTIA_PLACES, LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.reading import Direction
 
-__all__ = ["INERTIA_KEYS", "ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
-
-Symbols: TypeAlias = Literal["none", "file", "inertial"]
-"""Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
-
-ONE = exact(1)
-INERTIA_KEYS = ("xx", "yy", "zz", "xy", "yz", "xz")
-INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+__all__ = ["ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,21 +148,6 @@ class ExactArm:
         return numbers.reshape((*batch, *shape))
 
 
-@dataclass(frozen=True)
-class _Link:
-    """What is read of a link, as expressions."""
-
-    row: tuple[Expression, Expression, Expression, Expression]
-    """a, d, alpha, theta."""
-    mass: Expression
-    com: tuple[Expression, ...]
-    inertia: tuple[Expression, ...] | None
-    """In the order of ``INERTIA_KEYS``, about the centre of mass; None where ``second`` is given."""
-    second: tuple[Expression, ...] | None
-    gear: Expression
-    rotor: Expression
-
-
 @lru_cache(maxsize=32)
 def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> ExactArm:
     """Return a description in a ring of its own; the same one each time, so that results can be compared.
@@ -201,7 +178,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
                 f"{description.name}: joint {i} ({joint.name}) has no body, which dynamics need; "
                 "give it one, or see with_uniform_links"
             )
-    naming = _Naming(description, symbols)
+    naming = Naming(description, symbols)
     links = [naming.link(i, joint, body) for i, (joint, body) in enumerate(_with_bodies(description), start=1)]
     gravity = naming.gravity()
     placement = description.base.placement
@@ -241,86 +218,6 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     )
 
 
-class _Naming:
-    """Decides which numbers become symbols, and remembers the symbols' values."""
-
-    def __init__(self, description: Description, symbols: Symbols) -> None:
-        self.description = description
-        self.symbols = symbols
-        self.inertial: list[str] = []
-        self.values = resolved(description.parameters)
-        own = {name for name, value in description.parameters.items() if not value.symbols}
-        self._fixed = {
-            name: _through(description.parameters, name) for name in description.parameters if name not in own
-        }
-        if symbols == "none":
-            self._fixed = self.values
-
-    def known(self, expression: Expression) -> Expression:
-        """Return an expression in the symbols that are kept."""
-        return substitute(expression, self._fixed)
-
-    def symbol(self, name: str, value: Expression) -> Expression:
-        """Return a new symbol of that value; zero needs none."""
-        while name in self.values and self.values[name] != value:
-            name += "_"
-        self.values[name] = value
-        return Expression.symbol(name)
-
-    def inertial_symbol(self, name: str, value: Expression) -> Expression:
-        """Return a new symbol that torques are linear in."""
-        symbol = self.symbol(name, value)
-        self.inertial.append(symbol.text)
-        return symbol
-
-    def length(self, name: str, expression: Expression) -> Expression:
-        """Return a length of the table, by a name of its own where all numbers are symbols."""
-        known = self.known(expression)
-        if self.symbols != "inertial" or known.symbols or known.is_zero:
-            return known
-        return self.symbol(name, known)
-
-    def gravity(self) -> list[Expression]:
-        """Return the free-fall acceleration in the world."""
-        vector = [self.known(x) for x in self.description.gravity]
-        if self.symbols != "inertial" or any(x.symbols for x in vector):
-            return vector
-        along = [x for x in vector if not x.is_zero]
-        if len(along) == 1:
-            size = along[0] if float(along[0]) > 0 else -along[0]
-            g = self.symbol("g", size)
-            return [x if x.is_zero else g if float(x) > 0 else -g for x in vector]
-        return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
-
-    def link(self, i: int, joint: Joint, body: Body) -> _Link:
-        """Return what link i, from 1, is read from."""
-        row = (
-            self.length(f"a{i}", joint.a),
-            self.length(f"d{i}", joint.d),
-            exact_angle(self.known(joint.alpha)),
-            exact_angle(self.known(joint.theta)),
-        )
-        drive = joint.drive or Drive()
-        gear, rotor = self.known(drive.gear), self.known(drive.rotor_inertia)
-        if self.symbols != "inertial":
-            inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_KEYS)
-            com = tuple(self.known(x) for x in body.com)
-            return _Link(row, self.known(body.mass), com, inertia, None, gear, rotor)
-        numbers = self.description.numbers
-        m, c, I_com = numbers.mass[i - 1], numbers.com[i - 1], numbers.inertia[i - 1]
-        about_origin = I_com + m * (c @ c * np.eye(3) - np.outer(c, c))
-        mass = self.inertial_symbol(f"m{i}", exact(float(m)))
-        moments = [self.inertial_symbol(f"r{axis}{i}", exact(float(m * x))) for axis, x in zip("xyz", c, strict=True)]
-        second = tuple(
-            self.inertial_symbol(f"I{key}{i}", exact(float(about_origin[place])))
-            for key, place in INERTIA_PLACES.items()
-        )
-        if not rotor.is_zero:
-            gear = gear if gear == ONE else self.symbol(f"G{i}", substitute(drive.gear, self.values))
-            rotor = self.inertial_symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
-        return _Link(row, mass, tuple(x / mass for x in moments), None, second, gear, rotor)
-
-
 def _symbols(constants: Constants) -> list[str]:
     """Return the names that constants are made of, in their order."""
     names: dict[str, None] = {}
@@ -334,16 +231,7 @@ def _with_bodies(description: Description) -> list[tuple[Joint, Body]]:
     return [(joint, joint.body) for joint in description.joints if joint.body is not None]
 
 
-def _through(parameters: object, name: str) -> Expression:
-    """Return a parameter in those that are not made of others."""
-    table: dict[str, Expression] = dict(parameters)  # type: ignore[call-overload]
-    expression = table[name]
-    while made := {x for x in expression.symbols if table[x].symbols}:
-        expression = substitute(expression, {x: table[x] for x in made})
-    return expression
-
-
-def _row(ring: Ring, i: int, link: _Link) -> ExactRow:
+def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
     """Return row i, from 0, with the joint's variable added to theta or d."""
     a, d = ring.read(link.row[0]), ring.read(link.row[1])
     alpha, theta = ring.direction(link.row[2]), ring.direction(link.row[3])
@@ -353,7 +241,7 @@ def _row(ring: Ring, i: int, link: _Link) -> ExactRow:
     return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
 
 
-def _body(ring: Ring, link: _Link) -> ExactBody:
+def _body(ring: Ring, link: LinkNumbers) -> ExactBody:
     mass = ring.read(link.mass)
     com = np.array([ring.read(x) for x in link.com], dtype=object)
     moment = np.array([mass * x for x in com], dtype=object)

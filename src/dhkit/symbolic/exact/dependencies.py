@@ -1,0 +1,195 @@
+"""Which parameters of equations of motion depend on others, found in the regressor's columns and grouped exactly."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+from itertools import combinations, islice
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.expressions import Expression, exact, substitute
+from dhkit.symbolic.exact.lagrangian import Lagrangian
+from dhkit.symbolic.ring import Element, Ring, RingError, translated
+from dhkit.symbolic.ring.polynomials import Monomial
+
+__all__ = ["MissingReciprocalError", "independent"]
+
+MOST = 3
+"""Parameters that one may depend on: a sliding joint's moment on two of the link that it slides in, and a mass."""
+TRIES = 200
+DEPENDENT = 1e-9
+"""What is left of a column of unit length, others taken off, where it depends on them; roundings leave 1e-14."""
+
+
+class MissingReciprocalError(Exception):
+    """A parameter depends on another by a fraction whose reciprocal the ring has not."""
+
+    def __init__(self, reciprocal: Expression) -> None:
+        super().__init__(str(reciprocal))
+        self.reciprocal = reciprocal
+
+
+def independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[str, Element]:
+    """Drop what has no effect, and group what depends on parameters before it."""
+    regressor = _Regressor.of(trial, list(definitions))
+    merged: dict[str, Element] = {}
+    basis = np.zeros((len(regressor.rows), 0))
+    for name in definitions:
+        column = regressor.column(name)
+        if not column.any():
+            continue
+        rest = column / np.linalg.norm(column)
+        for _ in range(2):  # once more, so that roundings go as well
+            rest = rest - basis @ (basis.T @ rest)
+        if np.linalg.norm(rest) > DEPENDENT:
+            merged[name] = definitions[name]
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            continue
+        for other, factor in regressor.grouping(name, list(merged)).items():
+            merged[other] = merged[other] + definitions[name] * translated(factor, definitions[name].ring, {})
+    return merged
+
+
+@dataclass(frozen=True, eq=False)
+class _Regressor:
+    """Coefficients of the parameters in M and g, which decide the torques: a row for every entry and monomial of state.
+
+    Attributes
+    ----------
+    ring, names
+        Of the parameters.
+    rows
+        The coefficient of each parameter: terms without the state.
+    numbers
+        What the rows are worth where lengths and angles are anything, shape (rows, parameters).
+    """
+
+    ring: Ring
+    names: Sequence[str]
+    rows: Sequence[Mapping[str, Mapping[Monomial, Fraction]]]
+    numbers: Array
+
+    @classmethod
+    def of(cls, trial: Lagrangian, names: Sequence[str]) -> _Regressor:
+        ring = trial.arm.ring
+        places = {ring.place("constant", name): name for name in names}
+        of_state = [k for k, generator in enumerate(ring.generators) if generator.kind != "constant"]
+        terms: dict[tuple[int, Monomial], dict[str, dict[Monomial, Fraction]]] = {}
+        for i, element in enumerate([*trial.M[np.triu_indices(trial.n)], *trial.g]):
+            for monomial, coefficient in element.terms.items():
+                place = next(place for place in places if monomial[place])
+                rest = list(monomial)
+                for k in (*of_state, place):
+                    rest[k] = 0
+                row = terms.setdefault((i, tuple(monomial[k] for k in of_state)), {})
+                row.setdefault(places[place], {})[tuple(rest)] = coefficient
+        anywhere = _somewhere(ring)
+        numbers = np.zeros((len(terms), len(names)))
+        for k, row in enumerate(terms.values()):
+            for name, entry in row.items():
+                numbers[k, names.index(name)] = sum(_worth(m, c, anywhere) for m, c in entry.items())
+        return cls(ring, names, list(terms.values()), numbers)
+
+    def column(self, name: str) -> Array:
+        """Return a parameter's column of numbers."""
+        column: Array = self.numbers[:, self.names.index(name)]
+        return column
+
+    def grouping(self, name: str, kept: Sequence[str]) -> dict[str, Element]:
+        """Return by which factors a dependent parameter enters those before it, exactly.
+
+        The fewest columns that it depends on are found in numbers; the factors are quotients of determinants (Cramer's
+        rule) of exact entries, of the rows where those are shortest.
+        """
+        column = self.column(name)
+        for size in range(1, MOST + 1):
+            for support in combinations(kept, size):
+                A = np.column_stack([self.column(other) for other in support])
+                factors, *_ = np.linalg.lstsq(A, column, rcond=None)
+                if np.linalg.norm(A @ factors - column) <= DEPENDENT * np.linalg.norm(column):
+                    return self._factors(name, support)
+        raise RingError(f"{name} depends on more than {MOST} parameters before it; base parameters were not found")
+
+    def _factors(self, name: str, support: Sequence[str]) -> dict[str, Element]:
+        ring, polynomials = self.ring, self.ring.polynomials
+        places = [self.names.index(other) for other in support]
+        touching = [k for k, row in enumerate(self.rows) if not row.keys().isdisjoint(support)]
+        touching.sort(key=lambda k: sum(len(entry) for entry in self.rows[k].values()))
+        fractions: tuple[list[Element], Element] | None = None
+        for chosen in islice(combinations(touching, len(support)), TRIES):
+            if abs(np.linalg.det(self.numbers[np.ix_(chosen, places)])) < DEPENDENT:
+                continue
+            A = [[ring.from_terms(self.rows[k].get(other, {})) for other in support] for k in chosen]
+            right = [ring.from_terms(self.rows[k].get(name, {})) for k in chosen]
+            whole = _determinant(A)
+            parts = [
+                _determinant([[*r[:j], b, *r[j + 1 :]] for r, b in zip(A, right, strict=True)]) for j in range(len(A))
+            ]
+            quotients = [polynomials.quotient(part.polynomial, whole.polynomial) for part in parts]
+            if all(quotient is not None for quotient in quotients):
+                return {other: Element(ring, x) for other, x in zip(support, quotients, strict=True)}
+            fractions = fractions or (parts, whole)
+        if fractions is None:
+            raise RingError(f"{name} depends on {', '.join(support)}, but not exactly; base parameters were not found")
+        parts, whole = fractions
+        inverse = 1 / _expression(whole)
+        try:
+            factor = ring.read(inverse)
+        except RingError:
+            raise MissingReciprocalError(inverse) from None
+        return {other: part * factor for other, part in zip(support, parts, strict=True)}
+
+
+def _expression(element: Element) -> Expression:
+    """Return an element of constants as an expression in the parameters."""
+    meanings = {k: g.meaning or Expression.symbol(g.text) for k, g in enumerate(element.ring.generators)}
+    return Expression.sum(
+        reduce(operator.mul, (meanings[k] ** e for k, e in enumerate(monomial) if e), Expression.number(coefficient))
+        for monomial, coefficient in element.terms.items()
+    )
+
+
+def _somewhere(ring: Ring) -> list[float]:
+    """Return a number for each generator, lengths and angles in general position: what their relations allow."""
+    rng = np.random.default_rng(0)
+    known: dict[str, float] = {}
+    values = {name: exact(float(x)) for name, x in zip(_symbols(ring), rng.uniform(0.5, 2.0, 1000), strict=False)}
+    for constant in ring.given:
+        if constant.text in known:
+            continue
+        if constant.text.startswith("cos(") and constant.meaning is not None:
+            angle = rng.uniform(0.2, 1.4)
+            known[constant.text], known[f"sin{constant.text[3:]}"] = math.cos(angle), math.sin(angle)
+        elif constant.reciprocal_of is not None:
+            so_far = [known.get(generator.text, 1.0) for generator in ring.generators]
+            known[constant.text] = 1 / float(ring.read(constant.reciprocal_of).value(so_far))
+        else:
+            known[constant.text] = float(substitute(constant.meaning or Expression.symbol(constant.text), values))
+    return [known.get(generator.text, 1.0) for generator in ring.generators]
+
+
+def _symbols(ring: Ring) -> list[str]:
+    found = {constant.text for constant in ring.given if constant.meaning is None}
+    return sorted(found.union(*(constant.meaning.symbols for constant in ring.given if constant.meaning)))
+
+
+def _worth(monomial: Monomial, coefficient: Fraction, values: Sequence[float]) -> float:
+    number = float(coefficient)
+    for value, exponent in zip(values, monomial, strict=True):
+        if exponent:
+            number *= value**exponent
+    return number
+
+
+def _determinant(A: list[list[Element]]) -> Element:
+    if len(A) == 1:
+        return A[0][0]
+    minors = [_determinant([row[:j] + row[j + 1 :] for row in A[1:]]) for j in range(len(A))]
+    signed = [(1 if j % 2 == 0 else -1) * A[0][j] * minor for j, minor in enumerate(minors)]
+    return signed[0].ring.sum(signed)
