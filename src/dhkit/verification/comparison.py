@@ -133,7 +133,7 @@ def _dynamics(description: Description, reference: Reference, notes: list[str]) 
     yield _relative("kinetic energy K", K, reference.kinetic_energy(), floors.h, vectors=2)
     yield _relative("potential energy V", V, reference.potential_energy(), floors.g)
     Y = dynamics.regressor(description, q, qd, qdd)
-    yield _relative("regressor Y", Y, reference.regressor(), vectors=3)
+    yield _relative("regressor Y", Y, reference.regressor(), floors.Y, vectors=3)
 
 
 def _relative(quantity: str, ours: Array, theirs: Array, floor: Array | float = 0.0, vectors: int = 1) -> Comparison:

@@ -59,6 +59,8 @@ class Floors:
     """Those of g and h, and max|M| max|qdd|."""
     qdd: Array
     """max|tau| / min diag M."""
+    Y: float
+    """|gravity|, m/s^2: what a kilogram weighs, of which nothing may be left in a joint's direction."""
 
     @classmethod
     def of(cls, description: Description, M: Array, qd: Array, qdd: Array, tau: Array) -> Floors:
@@ -70,7 +72,8 @@ class Floors:
         C, h = inertia * rate, inertia * rate**2
         with np.errstate(all="ignore"):
             fastest = _largest(tau) / np.min(np.diagonal(M, axis1=-2, axis2=-1), axis=-1)
-        return cls(g, C, h, g + h, g + h + inertia * _largest(qdd), fastest)
+        falling = float(np.linalg.norm(numbers.gravity))
+        return cls(g, C, h, g + h, g + h + inertia * _largest(qdd), fastest, falling)
 
 
 def forward_tolerance(M: Array) -> Array:
