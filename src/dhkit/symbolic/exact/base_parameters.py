@@ -213,11 +213,7 @@ def _kept(arm: ExactArm) -> list[Constant]:
     for body in arm.bodies:
         inertial += [body.mass, *body.moment, *body.second.flat]
     names = _constants(inertial) - _constants(geometry)
-    return [
-        constant
-        for constant in arm.ring.given
-        if constant.text not in names and not (constant.meaning and constant.meaning.symbols & names)
-    ]
+    return [constant for constant in arm.ring.given if constant.text not in names and not constant.symbols & names]
 
 
 def _constants(elements: Sequence[Element]) -> set[str]:

@@ -6,8 +6,9 @@ proofs; for reading, each entry is written in whichever angles make it shortest.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import islice, product
 
 import numpy as np
@@ -50,13 +51,20 @@ def shortened(arm: ExactArm, elements: Elements) -> Elements:
     runs = parallel_runs(arm)
     if not runs:
         return elements
-    rings = [_ring(arm, angles, runs) for angles in islice(_ways(runs), WAYS)]
-    turns = [_turns(arm.ring, ring) for ring in rings]
+    writings = _writings(arm.ring, tuple(runs))
     shortest = np.empty(elements.shape, dtype=object)
     for place, element in np.ndenumerate(elements):
-        written = (_merged(translated(element, ring, turn)) for ring, turn in zip(rings, turns, strict=True))
+        written = (_merged(translated(element, ring, turns)) for ring, turns in writings)
         shortest[place] = min([element, *written], key=len)
     return shortest
+
+
+@lru_cache(maxsize=64)
+def _writings(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
+    """Return rings in other angles, each with what the sines and cosines of the own ring's joints are in it."""
+    sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
+    rings = [Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_ways(runs), WAYS)]
+    return [(other, _turns(ring, other)) for other in rings]
 
 
 def _ways(runs: Sequence[tuple[int, ...]]) -> Iterator[dict[int, tuple[int, ...]]]:
@@ -67,11 +75,6 @@ def _ways(runs: Sequence[tuple[int, ...]]) -> Iterator[dict[int, tuple[int, ...]
             summed = len(run) - 1 - start  # none first: joint angles themselves
             angles |= {run[k]: run[summed : k + 1] for k in range(summed + 1, len(run))}
         yield angles
-
-
-def _ring(arm: ExactArm, angles: Mapping[int, tuple[int, ...]], runs: Iterable[tuple[int, ...]]) -> Ring:
-    sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
-    return Ring(arm.ring.kinds, arm.ring.given, angles, sums)
 
 
 def _turns(old: Ring, new: Ring) -> dict[int, Element]:

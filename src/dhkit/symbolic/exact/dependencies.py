@@ -159,7 +159,8 @@ def _somewhere(ring: Ring) -> list[float]:
     """Return a number for each generator, lengths and angles in general position: what their relations allow."""
     rng = np.random.default_rng(0)
     known: dict[str, float] = {}
-    values = {name: exact(float(x)) for name, x in zip(_symbols(ring), rng.uniform(0.5, 2.0, 1000), strict=False)}
+    symbols = frozenset[str]().union(*(constant.symbols for constant in ring.given))
+    values = {name: exact(float(x)) for name, x in zip(sorted(symbols), rng.uniform(0.5, 2.0, 1000), strict=False)}
     for constant in ring.given:
         if constant.text in known:
             continue
@@ -172,11 +173,6 @@ def _somewhere(ring: Ring) -> list[float]:
         else:
             known[constant.text] = float(substitute(constant.meaning or Expression.symbol(constant.text), values))
     return [known.get(generator.text, 1.0) for generator in ring.generators]
-
-
-def _symbols(ring: Ring) -> list[str]:
-    found = {constant.text for constant in ring.given if constant.meaning is None}
-    return sorted(found.union(*(constant.meaning.symbols for constant in ring.given if constant.meaning)))
 
 
 def _worth(monomial: Monomial, coefficient: Fraction, values: Sequence[float]) -> float:

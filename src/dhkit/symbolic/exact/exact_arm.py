@@ -222,8 +222,7 @@ def _symbols(constants: Constants) -> list[str]:
     """Return the names that constants are made of, in their order."""
     names: dict[str, None] = {}
     for constant in constants.found.values():
-        own = [constant.text] if constant.meaning is None else sorted(constant.meaning.symbols)
-        names |= dict.fromkeys(own)
+        names |= dict.fromkeys(sorted(constant.symbols))
     return list(names)
 
 

@@ -183,7 +183,11 @@ class Lagrangian:
         for name, given in quantities.items():
             if name not in equations.QUANTITIES:
                 raise ValueError(f"no quantity {name!r}; expected {', '.join(equations.QUANTITIES)}")
-            _check_like(name, given, getattr(self, name))
+            shape = np.shape(getattr(self, name))
+            entries = np.ravel(np.asarray(given, dtype=object)) if shape else [given]
+            own = all(isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries)
+            if np.shape(given) != shape or not own:
+                raise ValueError(f"{name}: expected an array of shape {shape} of elements of these equations' ring")
         other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V), self.definitions)
         vars(other).update(quantities)
         return other
@@ -267,13 +271,6 @@ class Lagrangian:
                 f"{self.description.name} with {self.arm.symbols!r}"
             )
         return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - route.tau)
-
-
-def _check_like(name: str, given: Any, own: Any) -> None:
-    listed = [given] if isinstance(given, Element) else list(np.ravel(np.asarray(given, dtype=object)))
-    ring = next(iter(np.ravel(np.asarray(own, dtype=object)))).ring if not isinstance(own, Element) else own.ring
-    if np.shape(given) != np.shape(own) or not all(isinstance(x, Element) and x.ring == ring for x in listed):
-        raise ValueError(f"{name}: expected an array of shape {np.shape(own)} of elements of these equations' ring")
 
 
 def lagrangian(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> Lagrangian:

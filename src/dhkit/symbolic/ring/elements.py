@@ -256,19 +256,24 @@ def translated(element: Element, ring: Ring, replacements: Mapping[int, Element]
     own = element.ring.generators
     powers: dict[tuple[int, int], Element] = {}
     kept = [k for k in range(len(own)) if k not in replacements]
+    targets: dict[int, int] = {}
     parts: dict[Monomial, dict[Monomial, Fraction]] = {}
     for monomial, coefficient in element.terms.items():
         replaced = tuple(monomial[k] for k in replacements)
         moved = [0] * len(ring.generators)
         for k in kept:
             if monomial[k]:
-                moved[ring.place(own[k].kind, own[k].text if own[k].joint < 0 else own[k].joint)] = monomial[k]
+                if k not in targets:
+                    targets[k] = ring.place(*own[k].key)
+                moved[targets[k]] = monomial[k]
         parts.setdefault(replaced, {})[tuple(moved)] = coefficient
     total = []
     for exponents, group in parts.items():
         product = ring.one
         for k, exponent in zip(replacements, exponents, strict=True):
             if exponent:
-                product = product * powers.setdefault((k, exponent), replacements[k] ** exponent)
+                if (k, exponent) not in powers:
+                    powers[k, exponent] = replacements[k] ** exponent
+                product = product * powers[k, exponent]
         total.append(ring.from_terms(group) * product)
     return ring.sum(total)

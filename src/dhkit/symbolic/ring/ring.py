@@ -3,8 +3,8 @@
 Elements are polynomials over the rationals in sines and cosines of the joint angles, the values of sliding joints,
 joint rates and accelerations, and constants (parameters, roots, functions of parameters, reciprocals). Squares of sines
 become 1 - c^2, squares of roots what stands below them, and a reciprocal cancels against what it is the reciprocal of,
-so that two elements are equal if, and only if, they are the same function of the state: equality is decided, not
-sampled.
+so that equality is decided, not sampled. Of angles whose cosine cannot be written exactly, only multiples of a common
+one are known to be related.
 """
 
 from __future__ import annotations
@@ -48,6 +48,11 @@ class Constant:
     square: Expression | None = None
     reciprocal_of: Expression | None = None
 
+    @property
+    def symbols(self) -> frozenset[str]:
+        """The names that it is made of."""
+        return frozenset({self.text}) if self.meaning is None else self.meaning.symbols
+
 
 @dataclass(frozen=True)
 class Generator:
@@ -72,6 +77,11 @@ class Generator:
     joint: int = -1
     joints: tuple[int, ...] = ()
     meaning: Expression | None = None
+
+    @property
+    def key(self) -> tuple[str, int | str]:
+        """What it is found by in any ring of the arm: its kind, and its joint or, where it has none, its text."""
+        return self.kind, self.text if self.joint < 0 else self.joint
 
 
 class Ring:
@@ -127,7 +137,7 @@ class Ring:
             *(Generator("acceleration", f"qdd{i + 1}", i) for i in range(len(kinds))),
             *(Generator("constant", c.text, meaning=c.meaning) for c in others if c.square is None),
         )
-        self._places = {(g.kind, g.text if g.joint < 0 else g.joint): k for k, g in enumerate(self.generators)}
+        self._places = {generator.key: k for k, generator in enumerate(self.generators)}
         self.polynomials = polynomials(len(self.generators))
         self.relations: tuple[Relation, ...] = ()
         """What is zero, the greatest generator's first."""
