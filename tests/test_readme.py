@@ -17,6 +17,9 @@ FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "answer.toml").write_text(
+        'robot = "planar2r"\n[answer]\nV = "m1*g*l1*s1/2 + m2*g*(l1*s1 + l2*s12/2)"\n'
+    )
     with pytest.raises(SystemExit) as exit:
         main(shlex.split(command))
     assert exit.value.code == 0, capsys.readouterr()

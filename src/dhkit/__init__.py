@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from dhkit.arm import Arm
     from dhkit.description import Description, pose, pose_parts, robots
     from dhkit.dynamics import Friction
+    from dhkit.grading import GradeReport, grade
     from dhkit.kinematics import IKFlag, IKSolutions, IKStatus
     from dhkit.viewer import plot
 
@@ -32,6 +33,7 @@ __all__ = [
     "DhkitError",
     "ExpressionError",
     "Friction",
+    "GradeReport",
     "IKFlag",
     "IKSolutions",
     "IKStatus",
@@ -39,6 +41,7 @@ __all__ = [
     "PlanningError",
     "UnreachableError",
     "__version__",
+    "grade",
     "plot",
     "pose",
     "pose_parts",
@@ -49,9 +52,11 @@ _HOMES = {
     "Arm": "dhkit.arm",
     "Description": "dhkit.description",
     "Friction": "dhkit.dynamics",
+    "GradeReport": "dhkit.grading",
     "IKFlag": "dhkit.kinematics",
     "IKSolutions": "dhkit.kinematics",
     "IKStatus": "dhkit.kinematics",
+    "grade": "dhkit.grading",
     "plot": "dhkit.viewer",
     "pose": "dhkit.description",
     "pose_parts": "dhkit.description",

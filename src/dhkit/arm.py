@@ -15,6 +15,7 @@ from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
     from dhkit.description.table import Quantity
+    from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
@@ -325,6 +326,26 @@ class Arm:
         return CasadiFunctions(self._description)
 
     # Equations
+
+    def grade(
+        self,
+        answers: Mapping[str, Any] | None = None,
+        *,
+        names: Mapping[str, Any] | None = None,
+        task: Mapping[str, Any] | None = None,
+        **quantities: Any,
+    ) -> GradeReport:
+        """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
+
+        Examples
+        --------
+        >>> report = Arm.load("planar2r").grade(g=["(m1/2 + m2)*g*l1*c1", "m2*g*l2*c2/2"])
+        >>> report.verdict.value, report.diagnosis[0].mistake
+        ('wrong', 'height_relative_angle')
+        """
+        from dhkit.grading import grade_answers
+
+        return grade_answers(self._description, {**(answers or {}), **quantities}, names, task)
 
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
         """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.

@@ -369,9 +369,12 @@ def test_results_are_pickled():
     assert again.prove_euler_lagrange()
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("mistake", [name for name in MISTAKES if name != "rotation_transposed"])
 def test_mistakes_mean_the_same_in_both_conventions(mistake):
-    """The same two rods in both tables: frames lie at the links' far ends, or at their joints."""
+    """The same two rods in both tables: frames lie at the links' far ends, or at their joints.
+
+    A rotation that is transposed is that of the link's own frame, which is another one in the other convention.
+    """
     standard = library_robot("planar2r")
     first, second = standard.joints
     l1, l2 = first.a, second.a

@@ -6,7 +6,7 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, NoReturn, cast
+from typing import Annotated, Any, NoReturn, cast
 
 import typer
 
@@ -213,6 +213,47 @@ def equations(
     from dhkit.cli import equations as equations_command
 
     equations_command.run(Arm.load(robot), what=what, form=form, symbols=symbols, base=base, output=output, json=json)
+
+
+@app.command()
+def grade(
+    sheets: Annotated[
+        list[Path] | None, typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them.")
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="A library name or a robot file, in place of the sheets' own.")
+    ] = None,
+    rubric: Annotated[Path | None, typer.Option(help="What answers are worth (.toml).")] = None,
+    form: Annotated[str, typer.Option("--format", help="text, json, gradescope, junit or html.")] = "text",
+    feedback: Annotated[
+        str | None, typer.Option(help="full, hint or verdict: how much is told; the rubric's unless given.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, max=1024, help="Sheets at once; one for each core.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="The longest that a sheet may take.")] = 60.0,
+    remark: Annotated[
+        bool, typer.Option("--remark", help="The files are reports written before (JSON): mark them again.")
+    ] = False,
+    template: Annotated[str | None, typer.Option(help="Print an empty sheet for this robot.")] = None,
+    explain: Annotated[str | None, typer.Option(help="Print this robot's worked solution, step by step.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; a folder for several sheets.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Judge students' answers exactly, entry by entry; exit status 1 where one is wrong, 2 where one is unreadable."""
+    from dhkit.cli import grade as grade_command
+    from dhkit.cli import grade_texts
+
+    if template is not None:
+        return grade_texts.write_template(template, output)
+    if explain is not None:
+        return grade_texts.write_explanation(Arm.load(explain), form, output)
+    if not sheets:
+        raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
+    wanted: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
+    if remark:
+        return grade_command.remark(sheets, grade_command.rubric_of(rubric), **wanted)
+    return grade_command.grade_files(sheets, robot, rubric, jobs=jobs, seconds=seconds, **wanted)
 
 
 @app.command()

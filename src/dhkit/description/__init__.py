@@ -1,6 +1,7 @@
 """A robot as data: its table, bodies, drives and shapes with exact numbers; robot files, the library, frames, poses."""
 
 from dhkit.description.assets import asset
+from dhkit.description.bodies import require_bodies
 from dhkit.description.changes import with_base, with_parameters, with_payload, with_tool, with_uniform_links
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array, link_transforms, world_to_frames, world_to_tool
@@ -14,6 +15,7 @@ from dhkit.description.robot_file import from_toml, read_robot
 from dhkit.description.table import DHTable, from_dh
 from dhkit.description.toml_writer import to_toml, write_robot
 from dhkit.description.values import (
+    INERTIA_PLACES,
     Base,
     Body,
     Box,
@@ -34,6 +36,7 @@ from dhkit.description.values import (
 )
 
 __all__ = [
+    "INERTIA_PLACES",
     "Array",
     "Base",
     "Body",
@@ -68,6 +71,7 @@ __all__ = [
     "pose_parts",
     "pose_quaternion",
     "read_robot",
+    "require_bodies",
     "robots",
     "to_toml",
     "with_base",

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.exact_poses import ExactPose, settled, vector
-from dhkit.description.values import Body, Inertia, Vector
+from dhkit.description.values import INERTIA_PLACES, Body, Inertia, Vector
+from dhkit.errors import DescriptionError
 from dhkit.expressions import ZERO, Expression
 
-__all__ = ["joined", "moved_body", "rod"]
+if TYPE_CHECKING:
+    from dhkit.description.robot import Description
+
+__all__ = ["joined", "moved_body", "require_bodies", "rod"]
 
 
 def moved_body(body: Body, T: ExactPose) -> Body:
@@ -53,6 +57,24 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     return Body(mass, vector((first + last) / 2), _inertia(_steiner(last - first, mass / 12)))
 
 
+def require_bodies(description: Description) -> tuple[Body, ...]:
+    """Return the links' bodies, and refuse an arm whose dynamics are unknown.
+
+    Raises
+    ------
+    DescriptionError
+        Names the joints whose links have no body.
+    """
+    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if joint.body is None]
+    if bare:
+        raise DescriptionError(
+            f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
+            f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
+            "or use with_uniform_links"
+        )
+    return tuple(joint.body for joint in description.joints if joint.body is not None)
+
+
 def _steiner(lever: NDArray[Any], mass: Expression) -> NDArray[Any]:
     """Return mass (l^2 1 - l l^T)."""
     square = sum((x * x for x in lever), ZERO)
@@ -63,5 +85,4 @@ def _steiner(lever: NDArray[Any], mass: Expression) -> NDArray[Any]:
 
 
 def _inertia(tensor: NDArray[Any]) -> Inertia:
-    entries = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
-    return Inertia(**{key: settled(tensor[place]) for key, place in entries.items()})
+    return Inertia(**{key: settled(tensor[place]) for key, place in INERTIA_PLACES.items()})

@@ -18,7 +18,7 @@ from dhkit.description.robot import Description
 from dhkit.description.table import Quantity, quantity
 from dhkit.description.traversal import names_in
 from dhkit.description.validation import check_body
-from dhkit.description.values import ORIGIN, Base, Body, Convention, Inertia, Placement, Tool, Vector
+from dhkit.description.values import INERTIA_PLACES, ORIGIN, Base, Body, Convention, Inertia, Placement, Tool, Vector
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 
@@ -171,5 +171,4 @@ def _tensor(inertia: ArrayLike | None) -> Inertia:
         raise DescriptionError(f"payload: inertia has shape {I.shape}; expected a symmetric (3, 3) matrix")
     if not np.all(np.isfinite(I)):
         raise DescriptionError("payload: inertia is not finite")
-    entries = {"xx": I[0, 0], "yy": I[1, 1], "zz": I[2, 2], "xy": I[0, 1], "yz": I[1, 2], "xz": I[0, 2]}
-    return Inertia(**{key: exact(float(entry)) for key, entry in entries.items()})
+    return Inertia(**{key: exact(float(I[place])) for key, place in INERTIA_PLACES.items()})

@@ -12,8 +12,8 @@ from dhkit.errors import DescriptionError
 __all__ = ["read_bounded", "write_atomically"]
 
 
-def read_bounded(path: Path, most: int) -> bytes:
-    """Return a regular file's bytes.
+def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes:
+    """Return a regular file's bytes; ``expected`` says in a message what it should be.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def read_bounded(path: Path, most: int) -> bytes:
     except (OSError, ValueError) as error:
         raise DescriptionError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > most:
-        raise DescriptionError(f"{path}: more than {most / 1e6:g} MB; expected a robot file")
+        raise DescriptionError(f"{path}: more than {most / 1e6:g} MB; expected {expected}")
     return content
 
 

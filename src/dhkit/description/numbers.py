@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.parameters import resolved
+from dhkit.description.values import INERTIA_PLACES
 from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
 
 if TYPE_CHECKING:
@@ -76,6 +77,19 @@ class Numbers:
     """Joint vectors by name, shape (n,), rad and m."""
     reach: float
     """The sum of abs(a) + abs(d) + stroke, m."""
+
+    @property
+    def inertial_parameters(self) -> Array:
+        """What torques are linear in, shape (n, 10), in the axes of DH frame i and about its origin.
+
+        Mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz, kg m^2; NaN where a link has no
+        body.
+        """
+        m, c = self.mass[:, None], self.com
+        square = np.sum(c * c, axis=-1)[:, None, None] * np.eye(3)
+        second = self.inertia + m[..., None] * (square - c[:, :, None] * c[:, None, :])
+        listed = np.stack([second[:, i, j] for i, j in INERTIA_PLACES.values()], axis=-1)
+        return np.concatenate([m, m * c, listed], axis=-1)
 
     @classmethod
     def of(cls, description: Description) -> Numbers:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Iterable, Sequence
-from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dhkit.description.files import read_bounded
 from dhkit.description.named import Named
 from dhkit.description.robot import Description
+from dhkit.description.toml_text import toml_document
 from dhkit.description.values import (
     Base,
     Body,
@@ -40,8 +38,6 @@ if TYPE_CHECKING:
 __all__ = ["from_toml", "read_robot"]
 
 MAX_BYTES = 1_000_000
-DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
-"""No key of ours is dotted so deep, and tomllib takes quadratic time over such keys. (Possessive: linear itself.)"""
 ONE = exact(1)
 
 
@@ -76,29 +72,9 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
         if len(text) > MAX_BYTES:
             raise DescriptionError(f"more than {MAX_BYTES / 1e6:g} MB; expected a robot file")
         with Budget():
-            return _Reader(validated(_document(text)), mesh_folder).description()
+            return _Reader(validated(toml_document(text)), mesh_folder).description()
     except DescriptionError as error:
         raise DescriptionError(f"{file}: {error}") from None
-
-
-def _document(text: str) -> dict[str, Any]:
-    if deep := DOTTED_KEY.search(text):
-        raise DescriptionError(f"the key {deep.group()[:40]}... is nested too deep")
-    try:
-        return tomllib.loads(text, parse_float=_decimal)
-    except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
-    except RecursionError:
-        raise DescriptionError("nested too deep") from None
-    except ValueError as error:
-        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
-
-
-def _decimal(text: str) -> Decimal:
-    try:
-        return Decimal(text)
-    except InvalidOperation:
-        raise DescriptionError(f"{text[:40]} is beyond the range of a double") from None
 
 
 class _Reader:

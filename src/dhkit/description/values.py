@@ -9,6 +9,7 @@ from typing import TypeAlias
 from dhkit.expressions import PI, ZERO, Expression, exact
 
 __all__ = [
+    "INERTIA_PLACES",
     "ORIGIN",
     "STANDARD_GRAVITY",
     "Base",
@@ -76,6 +77,10 @@ class Units:
     def radians(self) -> Expression:
         """One unit of angle, in radians."""
         return self.ANGLES[self.angle]
+
+
+INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+"""Where moments and products stand in a tensor, in the order in which six of them are listed."""
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import INERTIA_PLACES, Array, Description, joint_array
 from dhkit.description.frames import carrying, world_to_frames
 
 __all__ = ["inertial_parameters", "regressor"]
-
-PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-"""Second moments in the order xx, yy, zz, xy, yz, xz."""
 
 
 def inertial_parameters(description: Description) -> Array:
@@ -20,12 +17,7 @@ def inertial_parameters(description: Description) -> Array:
     Of each link its mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz about its DH frame's
     origin, kg m^2, in the axes of that frame: m2, rx2, ry2, rz2, Ixx2, Iyy2, Izz2, Ixy2, Iyz2, Ixz2.
     """
-    numbers = description.numbers
-    m, c = numbers.mass[:, None], numbers.com
-    square = np.sum(c * c, axis=-1)[:, None, None] * np.eye(3)
-    second = numbers.inertia + m[..., None] * (square - c[:, :, None] * c[:, None, :])
-    listed = np.stack([second[:, i, j] for i, j in PLACES], axis=-1)
-    return np.concatenate([m, m * c, listed], axis=-1).ravel()
+    return description.numbers.inertial_parameters.ravel()
 
 
 def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -106,7 +98,7 @@ def _needed(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array
 def _tensor_times(w: Array) -> Array:
     """Return the matrix (..., 3, 6) that takes second moments to I w."""
     matrix = np.zeros((*w.shape, 6))
-    for k, (i, j) in enumerate(PLACES):
+    for k, (i, j) in enumerate(INERTIA_PLACES.values()):
         matrix[..., i, k] = w[..., j]
         matrix[..., j, k] = w[..., i]
     return matrix

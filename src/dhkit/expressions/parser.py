@@ -56,7 +56,7 @@ def parse(text: str, names: Collection[str] = ()) -> Expression:
 def value_of(tree: Tree, names: Collection[str]) -> Expression:
     """Work out a syntax tree."""
     match tree:
-        case Number(decimal):
+        case Number(value=decimal):
             return Expression.number(decimal)
         case Name(text):
             return _named(text, names)

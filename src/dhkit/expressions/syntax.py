@@ -15,13 +15,26 @@ Sums and products are kept flat, so that a tree is no deeper than the brackets o
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NoReturn, TypeAlias
+from typing import NamedTuple, NoReturn, TypeAlias
 
 from dhkit.errors import ExpressionError
 
-__all__ = ["Call", "Name", "Number", "Power", "Product", "Sum", "Tree", "decimal_fraction", "read"]
+__all__ = [
+    "Call",
+    "Name",
+    "Number",
+    "Power",
+    "Product",
+    "Sum",
+    "Token",
+    "Tree",
+    "decimal_fraction",
+    "read",
+    "read_tokens",
+]
 
 MAX_LENGTH = 10_000
 """Characters of one expression: longer than any derivation that a person types."""
@@ -33,11 +46,21 @@ MAX_DIGITS = 400
 TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
 
 
+class Token(NamedTuple):
+    """A number, a name or a sign, and where it stands in its text, from 0."""
+
+    kind: str
+    text: str
+    at: int
+
+
 @dataclass(frozen=True)
 class Number:
-    """A decimal, as the rational that it is."""
+    """A decimal, as the rational that it is, and as it was written."""
 
     value: Fraction
+    text: str
+    at: int
 
 
 @dataclass(frozen=True)
@@ -93,7 +116,25 @@ def read(text: str) -> Tree:
     """
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"an expression of {len(text)} characters; expected at most {MAX_LENGTH}")
-    return _Reader(text).whole()
+    return read_tokens(_tokens(text), text)
+
+
+def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
+    """Read a syntax tree from tokens.
+
+    Parameters
+    ----------
+    tokens
+        What was found in a text; a kind is ``number``, ``name`` or ``sign``.
+    text
+        What messages show; positions count from its beginning.
+
+    Raises
+    ------
+    ExpressionError
+        The tokens are no expression, or nested deeper than :data:`MAX_DEPTH`.
+    """
+    return _Reader(tokens, text).whole()
 
 
 def decimal_fraction(text: str) -> Fraction:
@@ -116,36 +157,38 @@ def decimal_fraction(text: str) -> Fraction:
     return value
 
 
+def _tokens(text: str) -> list[Token]:
+    tokens, at = [], 0
+    end = len(text.rstrip())
+    while at < end:
+        match = TOKEN.match(text, at)
+        if match is None:
+            at += len(text[at:]) - len(text[at:].lstrip())
+            raise ExpressionError(f"{_shown(text)}: unexpected character {text[at]!r} at position {at + 1}")
+        kind = ("number", "name", "sign")[(match.lastindex or 1) - 1]
+        tokens.append(Token(kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1)))
+        at = match.end()
+    return tokens
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + "...")
+
+
 class _Reader:
     """One pass over the tokens of a text."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, tokens: Sequence[Token], text: str) -> None:
+        self.tokens = tokens
+        self.shown = _shown(text)
         self.depth = 0
-        self.tokens = self._split()
         self.index = 0
-
-    def _split(self) -> list[tuple[str, str, int]]:
-        tokens, at = [], 0
-        end = len(self.text.rstrip())
-        while at < end:
-            match = TOKEN.match(self.text, at)
-            if match is None:
-                at += len(self.text[at:]) - len(self.text[at:].lstrip())
-                raise ExpressionError(f"{self._shown()}: unexpected character {self.text[at]!r} at position {at + 1}")
-            kind = ("number", "name", "sign")[(match.lastindex or 1) - 1]
-            tokens.append((kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1)))
-            at = match.end()
-        return tokens
-
-    def _shown(self) -> str:
-        return repr(self.text if len(self.text) <= 60 else self.text[:57] + "...")
 
     def _fail(self, expected: str) -> NoReturn:
         if self.index < len(self.tokens):
             _, found, at = self.tokens[self.index]
-            raise ExpressionError(f"{self._shown()}: found {found!r} at position {at + 1}, expected {expected}")
-        raise ExpressionError(f"{self._shown()}: ends where {expected} was expected")
+            raise ExpressionError(f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}")
+        raise ExpressionError(f"{self.shown}: ends where {expected} was expected")
 
     def _peek(self) -> str:
         return self.tokens[self.index][1] if self.index < len(self.tokens) else ""
@@ -161,7 +204,7 @@ class _Reader:
     def _deeper(self) -> None:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise ExpressionError(f"{self._shown()}: nested more than {MAX_DEPTH} deep")
+            raise ExpressionError(f"{self.shown}: nested more than {MAX_DEPTH} deep")
 
     def whole(self) -> Tree:
         tree = self.sum()
@@ -204,7 +247,7 @@ class _Reader:
         kind, text, at = self.tokens[self.index]
         if kind == "number":
             self.index += 1
-            return Number(decimal_fraction(text))
+            return Number(decimal_fraction(text), text, at)
         if kind == "name":
             self.index += 1
             return Call(text, self._arguments(), at) if self._peek() == "(" else Name(text, at)

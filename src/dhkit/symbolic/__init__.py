@@ -22,7 +22,7 @@ from dhkit.symbolic.differentiable.frames import (
     table_pattern,
 )
 from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
-from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern, require_bodies
+from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern
 from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
 from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
@@ -83,7 +83,6 @@ __all__ = [
     "recursive_forward_dynamics",
     "recursive_gravity",
     "recursive_inverse_dynamics",
-    "require_bodies",
     "smooth_direction",
     "solve_for_acceleration",
     "table_pattern",

@@ -11,16 +11,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from dhkit.description import Description
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
-from dhkit.symbolic.mistakes import VELOCITY_FACTORS, check_mistake, has
+from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, check_mistake, has
 from dhkit.symbolic.ring import Element, Elements, Ring
 
-__all__ = ["LinkMotion", "TextbookDerivation", "derive"]
+__all__ = ["LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
 
 HALF = Fraction(1, 2)
 
@@ -116,14 +116,7 @@ class TextbookDerivation:
     @cached_property
     def h(self) -> Elements:
         """Coriolis and centrifugal torques, shape (n,): what is left of tau without accelerations and gravity."""
-        ring, n = self.arm.ring, self.arm.n
-        gradient = -1 if self._has("kinetic_gradient_sign") else 0 if self._has("kinetic_gradient_omitted") else 1
-        torques = []
-        for i, momentum in enumerate(self.momenta):
-            rate = [momentum.by_position(k) * ring.rate(k) for k in range(n)]
-            own = ring.zero if self._has("mass_rate_omitted") else ring.sum(rate)
-            torques.append(self._velocity_terms(own - self.K.by_position(i) * gradient))
-        return np.array(torques, dtype=object)
+        return velocity_torques(self.arm.ring, self.K, self.momenta, self.mistakes)
 
     @cached_property
     def tau(self) -> Elements:
@@ -132,15 +125,37 @@ class TextbookDerivation:
         inertial = [ring.sum(p.by_rate(j) * ring.acceleration(j) for j in range(n)) for p in self.momenta]
         return np.array(inertial, dtype=object) + self.h + self.g
 
-    def _velocity_terms(self, torque: Element) -> Element:
-        """Put the mistakes in that concern products of rates."""
-        for name, (squares, factor) in VELOCITY_FACTORS.items():
-            if self._has(name):
-                torque = _scaled(torque, squares, factor)
-        return torque
-
     def _has(self, mistake: str, i: int | None = None) -> bool:
         return has(self.mistakes, mistake, i)
+
+
+def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozenset[str] = frozenset()) -> Elements:
+    """Return d/dt dK/dqd - dK/dq without accelerations, shape (n,): linear in K.
+
+    Parameters
+    ----------
+    ring
+        Of the elements.
+    K
+        Kinetic energy.
+    momenta
+        Its derivatives by the rates, shape (n,).
+    mistakes
+        Those that concern this step are made.
+    """
+    of_rate, of_gradient = Fraction(1), Fraction(1)
+    for name, (rate, gradient) in STEP_FACTORS.items():
+        if name in mistakes:
+            of_rate, of_gradient = of_rate * rate, of_gradient * gradient
+    torques = []
+    for i, momentum in enumerate(momenta):
+        rates = ring.sum(momentum.by_position(k) * ring.rate(k) for k in range(ring.n))
+        torque = rates * of_rate - K.by_position(i) * of_gradient
+        for name, (squares, factor) in VELOCITY_FACTORS.items():
+            if name in mistakes:
+                torque = scaled(torque, squares, factor)
+        torques.append(torque)
+    return np.array(torques, dtype=object)
 
 
 def derive(
@@ -179,22 +194,51 @@ def derive(
     for mistake in made:
         check_mistake(mistake, description.n)
     arm = exact_arm(description, symbols)
-    return TextbookDerivation(arm, tuple(_links(arm, made)), made)
+    motions = []
+    for i in range(arm.n):
+        concerned = frozenset(m.partition("@")[0] for m in made if m.partition("@")[2] in ("", str(i + 1)))
+        motions.append(_motion(arm, i, concerned & LINK_MISTAKES))
+    return TextbookDerivation(arm, tuple(motions), made)
 
 
-def _links(arm: ExactArm, mistakes: frozenset[str]) -> Iterable[LinkMotion]:
-    """Walk along the arm: frame, centre of mass, velocities and energies of each link."""
+@lru_cache(maxsize=4096)
+def _motion(arm: ExactArm, i: int, mistakes: frozenset[str]) -> LinkMotion:
+    """Return what is found of link i, from 0; derivations that share it do not find it twice."""
+    places = _places(arm)
+    axes = [place.axis for place in places[: i + 1]]
+    return _Link(arm, mistakes, i, places[i]).motion(axes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a link's frame is."""
+
+    R_own: Elements
+    R: Elements
+    before: Elements
+    """Origin of the frame before, in frame 0."""
+    origin: Elements
+    alone: Elements
+    """The frame's origin if frame i - 1 were not turned."""
+    axis: Elements
+    """The joint's axis in frame 0."""
+
+
+@lru_cache(maxsize=32)
+def _places(arm: ExactArm) -> tuple[_Place, ...]:
+    """Walk along the arm."""
     ring = arm.ring
+    places = []
     R, p = _identity(ring), np.array([ring.zero] * 3, dtype=object)
-    axes: list[Elements] = []
-    for i, row in enumerate(arm.rows):
+    for row in arm.rows:
         R_before, p_before = R, p
         R_own, p_own = _transform(arm, row)
         R, p = R_before @ R_own, p_before + R_before @ p_own
-        axes.append((R_before if arm.is_standard else R)[:, 2])
+        axis = (R_before if arm.is_standard else R)[:, 2]
         # What a student turns by the joint's own angle alone: the link from its joint on.
         alone = p_before + p_own if arm.is_standard else p
-        yield _Link(arm, mistakes, i, R_own, R, p_before, p, alone).motion(axes)
+        places.append(_Place(R_own, R, p_before, p, alone, axis))
+    return tuple(places)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,21 +248,16 @@ class _Link:
     arm: ExactArm
     mistakes: frozenset[str]
     i: int
-    R_own: Elements
-    R: Elements
-    before: Elements
-    origin: Elements
-    alone: Elements
-    """The frame's origin if frame i - 1 were not turned."""
+    at: _Place
 
     def has(self, mistake: str) -> bool:
-        return has(self.mistakes, mistake, self.i)
+        return mistake in self.mistakes
 
     def motion(self, axes: list[Elements]) -> LinkMotion:
         velocity, omega = self.velocity(), self.omega(axes)
         K = self.kinetic(velocity, omega)
         return LinkMotion(
-            self.R, self.origin, self.place("velocity_relative_angle"), velocity, omega, K, self.potential()
+            self.at.R, self.at.origin, self.place("velocity_relative_angle"), velocity, omega, K, self.potential()
         )
 
     @property
@@ -234,7 +273,7 @@ class _Link:
     @property
     def joint(self) -> Elements:
         """The link's joint, the origin of the frame that it moves about, in frame 0."""
-        return self.before if self.arm.is_standard else self.origin
+        return self.at.before if self.arm.is_standard else self.at.origin
 
     @property
     def end(self) -> Elements:
@@ -249,14 +288,15 @@ class _Link:
     def place(self, mistake: str) -> Elements:
         """Return where the centre of mass is, in frame 0."""
         if self.has(mistake):
-            return self.alone + self.R_own @ self.com  # type: ignore[no-any-return]
-        return self.origin + self.R @ self.com  # type: ignore[no-any-return]
+            return self.at.alone + self.at.R_own @ self.com  # type: ignore[no-any-return]
+        R = self.at.R.T if self.has("rotation_transposed") else self.at.R
+        return self.at.origin + R @ self.com  # type: ignore[no-any-return]
 
     def velocity(self) -> Elements:
         """Differentiate the position, and resolve it in the link's axes, where it is shortest."""
         place = self.joint if self.has("velocity_at_joint") else self.place("velocity_relative_angle")
         rate = np.array([x.by_time() for x in place], dtype=object)
-        return self.R.T @ rate  # type: ignore[no-any-return]
+        return self.at.R.T @ rate  # type: ignore[no-any-return]
 
     def omega(self, axes: list[Elements]) -> Elements:
         """Sum the axes of the revolute joints up to this link, each times its rate."""
@@ -265,7 +305,7 @@ class _Link:
         total = np.array([ring.zero] * 3, dtype=object)
         for j in joints:
             if ring.kinds[j] == "R":
-                total = total + (self.R.T @ axes[j]) * ring.rate(j)
+                total = total + (self.at.R.T @ axes[j]) * ring.rate(j)
         return total
 
     def inertia(self) -> Elements:
@@ -278,31 +318,35 @@ class _Link:
         if self.has("inertia_axes"):
             tensor = np.roll(tensor, (-1, -1), (0, 1))
         if self.has("inertia_about_joint"):
-            lever = self.com - self.R.T @ (self.joint - self.origin)
+            lever = self.com - self.at.R.T @ (self.joint - self.at.origin)
             tensor = tensor + point_inertia(lever, self.mass * lever)
         return tensor
 
     def kinetic(self, velocity: Elements, omega: Elements) -> Element:
         """Return m v^2 / 2 + omega^T I omega / 2."""
-        factor = 1 if self.has("half_forgotten") else HALF * HALF if self.has("half_squared") else HALF
+        factor = Fraction(1) if self.has("half_forgotten") else HALF * HALF if self.has("half_squared") else HALF
         square = velocity @ velocity
-        if self.has("velocity_cross_term"):
-            own = self.R.T @ np.array([x.by_time() for x in self.joint], dtype=object)
-            square = square - 2 * (own @ (velocity - own))
-        return (self.mass * square + omega @ self.inertia() @ omega) * factor  # type: ignore[no-any-return]
+        if self.has("velocity_cross_term") or self.has("inertia_about_com_at_joint"):
+            own = self.at.R.T @ np.array([x.by_time() for x in self.joint], dtype=object)
+            swing = velocity - own
+            square = square - (2 * (own @ swing) if self.has("velocity_cross_term") else swing @ swing)
+        translation = self.mass * square * (2 if self.has("translation_half_forgotten") else 1)
+        rotation = omega @ self.inertia() @ omega * (2 if self.has("rotation_half_forgotten") else 1)
+        return (translation + rotation) * factor  # type: ignore[no-any-return]
 
     def potential(self) -> Element:
         """Return -m g.p, with p the centre of mass seen from the world's origin."""
         arm, gravity = self.arm, self.arm.gravity
         if self.has("gravity_forgotten") or self.has("height_forgotten"):
             return arm.ring.zero
-        if self.has("gravity_axis"):
-            gravity = np.roll(gravity, 1)
+        for name, places in (("gravity_axis", 1), ("gravity_axis_back", -1)):
+            if self.has(name):
+                gravity = arm.base.T @ np.roll(arm.base @ gravity, places)
         place = self.place("height_relative_angle")
         if self.has("height_at_joint"):
             place = self.joint
         if self.has("height_at_end"):
-            place = self.origin + self.R @ self.end
+            place = self.at.origin + self.at.R @ self.end
         sign = 1 if self.has("gravity_sign") else -1
         return sign * self.mass * (gravity @ (place + arm.origin))  # type: ignore[no-any-return]
 
@@ -321,7 +365,7 @@ def _identity(ring: Ring) -> Elements:
     return np.array([[ring.one if i == j else ring.zero for j in range(3)] for i in range(3)], dtype=object)
 
 
-def _scaled(torque: Element, squares: bool, factor: Fraction) -> Element:
+def scaled(torque: Element, squares: bool, factor: Fraction) -> Element:
     """Multiply the squares of rates, or the products of two different ones, by a factor."""
     ring = torque.ring
     rates = [ring.place("rate", i) for i in range(ring.n)]

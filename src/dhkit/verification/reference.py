@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dhkit.description import Array
+from dhkit.description import INERTIA_PLACES, Array
 from dhkit.model import PinocchioModel
 from dhkit.verification.states import Motion
 
@@ -115,7 +115,7 @@ class Reference:
         matrix = np.zeros((10, 10))
         for k, unit in enumerate(np.eye(10)):
             m, h, second = unit[0], unit[1:4], np.zeros((3, 3))
-            for value, (a, b) in zip(unit[4:], OURS, strict=True):
+            for value, (a, b) in zip(unit[4:], INERTIA_PLACES.values(), strict=True):
                 second[a, b] = second[b, a] = value
             turned = R @ h
             lever = 2 * (p @ turned) * np.eye(3) - np.outer(p, turned) - np.outer(turned, p)
@@ -133,6 +133,5 @@ class Reference:
         return np.array([np.reshape(np.array(answer(*state)), shape) for state in zip(*self.motion, strict=True)])
 
 
-OURS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 THEIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Order of the second moments."""
+"""Pinocchio's order of second moments."""

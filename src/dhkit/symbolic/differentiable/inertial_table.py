@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description
-from dhkit.errors import DescriptionError
+from dhkit.description import Array, Convention, Description, require_bodies
 from dhkit.symbolic.differentiable.bodies import Moments, regrouped
 from dhkit.symbolic.differentiable.frames import FOLDED
 from dhkit.symbolic.differentiable.joint_frames import JointRow, joint_rows
@@ -19,7 +18,7 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, plus
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["InertialTable", "exact_moments", "inertial_pattern", "require_bodies"]
+__all__ = ["InertialTable", "exact_moments", "inertial_pattern"]
 
 
 @dataclass(frozen=True)
@@ -109,23 +108,6 @@ def inertial_pattern(description: Description) -> tuple[str, Array]:
     numbers = _numbers(description)
     codes = np.select([numbers == x for x in FOLDED], list("0+-"), "p")
     return f"{description.kinds} {''.join(codes)}", numbers[codes == "p"]
-
-
-def require_bodies(description: Description) -> None:
-    """Refuse an arm whose dynamics are unknown.
-
-    Raises
-    ------
-    DescriptionError
-        Names the joints whose links have no body.
-    """
-    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if joint.body is None]
-    if bare:
-        raise DescriptionError(
-            f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
-            f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
-            "or use with_uniform_links"
-        )
 
 
 def _numbers(description: Description) -> Array:

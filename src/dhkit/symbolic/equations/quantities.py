@@ -10,7 +10,7 @@ import numpy as np
 
 from dhkit.symbolic.equations.notation import entry_name, generators_of
 from dhkit.symbolic.exact.compact import shortened
-from dhkit.symbolic.ring import Element, Elements, RingError
+from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
@@ -91,12 +91,7 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     unknown = [name for name in names if name not in QUANTITIES]
     if unknown or not names:
         raise ValueError(f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}")
-    found = []
-    for name in dict.fromkeys(names):
-        array = np.empty(np.shape(getattr(lag, name)), dtype=object)
-        array[...] = getattr(lag, name)
-        found.append(Quantity(name, shortened(lag.arm, array)))
-    return found
+    return [Quantity(name, shortened(lag.arm, element_array(getattr(lag, name)))) for name in dict.fromkeys(names)]
 
 
 def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:

@@ -17,7 +17,7 @@ from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-__all__ = ["parallel_runs", "shortened"]
+__all__ = ["parallel_runs", "shortened", "shortened_alike"]
 
 WAYS = 24
 """Choices of angles that are tried."""
@@ -57,6 +57,15 @@ def shortened(arm: ExactArm, elements: Elements) -> Elements:
         written = (_merged(translated(element, ring, turns)) for ring, turns in writings)
         shortest[place] = min([element, *written], key=len)
     return shortest
+
+
+def shortened_alike(arm: ExactArm, elements: Sequence[Element]) -> list[Element]:
+    """Return elements in the one choice of angles that makes all of them together shortest, to be held side by side."""
+    runs = parallel_runs(arm)
+    ways = [list(elements)]
+    for ring, turns in _writings(arm.ring, tuple(runs)) if runs else []:
+        ways.append([_merged(translated(element, ring, turns)) for element in elements])
+    return min(ways, key=lambda written: sum(map(len, written)))
 
 
 @lru_cache(maxsize=64)

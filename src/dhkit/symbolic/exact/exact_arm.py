@@ -9,10 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Body, Convention, Description, Joint, joint_array
-from dhkit.errors import DescriptionError
+from dhkit.description import INERTIA_PLACES, Array, Convention, Description, joint_array, require_bodies
 from dhkit.expressions import Expression, exact_angle
-from dhkit.symbolic.exact.naming import INERTIA_PLACES, LinkNumbers, Naming, Symbols
+from dhkit.symbolic.exact.naming import LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.reading import Direction
@@ -59,6 +58,8 @@ class ExactArm:
         One a joint.
     gear, rotor
         Gear ratio and rotor inertia of each joint's drive; 1 and 0 without one.
+    base
+        Rotation of frame 0 in the world, shape (3, 3).
     gravity
         Free-fall acceleration in frame 0, shape (3,).
     origin
@@ -82,6 +83,7 @@ class ExactArm:
     bodies: tuple[ExactBody, ...]
     gear: tuple[Element, ...]
     rotor: tuple[Element, ...]
+    base: Elements
     gravity: Elements
     origin: Elements
     tool: Elements
@@ -172,14 +174,9 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     """
     if symbols not in ("none", "file", "inertial"):
         raise ValueError(f"symbols is {symbols!r}; expected 'none', 'file' or 'inertial'")
-    for i, joint in enumerate(description.joints, start=1):
-        if joint.body is None:
-            raise DescriptionError(
-                f"{description.name}: joint {i} ({joint.name}) has no body, which dynamics need; "
-                "give it one, or see with_uniform_links"
-            )
+    bodies = require_bodies(description)
     naming = Naming(description, symbols)
-    links = [naming.link(i, joint, body) for i, (joint, body) in enumerate(_with_bodies(description), start=1)]
+    links = [naming.link(i, body) for i, body in enumerate(bodies)]
     gravity = naming.gravity()
     placement = description.base.placement
     xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
@@ -208,6 +205,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         tuple(_body(ring, link) for link in links),
         tuple(ring.read(link.gear) for link in links),
         tuple(ring.read(link.rotor) for link in links),
+        rotation,
         rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
         rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),
         np.array([ring.read(x) for x in tool], dtype=object),
@@ -224,10 +222,6 @@ def _symbols(constants: Constants) -> list[str]:
     for constant in constants.found.values():
         names |= dict.fromkeys(sorted(constant.symbols))
     return list(names)
-
-
-def _with_bodies(description: Description) -> list[tuple[Joint, Body]]:
-    return [(joint, joint.body) for joint in description.joints if joint.body is not None]
 
 
 def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:

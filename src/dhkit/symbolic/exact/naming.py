@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-import numpy as np
-
-from dhkit.description import Body, Description, Drive, Joint
+from dhkit.description import INERTIA_PLACES, Body, Description, Drive
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, exact_angle, substitute
 
-__all__ = ["INERTIA_KEYS", "INERTIA_PLACES", "LinkNumbers", "Naming", "Symbols"]
+__all__ = ["LinkNumbers", "Naming", "Symbols"]
 
 Symbols: TypeAlias = Literal["none", "file", "inertial"]
 """Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
 
 ONE = exact(1)
-INERTIA_KEYS = ("xx", "yy", "zz", "xy", "yz", "xz")
-INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,7 @@ class LinkNumbers:
     mass: Expression
     com: tuple[Expression, ...]
     inertia: tuple[Expression, ...] | None
-    """In the order of ``INERTIA_KEYS``, about the centre of mass; None where ``second`` is given."""
+    """In the order of ``INERTIA_PLACES``, about the centre of mass; None where ``second`` is given."""
     second: tuple[Expression, ...] | None
     gear: Expression
     rotor: Expression
@@ -87,39 +84,36 @@ class Naming:
             return [x if x.is_zero else g if float(x) > 0 else -g for x in vector]
         return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
 
-    def link(self, i: int, joint: Joint, body: Body) -> LinkNumbers:
-        """Return what link i, from 1, is read from."""
+    def link(self, i: int, body: Body) -> LinkNumbers:
+        """Return what link i, from 0, is read from."""
+        joint, number = self.description.joints[i], i + 1
         row = (
-            self.length(f"a{i}", joint.a),
-            self.length(f"d{i}", joint.d),
+            self.length(f"a{number}", joint.a),
+            self.length(f"d{number}", joint.d),
             exact_angle(self.known(joint.alpha)),
             exact_angle(self.known(joint.theta)),
         )
         drive = joint.drive or Drive()
         gear, rotor = self.known(drive.gear), self.known(drive.rotor_inertia)
         if self.symbols != "inertial":
-            inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_KEYS)
+            inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_PLACES)
             com = tuple(self.known(x) for x in body.com)
             return LinkNumbers(row, self.known(body.mass), com, inertia, None, gear, rotor)
-        numbers = self.description.numbers
-        m, c, I_com = numbers.mass[i - 1], numbers.com[i - 1], numbers.inertia[i - 1]
-        about_origin = I_com + m * (c @ c * np.eye(3) - np.outer(c, c))
-        mass = self.inertial_symbol(f"m{i}", exact(float(m)))
-        moments = [self.inertial_symbol(f"r{axis}{i}", exact(float(m * x))) for axis, x in zip("xyz", c, strict=True)]
-        second = tuple(
-            self.inertial_symbol(f"I{key}{i}", exact(float(about_origin[place])))
-            for key, place in INERTIA_PLACES.items()
+        m, x, y, z, *second = map(exact, self.description.numbers.inertial_parameters[i].tolist())
+        mass = self.inertial_symbol(f"m{number}", m)
+        moments = [self.inertial_symbol(f"r{axis}{number}", r) for axis, r in zip("xyz", (x, y, z), strict=True)]
+        tensor = tuple(
+            self.inertial_symbol(f"I{key}{number}", entry) for key, entry in zip(INERTIA_PLACES, second, strict=True)
         )
         if not rotor.is_zero:
-            gear = gear if gear == ONE else self.symbol(f"G{i}", substitute(drive.gear, self.values))
-            rotor = self.inertial_symbol(f"Jm{i}", substitute(drive.rotor_inertia, self.values))
-        return LinkNumbers(row, mass, tuple(x / mass for x in moments), None, second, gear, rotor)
+            gear = gear if gear == ONE else self.symbol(f"G{number}", substitute(drive.gear, self.values))
+            rotor = self.inertial_symbol(f"Jm{number}", substitute(drive.rotor_inertia, self.values))
+        return LinkNumbers(row, mass, tuple(r / mass for r in moments), None, tensor, gear, rotor)
 
 
-def _through(parameters: object, name: str) -> Expression:
+def _through(parameters: Mapping[str, Expression], name: str) -> Expression:
     """Return a parameter in those that are not made of others."""
-    table: dict[str, Expression] = dict(parameters)  # type: ignore[call-overload]
-    expression = table[name]
-    while made := {x for x in expression.symbols if table[x].symbols}:
-        expression = substitute(expression, {x: table[x] for x in made})
+    expression = parameters[name]
+    while made := {x for x in expression.symbols if parameters[x].symbols}:
+        expression = substitute(expression, {x: parameters[x] for x in made})
     return expression

@@ -1,7 +1,7 @@
 """The exact ring: polynomials in sines, cosines and parameters, in a normal form that decides equality."""
 
 from dhkit.symbolic.ring.constants import Constants, value_of
-from dhkit.symbolic.ring.elements import Element, Elements, RingError, translated
+from dhkit.symbolic.ring.elements import Element, Elements, RingError, element_array, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 from dhkit.symbolic.ring.reading import Direction
 from dhkit.symbolic.ring.ring import Constant, Generator, Ring, angle_name
@@ -17,6 +17,7 @@ __all__ = [
     "Ring",
     "RingError",
     "angle_name",
+    "element_array",
     "translated",
     "value_of",
 ]

@@ -9,6 +9,7 @@ from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.errors import DhkitError
@@ -18,7 +19,7 @@ from dhkit.symbolic.ring.polynomials import Monomial
 if TYPE_CHECKING:
     from dhkit.symbolic.ring.ring import Ring
 
-__all__ = ["Element", "Elements", "RingError", "Scalar", "translated"]
+__all__ = ["Element", "Elements", "RingError", "Scalar", "element_array", "translated"]
 
 MAX_TERMS = 300_000
 """Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
@@ -209,6 +210,14 @@ class Element:
 
 Elements: TypeAlias = NDArray[Any]
 """An array whose entries are elements of one ring."""
+
+
+def element_array(value: Any) -> Elements:
+    """Return an element, a list of them, or an array, as an array of the same shape."""
+    array: Elements = np.empty(np.shape(value), dtype=object)
+    array[...] = value
+    return array
+
 
 Scalar: TypeAlias = "Element | int | float | Fraction"
 

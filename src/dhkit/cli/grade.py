@@ -1,0 +1,225 @@
+"""`dhkit grade`: judge answer sheets, or mark again what was judged before; print or write the reports."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, get_args
+
+from dhkit.arm import Arm
+from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
+from dhkit.errors import AnswerError
+from dhkit.grading import LIBRARY, grade
+from dhkit.grading.answers.sheet import read_sheet
+from dhkit.grading.batch import GIGABYTE, Judge, find_sheets, grade_all
+from dhkit.grading.judgement import prepare
+from dhkit.grading.marks import marks
+from dhkit.grading.report import GradeReport, Verdict
+from dhkit.grading.reports import read_reports
+from dhkit.grading.rubric import Feedback, Rubric
+
+__all__ = ["grade_files", "remark", "rubric_of", "run"]
+
+
+def rubric_of(path: Path | None) -> Rubric:
+    """Return the rubric of a file, its mistakes' names checked; the usual one without a file.
+
+    Raises
+    ------
+    AnswerError
+        No rubric, or a mistake that is not known.
+    """
+    rubric = Rubric() if path is None else Rubric.read(path)
+    rubric.require_mistakes(LIBRARY, f"{path}: ")
+    return rubric
+
+
+def _own_rubric(path: Path) -> Rubric:
+    """Return the rubric that a sheet brings along.
+
+    It counts for a single sheet without another one: in a class anybody could give points to himself.
+    """
+    try:
+        data = read_sheet(path).rubric
+    except AnswerError:  # said when it is judged
+        return Rubric()
+    rubric = Rubric.from_data(data, f"{path}: rubric: ")
+    rubric.require_mistakes(LIBRARY, f"{path}: rubric: ")
+    return rubric
+
+
+def grade_files(sheets: Sequence[Path], robot: str | None, rubric: Path | None, **options: Any) -> int:
+    """Judge sheets about their own robots, or all about one; see :func:`run` for the options.
+
+    Raises
+    ------
+    AnswerError, DescriptionError
+        As :func:`run`, or no such robot or rubric.
+    """
+    about = Arm.load(robot).description if robot is not None else None
+    alone = rubric is None and len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
+    chosen = _own_rubric(sheets[0]) if alone else rubric_of(rubric)
+    prepare(about)
+    own_files = [path for path in (rubric, Path(robot) if robot else None) if path is not None]
+    return run(
+        sheets,
+        judge=lambda path: grade(path, about, chosen),
+        rubric=chosen,
+        exclude=own_files,
+        prepare=lambda report: prepare(about, report),
+        **options,
+    )
+
+
+def run(
+    sheets: Sequence[Path],
+    *,
+    judge: Judge,
+    rubric: Rubric,
+    form: str = "text",
+    feedback: str | None = None,
+    jobs: int | None = None,
+    output: Path | None = None,
+    json: bool = False,
+    seconds: float = 60.0,
+    memory: int = 2 * GIGABYTE,
+    exclude: Collection[Path] = (),
+    prepare: Callable[[GradeReport], object] | None = None,
+) -> int:
+    """Judge sheets and deliver the reports; return 0, 1 where one is wrong, 2 where one could not be judged.
+
+    Parameters
+    ----------
+    sheets
+        Files, and folders of them.
+    judge, prepare, seconds, memory
+        As in :func:`~dhkit.grading.batch.grade_all`.
+    jobs
+        Processes at once; one for each core unless given.
+    rubric
+        By which all are marked.
+    form
+        text, json, gradescope, junit or html.
+    feedback
+        full, hint or verdict; the rubric's unless given.
+    output
+        A file; or for several sheets as text a folder, of which ``students`` has what is for them, with the feedback,
+        and all else is the teacher's, whole.
+    json
+        As ``form="json"``.
+    exclude
+        Files in the folders that are no sheets.
+
+    Raises
+    ------
+    AnswerError
+        No such file, format or feedback; an output that would overwrite a sheet.
+    """
+    found = find_sheets(sheets, exclude)
+    several = len(found) > 1 or any(path.is_dir() for path in sheets)
+    form, level = _form("json" if json else form, several), _level(feedback, rubric)
+    check_output(output, form, several)
+    with _progress(len(found)) as progress:
+        judged = grade_all(
+            found,
+            judge,
+            jobs=jobs or os.cpu_count() or 1,
+            seconds=seconds,
+            memory=memory,
+            prepare=prepare,
+            progress=progress,
+        )
+        reports = list(judged)
+    deliver([Graded(report, marks(report, rubric)) for report in reports], form, level, output, several)
+    return _status(reports)
+
+
+def remark(
+    files: Sequence[Path],
+    rubric: Rubric,
+    *,
+    form: str = "text",
+    feedback: str | None = None,
+    output: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Mark again, without judging, what was judged before, and deliver it as :func:`run` does.
+
+    Parameters
+    ----------
+    files
+        JSON as ``dhkit grade --json`` prints it with all feedback, or folders of such files: ``records`` of an output.
+
+    Raises
+    ------
+    AnswerError
+        No such file, or no reports in it; no such format or feedback.
+    """
+    reports = [report for path in _records(files) for report in read_reports(path)]
+    if not reports:
+        raise AnswerError(f"{', '.join(map(str, files))}: no reports")
+    form, level = _form("json" if json else form, len(reports) > 1), _level(feedback, rubric)
+    check_output(output, form, len(reports) > 1)
+    graded = [Graded(report, marks(report, rubric)) for report in reports]
+    deliver(graded, form, level, output, len(reports) > 1)
+    return _status(reports)
+
+
+def _records(files: Sequence[Path]) -> Iterator[Path]:
+    for path in files:
+        folder = path / "records" if (path / "records").is_dir() else path
+        yield from sorted(folder.glob("*.json")) if folder.is_dir() else [path]
+
+
+def _form(form: str, several: bool) -> str:
+    if form not in FORMS:
+        raise AnswerError(f"--format: found {form!r}; expected {', '.join(FORMS)}")
+    if form == "gradescope" and several:
+        raise AnswerError("--format gradescope: found several sheets; expected one, which is what Gradescope hands in")
+    return form
+
+
+def _level(feedback: str | None, rubric: Rubric) -> Feedback:
+    for level in get_args(Feedback):
+        if level == (feedback or rubric.feedback):
+            known: Feedback = level
+            return known
+    raise AnswerError(f"--feedback: found {feedback!r}; expected {', '.join(get_args(Feedback))}")
+
+
+def _status(reports: Sequence[GradeReport]) -> int:
+    """Return the exit status of the worst: a sheet that could not be judged, then one that is wrong."""
+    worst = max((report.verdict for report in reports), key=lambda verdict: verdict.severity)
+    return {Verdict.UNREADABLE: 2, Verdict.WRONG: 1}.get(worst, 0)
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a bar on stderr, where that is a terminal and there is something to wait for."""
+    if total < 2 or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress
+
+    # Without a thread of its own: the sheets' processes are forked meanwhile.
+    bar = Progress(
+        *Progress.get_default_columns(),
+        MofNCompleteColumn(),
+        console=Console(stderr=True),
+        transient=True,
+        auto_refresh=False,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with bar:
+        task = bar.add_task("judging", total=total)
+
+        def show(done: int, of: int) -> None:
+            bar.update(task, completed=done, total=of, refresh=True)
+
+        bar.refresh()
+        yield show

@@ -1,0 +1,155 @@
+"""Where the reports of `dhkit grade` go: to the terminal, into a file, or into a folder for a class."""
+
+from __future__ import annotations
+
+import io
+import json as jsons
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rich.console import Console
+
+from dhkit.cli.output import console, say
+from dhkit.description import write_atomically
+from dhkit.errors import AnswerError
+from dhkit.grading.marks import Marks
+from dhkit.grading.report import GradeReport
+from dhkit.grading.reports import (
+    gradescope,
+    html_class,
+    html_report,
+    json_report,
+    junit,
+    marks_csv,
+    terminal_class,
+    terminal_report,
+    with_feedback,
+)
+from dhkit.grading.reports.sentences import fault_of
+from dhkit.grading.rubric import Feedback
+from dhkit.grading.sheets import SUFFIXES
+
+__all__ = ["FORMS", "Graded", "check_output", "deliver"]
+
+FORMS = ("text", "json", "gradescope", "junit", "html")
+FILE_WIDTH = 120
+"""Columns of text in a file."""
+UNSAFE = re.compile(r"[^\w.-]+")
+LONGEST = 80
+
+
+@dataclass(frozen=True)
+class Graded:
+    """A report with its marks."""
+
+    report: GradeReport
+    marks: Marks
+
+    def told(self, level: Feedback) -> Graded:
+        """Return what of it is told."""
+        marks = self.marks if level == "full" else self.marks.without_rules()
+        return replace(self, report=with_feedback(self.report, level), marks=marks)
+
+
+def check_output(output: Path | None, form: str, several: bool) -> None:
+    """Refuse, before anything is judged, an output that cannot be meant.
+
+    Raises
+    ------
+    AnswerError
+        It would overwrite a sheet, or is a file where a folder is needed.
+    """
+    if output is None or output.is_dir():
+        return
+    if output.suffix.lower() in SUFFIXES:
+        raise AnswerError(f"{output}: a report would overwrite an answer sheet; expected another name")
+    if _is_folder(output, form, several):
+        if output.exists() or output.suffix:
+            raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
+    elif not output.parent.is_dir():
+        raise AnswerError(f"{output.parent}: no such folder")
+
+
+def deliver(graded: Sequence[Graded], form: str, level: Feedback, output: Path | None, several: bool) -> None:
+    """Print reports, or write them; what is written into a folder is told on stdout as well."""
+    told = [one.told(level) for one in graded]
+    if output is not None and _is_folder(output, form, several):
+        _write_folder(graded, told, output)
+    elif output is not None:
+        write_atomically(output, _document(told, form, level, several))
+    if form == "json" and (output is None or output.is_dir()):
+        sys.stdout.write(_document(told, form, level, several))
+    elif form == "text":
+        _print(told, several)
+    elif output is None:
+        sys.stdout.write(_document(told, form, level, several))
+    if output is not None and form != "json":
+        say(f"wrote {output}")
+
+
+def _is_folder(output: Path, form: str, several: bool) -> bool:
+    return output.is_dir() or (several and form == "text")
+
+
+def _print(told: Sequence[Graded], several: bool) -> None:
+    if several:
+        console().print(terminal_class(*_columns(told)))
+    elif told[0].report.error:
+        sys.stderr.write(f"dhkit: {fault_of(told[0].report)}\n")
+    else:
+        console().print(terminal_report(told[0].report, told[0].marks))
+
+
+def _document(told: Sequence[Graded], form: str, level: Feedback, several: bool) -> str:
+    """Return what a file of a format holds."""
+    first = told[0]
+    match form:
+        case "json":
+            return "".join(f"{_json(one, level)}\n" for one in told)
+        case "gradescope":
+            return jsons.dumps(gradescope(first.report, first.marks), ensure_ascii=False, indent=2) + "\n"
+        case "junit":
+            return junit(*_columns(told))
+        case "html":
+            return html_class(*_columns(told)) if several else html_report(first.report, first.marks)
+        case _:
+            file = io.StringIO()
+            page = Console(file=file, width=FILE_WIDTH, highlight=False, color_system=None, soft_wrap=True)
+            page.print(terminal_report(first.report, first.marks))
+            return file.getvalue()
+
+
+def _json(one: Graded, level: Feedback) -> str:
+    return jsons.dumps(json_report(one.report, one.marks, level), ensure_ascii=False, allow_nan=False)
+
+
+def _columns(graded: Sequence[Graded]) -> tuple[list[GradeReport], list[Marks]]:
+    return [one.report for one in graded], [one.marks for one in graded]
+
+
+def _write_folder(graded: Sequence[Graded], told: Sequence[Graded], folder: Path) -> None:
+    """Write a class: marks, its page and whole records for the teacher; a page for each student, with the feedback."""
+    for name in ("students", "records"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    for name, whole, part in zip(_names(graded), graded, told, strict=True):
+        write_atomically(folder / "records" / f"{name}.json", _json(whole, "full") + "\n")
+        write_atomically(folder / "students" / f"{name}.html", html_report(part.report, part.marks))
+    write_atomically(folder / "marks.csv", marks_csv(*_columns(graded)))
+    write_atomically(folder / "class.html", html_class(*_columns(graded)))
+
+
+def _names(graded: Sequence[Graded]) -> list[str]:
+    """Return names for files: of the students, each once also where a system takes A for a."""
+    names: dict[str, str] = {}
+    for one in graded:
+        wanted = one.report.student or Path(one.report.sheet or "sheet").stem
+        plain = UNSAFE.sub("_", wanted).encode()[:LONGEST].decode(errors="ignore").lstrip(".") or "sheet"
+        name, number = plain, 1
+        while name.casefold() in names:
+            number += 1
+            name = f"{plain}-{number}"
+        names[name.casefold()] = name
+    return list(names.values())

@@ -1,0 +1,64 @@
+"""TOML that anybody may have written: bounded in size, depth and digits, decimals as they stand."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from dhkit.errors import DescriptionError
+
+__all__ = ["plain_numbers", "toml_document"]
+
+DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
+"""No key of ours is dotted so deep, and tomllib takes quadratic time over such keys. (Possessive: linear itself.)"""
+MAX_BITS = 2_048
+"""Of a whole number: beyond the range of a double."""
+
+
+def toml_document(text: str) -> dict[str, Any]:
+    """Return a TOML document.
+
+    Raises
+    ------
+    DescriptionError
+        Not TOML, nested too deep, or a number beyond the range of a double.
+    """
+    if deep := DOTTED_KEY.search(text):
+        raise DescriptionError(f"the key {deep.group()[:40]}... is nested too deep")
+    try:
+        document = tomllib.loads(text, parse_float=_decimal)
+        _check_numbers(document)
+    except RecursionError:
+        raise DescriptionError("nested too deep") from None
+    except ValueError as error:
+        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
+    return document
+
+
+def plain_numbers(value: Any) -> Any:
+    """Return a document with doubles for decimals."""
+    if isinstance(value, Mapping):
+        return {key: plain_numbers(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [plain_numbers(entry) for entry in value]
+    return float(value) if isinstance(value, Decimal) else value
+
+
+def _decimal(text: str) -> Decimal:
+    try:
+        return Decimal(text)
+    except InvalidOperation:
+        raise DescriptionError(f"{text[:40]} is beyond the range of a double") from None
+
+
+def _check_numbers(value: Any) -> None:
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, list):
+        for entry in value:
+            _check_numbers(entry)
+    elif isinstance(value, int) and value.bit_length() > MAX_BITS:
+        raise DescriptionError("a whole number beyond the range of a double")

@@ -1,0 +1,24 @@
+"""Judging students' work: answers read as text, decided exactly, explained, marked and reported."""
+
+from dhkit.grading.judgement import grade, grade_answers, robot_of
+from dhkit.grading.marks import Mark, Marks, marks
+from dhkit.grading.mistakes.library import LIBRARY
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
+from dhkit.grading.rubric import Credit, Rubric
+
+__all__ = [
+    "LIBRARY",
+    "Credit",
+    "Diagnosis",
+    "Entry",
+    "GradeReport",
+    "Mark",
+    "Marks",
+    "Rubric",
+    "Verdict",
+    "Witness",
+    "grade",
+    "grade_answers",
+    "marks",
+    "robot_of",
+]

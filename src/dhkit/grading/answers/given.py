@@ -1,0 +1,204 @@
+"""Answers as they are judged: entry by entry, each with its text and its syntax tree."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dhkit.description import Description
+from dhkit.errors import AnswerError
+from dhkit.expressions.syntax import Tree
+from dhkit.grading.answers.objects import entry_tree, is_entry
+from dhkit.grading.answers.reading import meaning_of, read_matrix
+from dhkit.grading.answers.sheet import Names, Refusal
+from dhkit.grading.answers.tokens import shown
+from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
+
+__all__ = ["LEFT_EMPTY", "POSE_NAMES", "Given", "given_branches", "given_quantity", "given_rows", "vocabulary_of"]
+
+LEFT_EMPTY = "left empty"
+POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
+"""The tool's pose in the world, which inverse kinematics start from: its origin, m, and its rotation by rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """One entry of an answer.
+
+    Attributes
+    ----------
+    index
+        Where it stands, from 0.
+    text
+        As it was typed.
+    tree
+        What it was read as; None where it could not be.
+    error
+        Why it could not be read.
+    """
+
+    index: tuple[int, ...]
+    text: str
+    tree: Tree | None = None
+    error: str = ""
+
+
+def vocabulary_of(
+    description: Description, names: Names, sums: Sequence[Sequence[int]] = (), inverse: bool = False
+) -> Vocabulary:
+    """Return what names mean on a sheet.
+
+    Raises
+    ------
+    AnswerError
+        A name that stands for two things, or one made of names that the robot does not have.
+    """
+    further = POSE_NAMES if inverse else ()
+    vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
+    for name, text in names.parameters.items():
+        if names.lenient and _stays(name, text, vocabulary, description):
+            continue
+        if isinstance(text, Refusal):
+            vocabulary.refuse(name, text.reason)
+            continue
+        try:
+            meaning = meaning_of(text, vocabulary)
+            (vocabulary.redefine if names.lenient else vocabulary.define)(name, meaning)
+        except AnswerError as error:
+            if not names.lenient:
+                raise AnswerError(f"names.parameters: {shown(name)}: {error}") from None
+            if not vocabulary.knows(name):
+                vocabulary.refuse(name, str(error))
+    return vocabulary
+
+
+def _stays(name: str, text: str | Refusal, vocabulary: Vocabulary, description: Description) -> bool:
+    """Whether a program's assignment changes nothing: a number for a parameter, symbols for joint variables."""
+    known = vocabulary.find(name)
+    if known is None:
+        return False
+    if known == (name,) and name in description.parameters:
+        return isinstance(text, str) and re.fullmatch(r"[-+\d.eE*/() ]+", text) is not None
+    return vocabulary.is_state(name)
+
+
+def given_quantity(name: str, value: Any, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+    """Return a quantity's entries, of those that were handed in.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        Text, a number, or lists of them; a matrix may stand in one text.
+    shape
+        What is expected.
+    vocabulary
+        What names mean.
+
+    Raises
+    ------
+    AnswerError
+        Another shape, or no text.
+    """
+    if isinstance(value, Refusal):
+        raise AnswerError(f"{name}: {value.reason}; a program is read, not run: write it in one assignment")
+    if isinstance(value, str) and math.prod(shape) == 1 and "[" not in value and "\\begin" not in value:
+        return (_read((0,) * len(shape), _without_head(name, value), vocabulary),)
+    if isinstance(value, str) and shape:
+        return _from_one_text(name, _without_head(name, value), shape, vocabulary)
+    entries = _flat(name, value, shape, ())
+    return tuple(_read(index, text, vocabulary) for index, text in entries)
+
+
+def _without_head(name: str, text: str) -> str:
+    """Take M = and M(q) = away from in front of M."""
+    head, equals, rest = text.partition("=")
+    own = plain_name(re.sub(r"\(.*", "", head.strip(), flags=re.DOTALL))
+    return rest.rstrip().removesuffix(";") if equals and own == name and not rest.startswith("=") else text
+
+
+def given_rows(rows: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
+    """Return the entries of a table.
+
+    Raises
+    ------
+    AnswerError
+        Another number of rows.
+    """
+    if len(rows) != n:
+        raise AnswerError(f"dh: found {len(rows)} rows; expected {n}, one a joint")
+    return [tuple(_read((i, k), text, vocabulary) for k, text in enumerate(row)) for i, row in enumerate(rows)]
+
+
+def given_branches(branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
+    """Return the formulas of inverse kinematics.
+
+    Raises
+    ------
+    AnswerError
+        Another number of formulas in a branch.
+    """
+    for k, branch in enumerate(branches):
+        if len(branch) != n:
+            raise AnswerError(f"ik: branch {k + 1}: found {len(branch)} formulas; expected {n}, one a joint")
+    return [
+        tuple(_read((k, i), text, vocabulary) for i, text in enumerate(branch)) for k, branch in enumerate(branches)
+    ]
+
+
+def _left_empty(value: Any) -> bool:
+    return isinstance(value, str) and not value.strip()
+
+
+def _read(index: tuple[int, ...], value: Any, vocabulary: Vocabulary) -> Given:
+    if _left_empty(value):
+        return Given(index, "", error=LEFT_EMPTY)
+    try:
+        return Given(index, *entry_tree(value.strip().rstrip(";,") if isinstance(value, str) else value, vocabulary))
+    except AnswerError as error:
+        shown_text = value if isinstance(value, str) else f"{type(value).__name__} object"
+        return Given(index, shown_text[:1000], error=str(error))
+
+
+def _flat(name: str, value: Any, shape: tuple[int, ...], index: tuple[int, ...]) -> list[tuple[tuple[int, ...], Any]]:
+    if not shape:
+        while isinstance(value, list) and len(value) == 1:
+            (value,) = value
+        if not is_entry(value):
+            raise AnswerError(
+                f"{_place(name, index)}: found {_kind(value)}; expected an expression in quotes, or a number"
+            )
+        return [(index, value)]
+    if not isinstance(value, list) or len(value) != shape[0]:
+        raise AnswerError(f"{_place(name, index)}: found {_kind(value)}; expected a list of {shape[0]}")
+    return [entry for k, part in enumerate(value) for entry in _flat(name, part, shape[1:], (*index, k))]
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "a table" if isinstance(value, Mapping) else str(value)[:40] or "nothing"
+
+
+def _place(name: str, index: tuple[int, ...]) -> str:
+    return name + "".join(f"[{k}]" for k in index)
+
+
+def _from_one_text(name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+    try:
+        rows = read_matrix(text, vocabulary)
+    except AnswerError as error:
+        raise AnswerError(f"{name}: {error}") from None
+    if len(shape) == 1:
+        listed = rows[0] if len(rows) == 1 else [entry for row in rows for entry in row]
+        if len(listed) != shape[0]:
+            raise AnswerError(f"{name}: found {len(listed)} entries; expected {shape[0]}")
+        return tuple(Given((k,), written, tree) for k, (written, tree) in enumerate(listed))
+    found = (len(rows), len(rows[0]) if rows else 0)
+    if len(rows) != shape[0] or any(len(row) != shape[1] for row in rows):
+        raise AnswerError(f"{name}: found {found[0]} rows of {found[1]}; expected {shape[0]} of {shape[1]}")
+    return tuple(Given((i, j), *entry) for i, row in enumerate(rows) for j, entry in enumerate(row))

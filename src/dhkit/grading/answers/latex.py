@@ -1,0 +1,361 @@
+r"""From LaTeX to the tokens of plain text: \frac{1}{2} m_1 \dot\theta_1^2, c_{12}, matrices between & and \\."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.tokens import closing_bracket, dotted, fail
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
+
+__all__ = ["is_latex", "latex_tokens"]
+
+MAX_DEPTH = 50
+MAX_LETTERS = 64
+PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
+SPACES = frozenset(
+    [
+        ",",
+        ";",
+        ":",
+        "!",
+        ">",
+        "quad",
+        "qquad",
+        "displaystyle",
+        "textstyle",
+        "limits",
+        "nolimits",
+        "nonumber",
+        "notag",
+        "thinspace",
+        "enspace",
+        "space",
+        "middle",
+    ]
+) | {" ", "\n", "("[:0]}
+SIZES = frozenset(
+    ["left", "right", "big", "Big", "bigg", "Bigg", "bigl", "bigr", "Bigl", "Bigr", "biggl", "biggr", "Biggl", "Biggr"]
+)
+FRACTIONS = frozenset(("frac", "tfrac", "dfrac", "cfrac"))
+UPRIGHT = frozenset(
+    [
+        "mathrm",
+        "mathit",
+        "mathbf",
+        "mathsf",
+        "mathcal",
+        "text",
+        "textrm",
+        "operatorname",
+        "boldsymbol",
+        "bm",
+        "vec",
+        "hat",
+        "bar",
+        "mathnormal",
+    ]
+)
+TIMES = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
+DOTS = {"dot": "dot", "ddot": "ddot"}
+GREEK = frozenset(
+    [
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "varepsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "vartheta",
+        "iota",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+        "rho",
+        "varrho",
+        "sigma",
+        "tau",
+        "upsilon",
+        "phi",
+        "varphi",
+        "chi",
+        "psi",
+        "omega",
+        "Gamma",
+        "Delta",
+        "Theta",
+        "Lambda",
+        "Xi",
+        "Sigma",
+        "Upsilon",
+        "Phi",
+        "Psi",
+        "Omega",
+    ]
+)
+MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
+
+
+def is_latex(text: str) -> bool:
+    """Whether a text is LaTeX rather than what programs read."""
+    return "\\" in text or "{" in text or "_{" in text or "^{" in text
+
+
+def latex_tokens(text: str, knows: Callable[[str], bool]) -> list[Token]:
+    """Return tokens of plain text: names without underscores, brackets for groups, no macros.
+
+    Parameters
+    ----------
+    text
+        LaTeX without a preamble; dollars around it are ignored.
+    knows
+        Whether several letters are one name.
+
+    Raises
+    ------
+    AnswerError
+        A macro that is no mathematics, or brackets that do not match.
+    """
+    return _Latex(text, knows).whole()
+
+
+class _Latex:
+    """One pass over a LaTeX formula."""
+
+    def __init__(self, text: str, knows: Callable[[str], bool]) -> None:
+        self.text = text
+        self.knows = knows
+        self.at = 0
+        self.depth = 0
+
+    def whole(self) -> list[Token]:
+        found = self._until("")
+        if self.at < len(self.text.rstrip()):
+            fail(self.text, self.at, "a closing brace without an opening one")
+        return found
+
+    # Pieces of the text
+
+    def _peek(self) -> re.Match[str] | None:
+        return PIECE.match(self.text, self.at)
+
+    def _next_is(self, sign: str) -> bool:
+        piece = self._peek()
+        return piece is not None and piece[4] == sign
+
+    def _until(self, closing: str) -> list[Token]:
+        """Read up to a closing brace, or to the end."""
+        found: list[Token] = []
+        while (piece := self._peek()) is not None and piece[4] != "}":
+            found += self._item(piece)
+        if closing:
+            if not self._next_is(closing):
+                fail(self.text, min(self.at, len(self.text) - 1), f"expected {closing!r}")
+            self._skip()
+        return found
+
+    def _skip(self) -> None:
+        piece = self._peek()
+        self.at = piece.end() if piece else len(self.text)
+
+    def _item(self, piece: re.Match[str]) -> list[Token]:
+        """Read one thing with what stands below it."""
+        at = piece.start(piece.lastindex or 0)
+        self.at = piece.end()
+        if piece[1] is not None:
+            return self._command(piece[1], at - 1)
+        if piece[2] is not None:
+            return [Token("number", piece[2], at)]
+        if piece[3] is not None:
+            return self._letters(piece[3], at)
+        sign = piece[4]
+        if sign == "{":
+            self.at = at
+            return self._grouped(at)
+        if sign == "^":
+            return [Token("sign", "^", at), *self._bracketed(at)]
+        if sign in "$~":
+            return []
+        if sign in "+-*/(),;[]&<>='.|":
+            return [Token("sign", sign, at)]
+        return fail(self.text, at, f"unexpected {sign!r}")
+
+    def _grouped(self, at: int) -> list[Token]:
+        r"""Read a group: {l_1}, or {\dot\theta}_1, whose subscript belongs to the name inside."""
+        inner = self._argument(at)
+        if len(inner) == 1 and inner[0].kind == "name":
+            return [Token("name", self._with_subscript(inner[0].text), at)]
+        if inner and inner[0].text == "(" and closing_bracket(inner, 0) == len(inner) - 1:
+            return inner
+        return [Token("sign", "(", at), *inner, Token("sign", ")", at)] if inner else []
+
+    def _argument(self, at: int) -> list[Token]:
+        """Read what a macro applies to: a group in braces, or one thing."""
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            fail(self.text, at, f"nested more than {MAX_DEPTH} deep")
+        piece = self._peek()
+        if piece is None:
+            fail(self.text, at, "ends where an argument was expected")
+        if piece[4] == "{":
+            self.at = piece.end()
+            inner = self._until("}")
+        elif piece[2] is not None:
+            # \frac12 is 1/2: one digit each.
+            self.at = piece.start(2) + 1
+            inner = [Token("number", piece[2][0], piece.start(2))]
+        elif piece[3] is not None:
+            self.at = piece.start(3) + 1
+            inner = [Token("name", piece[3][0], piece.start(3))]
+        elif piece[1] is not None:
+            self.at = piece.end()
+            inner = self._command(piece[1], piece.start(1) - 1, bare=True)
+        else:
+            fail(self.text, piece.start(), "expected an argument")
+        self.depth -= 1
+        return inner
+
+    def _bracketed(self, at: int) -> list[Token]:
+        return [Token("sign", "(", at), *self._argument(at), Token("sign", ")", at)]
+
+    # Names
+
+    def _letters(self, letters: str, at: int) -> list[Token]:
+        """Read letters: a known name, a function's, or one name each, the last with what stands below it."""
+        if len(letters) > MAX_LETTERS:
+            fail(self.text, at, f"{len(letters)} letters in a row")
+        digits = re.compile(r"\d+", re.ASCII).match(self.text, self.at)
+        if digits and self.knows(letters + digits[0]):
+            self.at = digits.end()  # m1 as programs write it
+            return [Token("name", letters + digits[0], at)]
+        below = self._subscript()
+        if letters in FUNCTION_NAMES and not below:
+            return [Token("name", letters, at)]
+        return [Token("name", name, at) for name in self._names(letters, below)]
+
+    def _names(self, letters: str, below: str) -> list[str]:
+        if len(letters) == 1 or self.knows(letters + below):
+            return [letters + below]
+        for k in range(1, len(letters)):
+            if self.knows(letters[k:] + below) and (k == 1 or self.knows(letters[:k])):
+                return [*self._names(letters[:k], ""), letters[k:] + below]
+        return [*self._names(letters[:-1], ""), letters[-1] + below]
+
+    def _subscript(self) -> str:
+        """Read _{12}, _1 or _{c1}: the characters that belong to the name."""
+        if not self._next_is("_"):
+            return ""
+        at = self.at
+        self._skip()
+        inner = self._argument(at)
+        word = "".join({"+": "p", "-": "m", ",": ""}.get(token.text, token.text) for token in inner)
+        if not re.fullmatch(r"\w*", word, re.ASCII):
+            fail(self.text, at, "a subscript that is no name")
+        return word
+
+    def _with_subscript(self, name: str) -> str:
+        return name + self._subscript()
+
+    # Macros
+
+    def _command(self, name: str, at: int, bare: bool = False) -> list[Token]:
+        if name in SPACES:
+            return []
+        if name in ("\\", "cr"):
+            spacing = re.compile(r"\s*\[-?\d*\.?\d+(?:pt|em|ex|mm|cm)\]", re.ASCII).match(self.text, self.at)
+            self.at = spacing.end() if spacing else self.at
+            return [Token("sign", "\\\\", at)]
+        if name == "partial":
+            return [Token("name", "d", at)]
+        if name in SIZES:
+            return self._delimiter(at)
+        if name in FRACTIONS:
+            above, below = self._bracketed(at), self._bracketed(at)
+            if order := _order_of_derivative(above, below):
+                return self._derivative(above, order, at)
+            return [Token("sign", "(", at), *above, Token("sign", "/", at), *below, Token("sign", ")", at)]
+        if name == "sqrt":
+            if self._next_is("["):
+                fail(self.text, at, "a root other than the square root")
+            return [Token("name", "sqrt", at), *self._bracketed(at)]
+        if name in DOTS:
+            return self._dotted(DOTS[name], at, bare)
+        if name in UPRIGHT:
+            return self._upright(at, bare)
+        if name in ("begin", "end"):
+            return self._environment(name, at)
+        if name in FUNCTION_NAMES:
+            return [Token("name", name, at)]
+        if name in ("pi", "ell") or name in GREEK:
+            letter = TIMES.get(name, name)
+            return [Token("name", letter if bare else self._with_subscript(letter), at)]
+        if name in TIMES:
+            return [Token("sign", TIMES[name], at)]
+        if name == "top":
+            return [Token("name", "top", at)]
+        if name in "{}":
+            return [Token("sign", "(" if name == "{" else ")", at)]
+        return fail(self.text, at, f"the macro \\{name}, which is not read,")
+
+    def _derivative(self, above: list[Token], order: int, at: int) -> list[Token]:
+        r"""Read \frac{d}{d t} \theta_{1}{\left(t \right)}, as sympy prints it, and \frac{d \theta_1}{dt}."""
+        names = [token for token in above if token.kind == "name" and token.text != "d"]
+        if not names:
+            piece = self._peek()
+            names = self._item(piece) if piece is not None else []
+        if len(names) != 1 or names[0].kind != "name":
+            fail(self.text, at, "a derivative other than of a joint's variable by t")
+        return [Token("name", dotted(names[0].text, ("dot", "ddot")[order - 1]), at)]
+
+    def _delimiter(self, at: int) -> list[Token]:
+        piece = self._peek()
+        if piece is None:
+            fail(self.text, at, "ends where a bracket was expected")
+        self.at = piece.end()
+        sign = piece[1] or piece[4]
+        if sign == ".":
+            return []
+        if sign in ("(", ")", "[", "]", "{", "}"):
+            return [Token("sign", "(" if sign in "([{" else ")", at)]
+        return fail(self.text, at, "expected a bracket")
+
+    def _dotted(self, dots: str, at: int, bare: bool) -> list[Token]:
+        r"""Read \dot\theta_1, \dot{\theta}_1 and \dot{\theta_1}."""
+        inner = self._argument(at)
+        if len(inner) != 1 or inner[0].kind != "name":
+            fail(self.text, at, "dots on something that is no name")
+        name = dotted(inner[0].text, dots)
+        return [Token("name", name if bare else self._with_subscript(name), at)]
+
+    def _upright(self, at: int, bare: bool) -> list[Token]:
+        inner = self._argument(at)
+        if not all(token.kind in ("name", "number") for token in inner):
+            return [Token("sign", "(", at), *inner, Token("sign", ")", at)]
+        name = "".join(token.text for token in inner)
+        if not name:
+            return []
+        return [Token("name", name if bare or name in FUNCTION_NAMES else self._with_subscript(name), at)]
+
+    def _environment(self, name: str, at: int) -> list[Token]:
+        match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)
+        if match is None or match[1] not in MATRICES:
+            fail(self.text, at, "an environment that is no matrix")
+        self.at = match.end()
+        return [Token("sign", "[" if name == "begin" else "]", at)]
+
+
+def _order_of_derivative(above: list[Token], below: list[Token]) -> int:
+    """Return 1 of d/dt, 2 of d^2/dt^2, 0 of another fraction."""
+    top = "".join(token.text for token in above if token.text not in "()")
+    bottom = "".join(token.text for token in below if token.text not in "()")
+    for order, (begins, ends) in enumerate((("d", "dt"), ("d^2", "dt^2")), start=1):
+        names = sum(token.kind == "name" and token.text != "d" for token in above)
+        if bottom == ends and (top == begins or (top.startswith(begins) and names == 1)) and above[1].text == "d":
+            return order
+    return 0

@@ -1,0 +1,281 @@
+"""Answers as syntax trees: one expression, or a matrix of them, in any of the notations that students write."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Sequence
+from fractions import Fraction
+
+from dhkit.errors import AnswerError, ExpressionError
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Token, Tree, read_tokens
+from dhkit.grading.answers.latex import is_latex, latex_tokens
+from dhkit.grading.answers.rewriting import rewritten
+from dhkit.grading.answers.tokens import fail, folded, tokens
+from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
+
+__all__ = ["meaning_of", "read_answer", "read_matrix"]
+
+MATRIX_WORDS = frozenset(
+    ("sym", "Matrix", "array", "matrix", "simplify", "transpose", "MutableDenseMatrix", "ImmutableMatrix", "DM", "SX")
+)
+MAX_ENTRIES = 1_024
+MAX_MEANING = 20_000
+"""Tokens of what a student's own name stands for, the names in it written out."""
+
+
+def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
+    """Read an expression in Python's, MATLAB's, sympy's or LaTeX notation, or in the shorthand of the field.
+
+    Parameters
+    ----------
+    text
+        What a student typed; never evaluated.
+    vocabulary
+        What names mean.
+
+    Returns
+    -------
+    Tree
+        In the robot's own names: q1, qd1, qdd1, the file's parameters, pi.
+
+    Raises
+    ------
+    AnswerError
+        No expression, an unknown name, or more than the limits allow; with the place.
+    """
+    return _tree(_tokens(text, vocabulary), vocabulary, text)
+
+
+def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]]]:
+    """Read a matrix or a vector out of one text: [[a, b], [c, d]], [a, b; c, d], Matrix([...]) or pmatrix.
+
+    Returns
+    -------
+    list
+        Rows of pairs: an entry's text, and its tree; a vector is a column or a row, as it was written.
+
+    Raises
+    ------
+    AnswerError
+        As for :func:`read_answer`, or no matrix.
+    """
+    text = _in_rows(text)
+    found = _stripped(_tokens(text, vocabulary))
+    start, end = _matrix_in(found, text)
+    before, after = found[:start], found[end + 1 :]
+    if sum(token.text in (",", ";", "&", "\\\\") for token in found) > MAX_ENTRIES:
+        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    rows = _rows(found[start : end + 1], text)
+    if sum(map(len, rows)) > MAX_ENTRIES:
+        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    places = [token.at for token in found]
+    return [
+        [(_written(entry, places, text), _tree(_scaled(before, entry, after), vocabulary, text)) for entry in row]
+        for row in rows
+    ]
+
+
+def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
+    """Return the tokens that a student's own name stands for, in brackets.
+
+    Raises
+    ------
+    AnswerError
+        As for :func:`read_answer`.
+    """
+    read_answer(text, vocabulary)
+    plain = rewritten(_tokens(text, vocabulary), vocabulary, text)
+    if len(plain) > MAX_MEANING:
+        raise AnswerError(f"written out, {len(plain)} signs; expected at most {MAX_MEANING}")
+    return ("(", *(token.text for token in plain), ")")
+
+
+def _tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
+    plain, places = folded(text)
+    if is_latex(plain):
+        return latex_tokens(plain, vocabulary.knows)
+    return tokens(plain, places, text, allowed="{}")
+
+
+def _tree(found: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:
+    end = len(found)
+    while end and found[end - 1].text in (",", ";", "."):
+        end -= 1
+    plain = rewritten(found[:end], vocabulary, text)
+    for token in plain:
+        if token.kind == "sign" and token.text not in "+-*/^(),":
+            fail(text, token.at, f"unexpected {token.text!r}")
+    try:
+        return _known(read_tokens(plain, text))
+    except ExpressionError as error:
+        raise AnswerError(str(error)) from None
+
+
+# Matrices
+
+
+def _in_rows(text: str) -> str:
+    """Return a text with ; where MATLAB begins a row by a new line, and without its ..."""
+    if is_latex(text):
+        return text
+    lines = [line.strip() for line in re.sub(r"\.\.\.[^\n]*\n", " ", text.strip()).splitlines()]
+    joined = ""
+    for line in filter(None, lines):
+        nested = joined.count("[") - joined.count("]") > 1
+        joined += (" " if nested or joined[-1:] in (",", ";", "[", "(", "") else "; ") + line
+    return joined.strip() if joined.count("[") == 1 else " ".join(lines).strip()
+
+
+def _matrix_in(found: Sequence[Token], text: str) -> tuple[int, int]:
+    """Return where the one matrix of a text begins and ends; a factor may stand before or behind it."""
+    opening = [k for k, token in enumerate(found) if token.text == "["]
+    end = max((k for k, token in enumerate(found) if token.text == "]"), default=-1)
+    if not opening or end < opening[0]:
+        raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}")
+    return opening[0], end
+
+
+def _scaled(before: Sequence[Token], entry: Sequence[Token], after: Sequence[Token]) -> list[Token]:
+    """Return an entry with the factors of its matrix."""
+    if (not before and not after) or not entry:
+        return list(entry)
+    at = entry[0].at
+    return [*before, Token("sign", "(", at), *entry, Token("sign", ")", at), *after]
+
+
+def _stripped(found: list[Token]) -> list[Token]:
+    """Take Matrix(...), np.array(...) and brackets around a matrix away, and transposes behind it."""
+    low, high = 0, len(found)
+    while low < high:
+        first, last = found[low], found[high - 1]
+        behind = [token.text for token in found[max(low, high - 4) : high]]
+        if last.text in ("'", ".'", ";", ",", "."):
+            high -= 1
+        elif behind[-2:] in ([".", "T"], ["^", "T"]):
+            high -= 2
+        elif behind in (["^", "(", "T", ")"], ["^", "(", "top", ")"]):
+            high -= 4
+        elif first.kind == "name" and first.text in MATRIX_WORDS and last.text == ")":
+            low, high = low + 2, high - 1
+        elif high - low > 2 and first.kind == "name" and found[low + 1].text == ".":
+            low += 2
+        elif first.text == "(" and last.text == ")":
+            low, high = low + 1, high - 1
+        else:
+            break
+    return found[low:high]
+
+
+def _rows(found: Sequence[Token], text: str) -> list[list[list[Token]]]:
+    """Split the inside of a matrix into rows of entries."""
+    inner = found[1:-1]
+    if inner and inner[0].text == "[":
+        return [_separated(_stripped(list(row))[1:-1], (",", "&"), text) for row in _separated(inner, (",", ";"), text)]
+    rows = _separated(inner, (";", "\\\\"), text)
+    spaced = not is_latex(text)
+    return [
+        _by_spaces(row, text) if spaced and not _has(row, ",&") else _separated(row, (",", "&"), text)
+        for row in rows
+        if row
+    ]
+
+
+def _has(row: Sequence[Token], signs: str) -> bool:
+    depth = 0
+    for token in row:
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(token.text, 0)
+        if depth == 0 and token.kind == "sign" and token.text in signs:
+            return True
+    return False
+
+
+def _separated(found: Sequence[Token], signs: Sequence[str], text: str) -> list[list[Token]]:
+    """Split at signs that stand in no brackets; a last empty piece is dropped."""
+    pieces: list[list[Token]] = [[]]
+    depth = 0
+    for token in found:
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(token.text, 0)
+        if depth < 0:
+            fail(text, token.at, f"{token.text!r} without an opening bracket")
+        if depth == 0 and token.kind == "sign" and token.text in signs:
+            pieces.append([])
+        else:
+            pieces[-1].append(token)
+    return pieces if pieces[-1] or len(pieces) == 1 else pieces[:-1]
+
+
+def _by_spaces(row: Sequence[Token], text: str) -> list[list[Token]]:
+    """Split a row of MATLAB's at spaces: [a -b] has two entries, [a - b] one."""
+    pieces: list[list[Token]] = [[]]
+    depth = 0
+    for before, token in zip([None, *row], row, strict=False):
+        spaced = text[token.at - 1 : token.at].isspace() and depth == 0
+        if before is not None and spaced:
+            ends = before.kind != "sign" or before.text in (")", "'")
+            unary = token.text in "+-" and not text[token.at + 1 : token.at + 2].isspace()
+            if ends and (unary or token.kind != "sign" or token.text == "("):
+                pieces.append([])
+        depth += {"(": 1, ")": -1}.get(token.text, 0)
+        pieces[-1].append(token)
+    return pieces
+
+
+def _written(entry: Sequence[Token], places: Sequence[int], text: str) -> str:
+    """Return an entry as it was typed: up to where the next token after it begins."""
+    if not entry:
+        return ""
+    behind = bisect_right(places, entry[-1].at)
+    return text[entry[0].at : places[behind] if behind < len(places) else len(text)].strip()
+
+
+# Functions that are written out in others
+
+
+def _known(tree: Tree) -> Tree:
+    """Return a tree without secants, degrees and the like."""
+    match tree:
+        case Number() | Name():
+            return tree
+        case Power(base, exponent, at):
+            return Power(_known(base), _known(exponent), at)
+        case Sum(terms):
+            return Sum(tuple((added, _known(term)) for added, term in terms))
+        case Product(factors):
+            return Product(tuple((multiplied, _known(factor)) for multiplied, factor in factors))
+        case Call(function, arguments, at):
+            return _call(function, tuple(_known(argument) for argument in arguments), at)
+
+
+def _call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
+    two = function in ("atan2", "pow", "Rational", "min", "max")
+    if len(arguments) != 1 + two:
+        if function == "Rational" and len(arguments) == 1:
+            return arguments[0]
+        raise AnswerError(f"{function} of {len(arguments)} arguments at position {at + 1}; expected {1 + two}")
+    first = arguments[0]
+    match function:
+        case "sec" | "csc" | "cot":
+            name = {"sec": "cos", "csc": "sin", "cot": "tan"}[function]
+            return Product(((True, _one(at)), (False, Call(name, (first,), at))))
+        case "sind" | "cosd" | "tand":
+            return Call(function[:3], (_radians(first, at),), at)
+        case "radians":
+            return _radians(first, at)
+        case "Rational":
+            return Product(((True, first), (False, arguments[1])))
+        case "number":
+            return first
+        case "pow":
+            return Power(first, arguments[1], at)
+        case "square":
+            return Power(first, Number(Fraction(2), "2", at), at)
+    return Call(function, arguments, at)
+
+
+def _radians(angle: Tree, at: int) -> Tree:
+    return Product(((True, angle), (True, Name("pi", at)), (False, Number(Fraction(180), "180", at))))
+
+
+def _one(at: int) -> Tree:
+    return Number(Fraction(1), "1", at)

@@ -1,0 +1,327 @@
+"""What names mean: the many ways in which students write joint variables, their rates, and sines of sums of angles."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TypeAlias
+
+from dhkit.description import Description
+from dhkit.errors import AnswerError
+from dhkit.expressions import CONSTANTS
+from dhkit.grading.answers.tokens import shown
+
+__all__ = ["FUNCTION_NAMES", "Meaning", "Vocabulary", "plain_name"]
+
+Meaning: TypeAlias = tuple[str, ...]
+"""Tokens that a name stands for, in the robot's own names."""
+
+FUNCTION_NAMES = {
+    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp")},
+    **{name: name for name in ("sec", "csc", "cot", "sind", "cosd", "tand", "pow", "min", "max")},
+    **{name: name.lower() for name in ("Sin", "Cos", "Tan", "SIN", "COS", "TAN", "Sqrt", "SQRT", "ABS")},
+    "c": "cos",
+    "s": "sin",
+    "arcsin": "asin",
+    "arccos": "acos",
+    "arctan": "atan",
+    "arctan2": "atan2",
+    "Abs": "abs",
+    "fabs": "abs",
+    "sgn": "sign",
+    "Rational": "Rational",
+    "Integer": "number",
+    "Float": "number",
+    "S": "number",
+    "sympify": "number",
+    "Min": "min",
+    "Max": "max",
+    "fmin": "min",
+    "fmax": "max",
+    "Pow": "pow",
+    "power": "pow",
+    "square": "square",
+    "deg2rad": "radians",
+    "radians": "radians",
+}
+"""What may be called, and what it is called here."""
+
+ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
+SLIDES = ("d", "r", "x", "s", "rho")
+"""Letters for the variable of a sliding joint, beside those of all joints."""
+LONGEST = 64
+"""Characters of a name that is looked into."""
+
+
+def plain_name(text: str) -> str:
+    r"""Return a name without the marks of typesetting: \theta_{1} and theta_1 are theta1."""
+    return re.sub(r"[\\_{}\s]", "", text)
+
+
+class Vocabulary:
+    """The names that an answer may use.
+
+    Parameters
+    ----------
+    description
+        The robot: its parameters go by their names in the file, its joint variables by q1, theta1, th_1 and so on.
+    q, qd, qdd
+        The student's own names of the joint variables; what is not named keeps the usual ones.
+    further
+        Names that the task has besides, such as px and r11.
+    sums
+        Of each joint the joints, from 0, whose variables the student's variable is the sum of: those of parallel axes
+        before it where angles are measured from a fixed direction; itself alone unless given.
+
+    Raises
+    ------
+    AnswerError
+        A name that is none, or one for two things.
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        *,
+        q: Sequence[str] = (),
+        qd: Sequence[str] = (),
+        qdd: Sequence[str] = (),
+        further: Iterable[str] = (),
+        sums: Sequence[Sequence[int]] = (),
+    ) -> None:
+        self.kinds = description.kinds
+        self.sums = tuple(tuple(joints) for joints in sums) or tuple((i,) for i in range(description.n))
+        self.symbols = tuple(description.parameters)
+        self.own: dict[str, Meaning] = {}
+        self.numbers = _numbering(q) or {str(i + 1): i + 1 for i in range(description.n)}
+        """What joint's numbers mean, from 1: those of the student's own names come first."""
+        for given, kind in ((q, "q"), (qd, "qd"), (qdd, "qdd")):
+            self._name_joints(given, kind)
+        self.further = tuple(further)
+        self.gravity = _gravity(description)
+        self._found: dict[str, Meaning | None] = {}
+        self.taken_for: dict[str, str] = {}
+        """What was not exactly a known name, and what it was taken for."""
+        self.refused: dict[str, str] = {}
+        """Names that could not be defined, and why."""
+
+    def _name_joints(self, given: Sequence[str], kind: str) -> None:
+        if given and len(given) != len(self.kinds):
+            raise AnswerError(f"names: {kind}: found {len(given)} names; expected {len(self.kinds)}, one a joint")
+        for i, name in enumerate(given, start=1):
+            own = plain_name(name)
+            if not re.fullmatch(r"[A-Za-z]\w*", own, re.ASCII):
+                raise AnswerError(f"names: {kind}: found {shown(name)}; expected a name such as th1")
+            self._add(own, self._sum(kind, i))
+            if kind == "q":
+                for dots, rate in ((1, "qd"), (2, "qdd")):
+                    for written in _dotted(own, dots):
+                        self.own.setdefault(written, self._sum(rate, i))
+
+    def _sum(self, kind: str, i: int) -> Meaning:
+        """Return joint i's variable (from 1), as the sum that it is."""
+        return _added([(f"{kind}{joint + 1}",) for joint in self.sums[i - 1]])
+
+    def _add(self, name: str, meaning: Meaning) -> None:
+        if self.own.get(name, meaning) != meaning:
+            raise AnswerError(f"names: {shown(name)} stands for two things")
+        self.own[name] = meaning
+
+    def define(self, name: str, meaning: Meaning) -> None:
+        """Give a name a meaning.
+
+        Raises
+        ------
+        AnswerError
+            It has another one already.
+        """
+        self._add(plain_name(name), meaning)
+        self._found.clear()
+
+    def redefine(self, name: str, meaning: Meaning) -> None:
+        """Give a name a meaning in place of any other."""
+        self.own[plain_name(name)] = meaning
+        self._found.clear()
+
+    def refuse(self, name: str, why: str) -> None:
+        """Take a name's meaning away."""
+        self.refused[plain_name(name)] = why
+        self._found.clear()
+
+    def is_state(self, name: str) -> bool:
+        """Whether a name is a joint's variable, rate or acceleration."""
+        return self._is_one_of(name, ("q", "qd", "qdd"))
+
+    def knows(self, name: str) -> bool:
+        """Whether a name, as typed, has a meaning."""
+        return self.find(name) is not None
+
+    def is_position(self, name: str) -> bool:
+        """Whether a name is a joint's variable."""
+        return self._is_one_of(name, ("q",))
+
+    def _is_one_of(self, name: str, kinds: Sequence[str]) -> bool:
+        meaning = self.find(name) if name else None
+        return meaning is not None and meaning in (
+            self._sum(kind, i + 1) for kind in kinds for i in range(len(self.kinds))
+        )
+
+    def find(self, name: str) -> Meaning | None:
+        """Return what a name stands for, nothing if it is unknown: the student's own names first, then the file's."""
+        if name not in self._found:
+            self._found[name] = self._find(name)
+        return self._found[name]
+
+    def _find(self, name: str) -> Meaning | None:
+        plain = plain_name(name)
+        if plain in self.refused:
+            return None
+        for text in (name, plain):
+            if text in self.own:
+                return self.own[text]
+            if text in self._exact:
+                return self._exact[text]
+        if plain in CONSTANTS:
+            return (plain,)
+        found = self._joint(plain) or self._turn(plain) or (self.gravity if plain == "g" else None)
+        if found is None and len(self._loose.get(plain.lower(), ())) == 1:
+            (symbol,) = self._loose[plain.lower()]
+            self.taken_for[name] = symbol
+            return (symbol,)
+        return found
+
+    @cached_property
+    def _exact(self) -> dict[str, Meaning]:
+        names = [*self.further, *self.symbols]
+        meanings: dict[str, Meaning] = {plain_name(name): (name,) for name in names}
+        return meanings | {name: (name,) for name in names}
+
+    @cached_property
+    def _loose(self) -> dict[str, set[str]]:
+        """Parameters by their names in small letters."""
+        loose: dict[str, set[str]] = {}
+        for name in self.symbols:
+            loose.setdefault(plain_name(name).lower(), set()).add(name)
+        return loose
+
+    def _joint(self, name: str) -> Meaning | None:
+        """Return a joint's variable, rate or acceleration, in any of the usual spellings."""
+        match = _VARIABLE.fullmatch(name)
+        if match is None:
+            alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
+            return self._joint(name + "1") if alone else None
+        before, letter, between, number, behind = match.groups()
+        joints = self._numbered(number)
+        if not joints:
+            return None
+        marks = [mark for mark in (before, between, behind) if mark]
+        if len(marks) > 1 or (letter in SLIDES and letter not in ANGLES and self.kinds[joints[0] - 1] == "R"):
+            return None
+        dots = _DOTS[marks[0]] if marks else 0
+        kind = ("q", "qd", "qdd")[dots]
+        return _added([self._sum(kind, joint) for joint in joints])
+
+    def _numbered(self, number: str) -> list[int]:
+        """Return which joint a number means, or several in a row: theta12 is theta1 + theta2."""
+        if number in self.numbers:
+            return [self.numbers[number]]
+        if len(number) > 3 or not all(digit in self.numbers for digit in number):
+            return []
+        digits = [self.numbers[digit] for digit in number]
+        in_a_row = all(b == a + 1 for a, b in pairwise(digits))
+        return digits if in_a_row and all(self.kinds[k - 1] == "R" for k in digits) else []
+
+    def _turn(self, name: str) -> Meaning | None:
+        """Return the sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
+        match = _TURN.fullmatch(name)
+        if match is None:
+            return None
+        numbers = re.findall(r"[pm]?\d", match[2])
+        joints = [self.numbers.get(x[-1], 0) for x in numbers]
+        if not all(joint and self.kinds[joint - 1] == "R" for joint in joints):
+            return None
+        angle: list[str] = []
+        for x, joint in zip(numbers, joints, strict=True):
+            angle += ["-" if x[0] == "m" else "+", *self._sum("q", joint)]
+        return ("cos" if match[1][0] in "cC" else "sin", "(", *angle[1:], ")")
+
+    def split(self, name: str) -> list[str] | None:
+        """Return the known names that an unknown one is a product of, where there is one way: m2l1 is m2 l1."""
+        if len(name) > LONGEST:
+            return None
+        fewest: dict[int, list[list[str]]] = {len(name): [[]]}
+        for start in reversed(range(len(name))):
+            ways = [
+                [name[start:end], *rest]
+                for end in range(start + 1, len(name) + 1)
+                if end in fewest and self._is_factor(name[start:end])
+                for rest in fewest[end]
+            ]
+            if ways:
+                shortest = min(map(len, ways))
+                fewest[start] = [way for way in ways if len(way) == shortest][:4]
+        found = fewest.get(0, [])
+        is_product = len(found) == 1 and any(len(piece) > 1 for piece in found[0])
+        return found[0] if is_product else None
+
+    def _is_factor(self, piece: str) -> bool:
+        return piece[0].isalpha() and (
+            piece in self.own or piece in self._exact or bool(self._joint(piece) or self._turn(piece))
+        )
+
+    def nearest(self, name: str) -> str:
+        """Return a hint: why a name could not be defined, or the known name that is nearest."""
+        if plain_name(name) in self.refused:
+            return f"its own assignment is not read: {self.refused[plain_name(name)][:200]}"
+        known = [*self.own, *self.further, *self.symbols, *FUNCTION_NAMES]
+        known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
+        known = [other for other in known if len(other) <= LONGEST]
+        close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+        listed = [*(other for other in self.own if len(other) <= LONGEST), *self.symbols, "q1", "qd1", "c1", "s1"]
+        return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
+
+
+_DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
+_BEFORE = "dot|ddot|d|dd|d2|D|DD"
+_LETTERS = "|".join(sorted((*ANGLES, *SLIDES), key=len, reverse=True))
+_VARIABLE = re.compile(rf"({_BEFORE})??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?", re.ASCII)
+_TURN = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
+
+
+def _added(terms: Sequence[Meaning]) -> Meaning:
+    """Return a sum in brackets; one term as it is."""
+    if len(terms) == 1:
+        return terms[0]
+    tokens = [token for term in terms for token in ("+", *term)]
+    return ("(", *tokens[1:], ")")
+
+
+def _numbering(q: Sequence[str]) -> dict[str, int]:
+    """Return which joint a number means where all of a student's names end in one: q0 is the first."""
+    ends = [re.fullmatch(r".*?(\d+)", plain_name(name)) for name in q]
+    numbers = {match[1]: i for i, match in enumerate(ends, start=1) if match}
+    return numbers if len(numbers) == len(q) else {}
+
+
+def _dotted(name: str, dots: int) -> list[str]:
+    """Return the usual spellings of the derivative of a student's own name: xdot, dx, xd, x1dot and xdot1."""
+    letters, number = re.fullmatch(r"(.*?)(\d*)", name).groups()  # type: ignore[union-attr]
+    marks = ("dot", "d", "p") if dots == 1 else ("ddot", "dd", "pp")
+    before = ("d", "dot", "D") if dots == 1 else ("dd", "d2", "ddot", "DD")
+    return [
+        *(f"{name}{mark}" for mark in marks),
+        *(f"{letters}{mark}{number}" for mark in marks),
+        *(f"{mark}{name}" for mark in before),
+    ]
+
+
+def _gravity(description: Description) -> Meaning | None:
+    """Return the size of gravity where the file gives it as a number along one axis."""
+    along = [x.rational for x in description.gravity if x.rational != 0]
+    if len(along) != 1 or along[0] is None:
+        return None
+    size = abs(along[0])
+    return ("(", str(size.numerator), "/", str(size.denominator), ")")

@@ -1,0 +1,144 @@
+"""A robot's equations of motion worked out step by step, as a student should have done."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.grading.reports.mathml import mathml
+from dhkit.grading.reports.style import STYLE
+from dhkit.symbolic import Lagrangian, lagrangian
+from dhkit.symbolic.equations import latex_text, plain_text
+from dhkit.symbolic.exact.compact import shortened
+from dhkit.symbolic.ring import Element, Elements, element_array
+from dhkit.symbolic.textbook import LinkMotion, TextbookDerivation, derive
+from dhkit.symbolic.textbook_kinematics import derive_kinematics
+
+__all__ = ["Step", "explanation_html", "explanation_text", "worked_solution"]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step of a derivation.
+
+    Attributes
+    ----------
+    title
+        What is found.
+    words
+        How.
+    results
+        Names, the same in LaTeX, and elements in the angles that make them shortest; zeros are left out.
+    """
+
+    title: str
+    words: str
+    results: tuple[tuple[str, str, Element], ...]
+
+
+def worked_solution(description: Description) -> list[Step]:
+    """Return the steps from the table to the joint torques.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body.
+    """
+    return list(_Solution(description).steps())
+
+
+def explanation_text(description: Description) -> str:
+    """Return the worked solution as text."""
+    lines = [f"{description.name}: the equations of motion, step by step", ""]
+    for number, step in enumerate(worked_solution(description), start=1):
+        lines += [f"{number}. {step.title}", f"   {step.words}", ""]
+        lines += [f"   {name} = {plain_text(element)}" for name, _, element in step.results] or ["   all zero"]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def explanation_html(description: Description) -> str:
+    """Return the worked solution as a page that stands alone."""
+    body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
+    for number, step in enumerate(worked_solution(description), start=1):
+        body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.words)}</p>"]
+        for name, head, element in step.results:
+            text = f"{name} = {plain_text(element)}"
+            body.append(f"<p>{mathml(f'{head} = {latex_text(element)}') or html.escape(text)}</p>")
+    title = f"{html.escape(description.name)}: worked solution"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{STYLE}</style></head>\n'
+        f"<body>{''.join(body)}</body></html>\n"
+    )
+
+
+class _Solution:
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        self.textbook: TextbookDerivation = derive(description)
+        self.lag: Lagrangian = lagrangian(description)
+
+    def steps(self) -> Iterator[Step]:
+        n, lag = self.description.n, self.lag
+        kind = "R_z(theta) T_z(d) T_x(a) R_x(alpha)"
+        if not lag.arm.is_standard:
+            kind = "R_x(alpha) T_x(a) R_z(theta) T_z(d), with the alpha and a of the row"
+        kinematics = derive_kinematics(self.description)
+        yield self._step(
+            "Link transforms",
+            f"A_i = {kind}, a row of the table each.",
+            [(f"A{i + 1}", A) for i, A in enumerate(kinematics.A)],
+        )
+        for i, link in enumerate(self.textbook.links, start=1):
+            yield from self._link(i, link)
+        yield self._step(
+            "Energies of the arm",
+            "Sums over the links, and over the drives' rotors: G^2 J qd^2/2 each.",
+            [("K", element_array(self.textbook.K)), ("V", element_array(self.textbook.V))],
+        )
+        yield self._step("Mass matrix", "M_ij is the second derivative of K by qd_i and qd_j.", [("M", lag.M)])
+        yield self._step(
+            "Coriolis matrix",
+            "Christoffel symbols c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2, and C_ij = sum of c_ijk qd_k.",
+            [("C", lag.C)],
+        )
+        yield self._step("Coriolis and centrifugal torques", "h = C qd.", [("h", lag.h)])
+        yield self._step("Gravity torques", "g_i = dV/dq_i.", [("g", lag.g)])
+        if n <= 3:
+            yield self._step("Joint torques", "tau = M qdd + h + g.", [("tau", lag.tau)])
+
+    def _link(self, i: int, link: LinkMotion) -> Iterator[Step]:
+        yield self._step(
+            f"Link {i}: where its centre of mass is",
+            f"In frame 0: p_{i} = o_{i} + R_{i} c_{i}.",
+            [(f"p{i}", link.com)],
+        )
+        yield self._step(
+            f"Link {i}: its velocities",
+            "The time derivative of p, and the sum of the turning joints' axes times their rates, both resolved in the "
+            "link's own axes.",
+            [(f"v{i}", link.velocity), (f"w{i}", link.omega)],
+        )
+        yield self._step(
+            f"Link {i}: its energies",
+            "K = m v.v/2 + w.I w/2, V = -m g.p, with I about the centre of mass.",
+            [(f"K{i}", element_array(link.K)), (f"V{i}", element_array(link.V))],
+        )
+
+    def _step(self, title: str, words: str, quantities: Sequence[tuple[str, Elements]]) -> Step:
+        results = []
+        for name, array in quantities:
+            for place, element in np.ndenumerate(shortened(self.lag.arm, element_array(array))):
+                if element:
+                    index = "".join(str(k + 1) for k in place)
+                    letter = {"w": r"\omega", "tau": r"\tau"}.get(name.rstrip("0123456789"), name.rstrip("0123456789"))
+                    number = name[len(name.rstrip("0123456789")) :]
+                    below = ",".join(x for x in (number, index) if x)
+                    head = f"{letter}_{{{below}}}" if below else letter
+                    results.append((f"{name}[{','.join(str(k + 1) for k in place)}]" if place else name, head, element))
+        return Step(title, words, tuple(results))

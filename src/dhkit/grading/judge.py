@@ -1,0 +1,258 @@
+"""From an answer sheet to a report: everything on it judged, explained and noted."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import time
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Description, to_toml
+from dhkit.errors import AnswerError, DescriptionError, DhkitError
+from dhkit.grading.answers.given import Given, given_branches, given_quantity, given_rows, vocabulary_of
+from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names
+from dhkit.grading.answers.vocabulary import Vocabulary
+from dhkit.grading.judging.consistency import Consistency
+from dhkit.grading.judging.findings import Finding, readable
+from dhkit.grading.judging.functions import judge_function
+from dhkit.grading.judging.kinematic_entries import KinematicEntries, inverse_entries, table_entries
+from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
+from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
+from dhkit.grading.judging.truth import Truth, shape_of, truth_of
+from dhkit.grading.mistakes.explaining import explain
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
+from dhkit.symbolic import ExactArm
+from dhkit.symbolic.equations import latex_text
+from dhkit.symbolic.ring import RingError
+
+__all__ = ["LONGEST_LATEX", "judge", "robot_digest"]
+
+LONGEST_LATEX = 200
+"""Terms of an answer that is typeset in reports."""
+
+
+def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> GradeReport:
+    """Judge everything on a sheet.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    sheet
+        What was handed in.
+    digits
+        Significant digits from which a decimal may have been rounded.
+
+    Raises
+    ------
+    AnswerError
+        Answers of another shape, unknown quantities, names that stand for two things.
+    DescriptionError
+        The robot has no bodies, and equations of motion were handed in.
+    """
+    start = time.perf_counter()
+    truth = truth_of(description, sheet.names.absolute, sheet.task.friction)
+    vocabulary = vocabulary_of(description, sheet.names, truth.coordinates.sums)
+    judged, refused = _judged(description, sheet, vocabulary, truth, digits)
+    others, refused_others = _kinematic(description, sheet, vocabulary)
+    refused |= refused_others
+    if refused and not judged and not others:
+        raise next(iter(refused.values()))
+    if not judged and not others:
+        raise AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity")
+    parts = Consistency(truth, judged)
+    follows, agreement, diagnosis, too_long = _explained(truth, parts, digits)
+    entries = [
+        entry
+        for name, quantity in judged.items()
+        for entry in _entries(truth.arm(name), quantity, follows.get(name, {}))
+    ]
+    notes = [*_notes(truth, judged, vocabulary), *agreement, *too_long]
+    entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
+    for other in others:
+        entries += other.entries
+        diagnosis += other.diagnosis
+        notes += other.notes
+    return GradeReport(
+        description.name,
+        robot_digest(description),
+        _version(),
+        tuple(entries),
+        tuple(diagnosis),
+        tuple(notes),
+        sheet.file,
+        sheet.student,
+        "",
+        time.perf_counter() - start,
+    )
+
+
+def _explained(
+    truth: Truth, parts: Consistency, digits: int
+) -> tuple[dict[str, dict[tuple[int, ...], str]], list[str], list[Diagnosis], list[str]]:
+    """Return what wrong entries follow from, which parts agree, what went wrong, and a note where that is too long."""
+    try:
+        follows = {name: parts.follows(name) for name in parts.judged}
+        return follows, parts.notes(), explain(truth, parts.judged, digits), []
+    except RingError as error:
+        return {}, [], [], [f"not explained, since an answer is too long: {error}"[:200]]
+
+
+def robot_digest(description: Description) -> str:
+    """Return what two descriptions of one robot have in common, in twelve characters."""
+    return hashlib.sha256(to_toml(description).encode()).hexdigest()[:12]
+
+
+def _version() -> str:
+    try:
+        return version("dhkit")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _judged(
+    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, truth: Truth, digits: int
+) -> tuple[dict[str, JudgedQuantity], dict[str, DhkitError]]:
+    """Judge a sheet's quantities; return them, and why others could not be: one does not stop the rest."""
+    judged: dict[str, JudgedQuantity] = {}
+    refused: dict[str, DhkitError] = {}
+    for name, value in sheet.answers.items():
+        if _is_empty(value):
+            continue
+        try:
+            judged[name] = _judge_one(name, value, description, sheet, vocabulary, truth, digits)
+        except AnswerError as error:
+            refused[name] = AnswerError(f"{sheet.file}: answer: {error}")
+        except DescriptionError as error:
+            refused[name] = error
+    return judged, refused
+
+
+def _judge_one(
+    name: str,
+    value: Any,
+    description: Description,
+    sheet: AnswerSheet,
+    vocabulary: Vocabulary,
+    truth: Truth,
+    digits: int,
+) -> JudgedQuantity:
+    known = quantity_names(description.n)
+    if name not in known:
+        meant = ALIASES.get(name) or next(iter(difflib.get_close_matches(name, known, n=1)), "")
+        hint = f"did you mean {meant!r}?" if meant else f"expected {', '.join(known)}, dh, ik"
+        raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
+    if callable(value):
+        return judge_function(name, value, truth)
+    given = given_quantity(name, value, shape_of(name, description.n), vocabulary)
+    return judge_quantity(name, given, truth, sheet.task, digits)
+
+
+def _kinematic(
+    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary
+) -> tuple[list[KinematicEntries], dict[str, DhkitError]]:
+    """Judge a sheet's table and formulas of inverse kinematics, as :func:`_judged` does its quantities."""
+    n = description.n
+
+    def table() -> KinematicEntries:
+        convention, rows = sheet.table or ("", ())
+        return table_entries(description, given_rows(rows, n, vocabulary), convention)
+
+    def inverse() -> KinematicEntries:
+        own = vocabulary_of(description, sheet.names, inverse=True)
+        return inverse_entries(description, given_branches(sheet.branches, n, own))
+
+    found, refused = [], dict[str, DhkitError]()
+    for name, judge_it, is_there in (("dh", table, sheet.table), ("ik", inverse, sheet.branches)):
+        try:
+            found += [judge_it()] if is_there else []
+        except AnswerError as error:
+            refused[name] = AnswerError(f"{sheet.file}: answer: {error}")
+    return found, refused
+
+
+def _is_empty(value: Any) -> bool:
+    """Whether nothing was handed in: a template's entries that stayed empty."""
+    return all(map(_is_empty, value)) if isinstance(value, list) else value == "" if isinstance(value, str) else False
+
+
+def _entries(arm: ExactArm, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> list[Entry]:
+    return [_entry(arm, quantity.name, given, quantity.findings[given.index], follows) for given in quantity.given]
+
+
+def _entry(arm: ExactArm, name: str, given: Given, finding: Finding, follows: Mapping[tuple[int, ...], str]) -> Entry:
+    latex = ""
+    if finding.answer is not None and name != "C":
+        element = finding.answer.element()
+        short = element is not None and len(element) <= LONGEST_LATEX
+        latex = latex_text(readable(arm, element)) if element is not None and short else ""
+    source = follows.get(given.index, "")
+    return Entry(
+        name,
+        given.index,
+        finding.verdict,
+        given.text,
+        latex,
+        finding.statement,
+        finding.texts[0],
+        finding.texts[1],
+        finding.witness,
+        source,
+    )
+
+
+def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary) -> list[str]:
+    """Return what a reader should know beside verdicts."""
+    notes = []
+    for name, quantity in judged.items():
+        if quantity.numbers:
+            values = truth.arm(name).parameters
+            listed = ", ".join(f"{p} = {values[p]:g}" for p in sorted(quantity.numbers))
+            notes.append(f"{name}: judged at the file's numbers: {listed}")
+    if "C" in judged:
+        notes += _about_C(truth, judged["C"])
+    notes += [f"{typed!r} was read as {meant}" for typed, meant in vocabulary.taken_for.items()]
+    notes += [
+        f"V and L count from any zero: {name} is right up to a constant"
+        for name in ("V", "L")
+        if _is_shifted(judged.get(name))
+    ]
+    return notes
+
+
+def _is_shifted(quantity: JudgedQuantity | None) -> bool:
+    if quantity is None or quantity.wrong:
+        return False
+    answers = quantity.answers
+    return answers is not None and not answers[()].less(quantity.right(())).is_zero
+
+
+def _about_C(truth: Truth, judged: JudgedQuantity) -> list[str]:
+    """Say which factorization a right C is: C is judged by C qd, which alone is determined."""
+    if judged.wrong or any(entry.tree is None for entry in judged.given):
+        return []
+    lag, coordinates = truth.lagrangian, truth.coordinates
+    C = np.empty((lag.n, lag.n), dtype=object)
+    reading = Reading(lag.arm.ring)
+    try:
+        for entry in judged.given:
+            element = reading.read(entry.tree).element() if entry.tree else None
+            if element is None:
+                return ["C: judged by C qd"]
+            C[entry.index] = element
+    except (OutsideTheRingError, AnswerError):
+        return ["C: judged by C qd"]
+    M, right = truth.of("M"), coordinates.in_y("C", lag.C)
+    if all(element.is_zero for element in (C - right).flat):
+        return ["C: judged by C qd; it is the one of the Christoffel symbols, so dM/dt - 2 C is skew-symmetric"]
+    rate = np.array([[entry.by_time() for entry in row] for row in M], dtype=object)
+    N = rate - 2 * C
+    skew = all(element.is_zero for element in (N + N.T).flat)
+    return [
+        "C: judged by C qd; it is another valid factorization than that of the Christoffel symbols, and dM/dt - 2 C is "
+        + ("skew-symmetric" if skew else "not skew-symmetric, which some controllers need")
+    ]

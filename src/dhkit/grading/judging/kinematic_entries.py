@@ -1,0 +1,125 @@
+"""Tables and inverse kinematics of a sheet as entries, diagnoses and notes of its report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dhkit.description import Description
+from dhkit.grading.answers.given import Given
+from dhkit.grading.capitals import capitalised
+from dhkit.grading.judging.inverse import BranchJudgement, judge_inverse
+from dhkit.grading.judging.tables import TableJudgement, judge_table
+from dhkit.grading.report import Diagnosis, Entry, Verdict, Witness
+
+__all__ = ["KinematicEntries", "inverse_entries", "table_entries"]
+
+TABLE_HINT = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
+INVERSE_HINT = "Look again at this branch: in which quadrant is the angle, and where is it counted from?"
+OTHER_FRAMES = "other_frames"
+
+
+@dataclass(frozen=True)
+class KinematicEntries:
+    """What a table or formulas add to a report."""
+
+    entries: tuple[Entry, ...]
+    diagnosis: tuple[Diagnosis, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def table_entries(description: Description, rows: Sequence[Sequence[Given]], convention: str) -> KinematicEntries:
+    """Judge a table, a row an entry.
+
+    Raises
+    ------
+    AnswerError
+        An entry with a name or a function that tables do not have.
+    """
+    unreadable = _unreadable("dh", rows)
+    if unreadable:
+        return unreadable
+    trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
+    judgement = judge_table(description, trees, convention)
+    # One slip is more likely than a choice of frames that differs in one entry alone.
+    slipped = bool(judgement.other_frames) and any(found.mistake for found in judgement.explanations)
+    entries = []
+    for i, (verdict, statement) in enumerate(zip(judgement.rows, judgement.statements, strict=True)):
+        if slipped and verdict is Verdict.UNDECIDED:
+            verdict, statement = Verdict.WRONG, f"A{i + 1} differs"
+        entries.append(Entry("dh", (i,), verdict, _row_text(rows[i]), statement=statement))
+    notes = judgement.notes
+    if slipped:
+        notes += ("dh: it would be right for the same arm in other frames than the file's",)
+    return KinematicEntries(tuple(entries), _table_diagnosis(judgement, entries, slipped), notes)
+
+
+def _table_diagnosis(judgement: TableJudgement, entries: Sequence[Entry], slipped: bool) -> tuple[Diagnosis, ...]:
+    open_rows = tuple(entry.name for entry in entries if entry.verdict is not Verdict.CORRECT)
+    found = []
+    for explanation in judgement.explanations:
+        rows = open_rows if explanation.row is None else (f"dh{explanation.row + 1}",)
+        where = "dh" if explanation.row is None else f"dh, row {explanation.row + 1}"
+        found.append(Diagnosis(explanation.mistake, _sentence(explanation.sentence), where, rows, TABLE_HINT))
+    if judgement.other_frames and not slipped:
+        said = "; ".join(judgement.other_frames)
+        sentence = f"The table describes the same arm, in other frames: {said}."
+        found.append(Diagnosis(OTHER_FRAMES, sentence, "dh", open_rows, TABLE_HINT))
+    return tuple(found)
+
+
+def inverse_entries(description: Description, branches: Sequence[Sequence[Given]]) -> KinematicEntries:
+    """Judge formulas of inverse kinematics, a branch an entry.
+
+    Raises
+    ------
+    AnswerError
+        A formula with a name that is not known yet.
+    """
+    unreadable = _unreadable("ik", branches)
+    if unreadable:
+        return unreadable
+    judgement = judge_inverse(description, [[e.tree for e in branch if e.tree is not None] for branch in branches])
+    entries, diagnosis = [], []
+    for k, (branch, given) in enumerate(zip(judgement.branches, branches, strict=True)):
+        entry = Entry(
+            "ik", (k,), branch.verdict, _row_text(given), statement=_statement(branch), witness=_witness(branch)
+        )
+        entries.append(entry)
+        for explanation in branch.explanations:
+            where = f"ik, branch {k + 1}" + ("" if explanation.joint is None else f", q{explanation.joint + 1}")
+            sentence = _sentence(explanation.sentence)
+            diagnosis.append(Diagnosis(explanation.mistake, sentence, where, (entry.name,), INVERSE_HINT))
+    return KinematicEntries(tuple(entries), tuple(diagnosis), tuple(f"ik: {note}" for note in judgement.notes))
+
+
+def _statement(branch: BranchJudgement) -> str:
+    said = branch.statement
+    return f"{said} to 1e-9; tried, not proved" if branch.verdict is Verdict.CORRECT else said
+
+
+def _witness(branch: BranchJudgement) -> Witness | None:
+    """Return a pose that is not reached, with the first joint value that is wrong."""
+    if branch.witness is None:
+        return None
+    joint = branch.joint or 0
+    return Witness(branch.witness.pose, branch.witness.answer[joint], branch.witness.truth[joint])
+
+
+def _row_text(row: Sequence[Given]) -> str:
+    return ", ".join(entry.text for entry in row)
+
+
+def _sentence(text: str) -> str:
+    return capitalised(f"{text.rstrip('.')}.")
+
+
+def _unreadable(name: str, rows: Sequence[Sequence[Given]]) -> KinematicEntries | None:
+    """Return entries of which some cannot be read, so that none is judged; nothing where all can."""
+    if all(entry.tree is not None for row in rows for entry in row):
+        return None
+    entries = []
+    for i, row in enumerate(rows):
+        error = next((entry.error for entry in row if entry.error), "another row cannot be read")
+        entries.append(Entry(name, (i,), Verdict.UNREADABLE, _row_text(row), statement=error))
+    return KinematicEntries(tuple(entries))

@@ -1,0 +1,229 @@
+"""Quantities held against the truth entry by entry: M, C, h, g, tau, K, V, L and the table's transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dhkit.errors import AnswerError
+from dhkit.expressions.syntax import Name, Product, Sum, Tree
+from dhkit.grading.answers.given import LEFT_EMPTY, Given
+from dhkit.grading.answers.sheet import Task
+from dhkit.grading.judging.coordinates import Coordinates
+from dhkit.grading.judging.findings import EXACT, Comparison, Finding, Residuals, compare, names_in
+from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
+from dhkit.grading.judging.quotients import Quotient, Reading
+from dhkit.grading.judging.truth import Truth, exact_number, substituted
+from dhkit.grading.report import Verdict
+from dhkit.symbolic import ExactArm
+from dhkit.symbolic.ring import Element, Elements
+
+__all__ = ["JudgedQuantity", "judge_quantity", "parameters_in"]
+
+Index = tuple[int, ...]
+NEAR = 5e-3
+"""Relative: decimals of four digits are off by less."""
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedQuantity:
+    """What is found of a quantity.
+
+    Attributes
+    ----------
+    name
+        Which.
+    given
+        What was handed in.
+    findings
+        By index; of C those of the rows' products with the rates.
+    truth
+        What is right, with numbers where the answer has them.
+    numbers
+        Parameters that the answer has as numbers.
+    """
+
+    name: str
+    given: tuple[Given, ...]
+    findings: Mapping[Index, Finding]
+    truth: Elements
+    numbers: frozenset[str] = frozenset()
+
+    @property
+    def wrong(self) -> int:
+        """How many entries are wrong."""
+        return sum(finding.verdict is Verdict.WRONG for finding in self.findings.values())
+
+    def right(self, index: Index) -> Element:
+        """Return what an entry should be; of C the row's torque."""
+        return self.truth[index[:1] if self.name == "C" else index]  # type: ignore[no-any-return]
+
+    @property
+    def answers(self) -> Mapping[Index, Quotient] | None:
+        """The answer in the ring; None where an entry is not in it."""
+        found = {index: finding.answer for index, finding in self.findings.items()}
+        return None if any(answer is None for answer in found.values()) else found  # type: ignore[return-value]
+
+    @property
+    def differences(self) -> Mapping[Index, Element] | None:
+        """Answer less truth where every entry is an element of the ring, zero where it is right."""
+        found: dict[Index, Element] = {}
+        for index, finding in self.findings.items():
+            zero = self.right(index).ring.zero
+            element = zero if finding.verdict.passes else finding.difference
+            if element is None:
+                return None
+            found[index] = element
+        return found
+
+
+def judge_quantity(name: str, given: tuple[Given, ...], truth: Truth, task: Task, digits: int = 4) -> JudgedQuantity:
+    """Judge a quantity, with its parameters as symbols or, where it has none of one, with the file's number.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body, and the quantity needs it.
+    """
+    arm = truth.arm(name)
+    right = truth.of("h" if name == "C" else name)
+    by = Comparison(arm, Reading(arm.ring, others=truth.others(name)), digits, residuals=_residuals(name, task))
+    judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth.coordinates), right)
+    missing = _missing(truth, right, given)
+    all_numbers = bool(missing) and missing == parameters_in(right, truth)
+    likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
+    if judged.wrong and (all_numbers or likely or (missing and name == "C")):
+        in_numbers = _at_numbers(truth, name, right, missing)
+        findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth.coordinates)
+        other = JudgedQuantity(name, given, findings, in_numbers, missing)
+        judged = other if all_numbers or other.wrong < judged.wrong else judged
+    return judged if name == "C" or not judged.wrong else _with_mixed_numbers(judged, missing, truth, by)
+
+
+def _is_near(judged: JudgedQuantity, entry: Given, arm: ExactArm) -> bool:
+    """Whether a wrong entry is nearly right with the file's numbers, in one state."""
+    if entry.tree is None or judged.findings[entry.index].verdict is not Verdict.WRONG or judged.name == "C":
+        return False
+    state = general_state(arm.n)
+    answer = float(doubles(entry.tree, {**arm.parameters, **state}))
+    right = float(arm.evaluate(judged.right(entry.index), *state_arrays(state, arm.n)))
+    return judged.name in ("V", "L") or bool(abs(answer - right) <= NEAR * max(abs(right), 1e-9))
+
+
+def _at_numbers(truth: Truth, name: str, right: Elements, numbers: frozenset[str]) -> Elements:
+    ring = truth.arm(name).ring
+    values = {p: ring.number(exact_number(truth.description, p)) for p in numbers}
+    return substituted(right, values, ring)
+
+
+def _with_mixed_numbers(judged: JudgedQuantity, tried: frozenset[str], truth: Truth, by: Comparison) -> JudgedQuantity:
+    """Judge wrong entries with numbers that stand where other entries have symbols.
+
+    A number that is 1 is never seen in a product: a parameter worth 1 that is missing is then missing.
+    """
+    findings, mixed = dict(judged.findings), set(judged.numbers)
+    for entry in judged.given:
+        if not _is_near(judged, entry, by.arm):
+            continue
+        right = np.array([judged.right(entry.index)], dtype=object)
+        numbers = frozenset(p for p in _missing(truth, right, [entry]) if exact_number(truth.description, p) != 1)
+        if not numbers or numbers == tried:
+            continue
+        finding = _finding(entry.tree, entry.error, _at_numbers(truth, judged.name, right, numbers)[0], by)
+        if finding.verdict in (Verdict.CORRECT, Verdict.ROUNDED):
+            findings[entry.index] = finding
+            mixed |= numbers
+    return replace(judged, findings=findings, numbers=frozenset(mixed)) if mixed != judged.numbers else judged
+
+
+def _missing(truth: Truth, right: Elements, given: Sequence[Given]) -> frozenset[str]:
+    """Return the parameters that the truth has, and no entry of the answer."""
+    used = [names_of(entry.tree) for entry in given if entry.tree is not None]
+    return parameters_in(right, truth).difference(*used)
+
+
+def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:
+    """Return the file's parameters that elements have."""
+    return frozenset().union(*map(names_in, array.flat)) & frozenset(truth.description.parameters)
+
+
+def _findings(
+    name: str, given: Sequence[Given], right: Elements, by: Comparison, coordinates: Coordinates
+) -> dict[Index, Finding]:
+    if name == "C":
+        return _row_findings(given, right, by, coordinates)
+    return {entry.index: _finding(entry.tree, entry.error, right[entry.index], by) for entry in given}
+
+
+def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> Finding:
+    if tree is None:
+        return Finding(Verdict.WRONG if error == LEFT_EMPTY else Verdict.UNREADABLE, error)
+    try:
+        return compare(tree, right, by)
+    except AnswerError as refusal:
+        return Finding(Verdict.UNREADABLE, str(refusal))
+
+
+def _row_findings(
+    given: Sequence[Given], right: Elements, by: Comparison, coordinates: Coordinates
+) -> dict[Index, Finding]:
+    """Judge C by C qd: each row's entries share what is found of their sum with the rates."""
+    found: dict[Index, Finding] = {}
+    for i in range(len(right)):
+        row = [entry for entry in given if entry.index[0] == i]
+        error = next((entry.error for entry in row if entry.tree is None), "")
+        terms = tuple((True, Product(((True, e.tree), (True, _rate(coordinates, e.index[1]))))) for e in row if e.tree)
+        finding = _finding(None if error else Sum(terms), error, right[i], by)
+        if finding.verdict is Verdict.WRONG:
+            finding = replace(
+                finding, statement=f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
+            )
+        found |= {entry.index: finding for entry in row}
+    return found
+
+
+def _rate(coordinates: Coordinates, j: int) -> Tree:
+    """Return the rate of variable j as a tree."""
+    names = tuple((True, Name(f"qd{joint + 1}", 0)) for joint in coordinates.sums[j])
+    return names[0][1] if len(names) == 1 else Sum(names)
+
+
+# What must vanish
+
+
+def _residuals(name: str, task: Task) -> Residuals:
+    """Return what must be zero: energies count from any zero, L perhaps up to a total derivative."""
+    if name == "V":
+        return _slopes
+    if name == "L":
+        return _euler_lagrange if task.total_derivative else _slopes
+    return EXACT
+
+
+def _slopes(answer: Quotient, truth: Element) -> Sequence[Element]:
+    """Return the derivatives of the difference by the state, times the square of what stands below the bar."""
+    above, below = answer.less(truth), answer.below
+    if _accelerates(above) or _accelerates(below):
+        return [above]
+    slopes = []
+    for derivative in ("by_position", "by_rate"):
+        for i in range(truth.ring.n):
+            change = getattr(above, derivative)(i)
+            slopes.append(change if answer.is_polynomial else change * below - above * getattr(below, derivative)(i))
+    return slopes
+
+
+def _euler_lagrange(answer: Quotient, truth: Element) -> Sequence[Element]:
+    """Return d/dt dD/dqd - dD/dq of the difference D: zero for a total derivative of a function of q and t."""
+    element = answer.element()
+    if element is None or _accelerates(element):
+        return _slopes(answer, truth)
+    difference = element - truth
+    return [difference.by_rate(i).by_time() - difference.by_position(i) for i in range(truth.ring.n)]
+
+
+def _accelerates(element: Element) -> bool:
+    places = [element.ring.place("acceleration", i) for i in range(element.ring.n)]
+    return any(monomial[place] for monomial in element.terms for place in places)

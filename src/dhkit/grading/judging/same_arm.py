@@ -1,0 +1,387 @@
+"""Whether two tables are one arm in different frames: their joint axes are laid over one another, numerically."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Convention
+from dhkit.grading.judging.table_arms import TableArm
+
+__all__ = ["SAME", "STATES", "Overlay", "overlaid"]
+
+SAME = 1e-9
+"""rad, or share of the reach: two arms whose poses differ by less, in every state tried, are one arm."""
+STEPS = 12
+"""Of Newton's method, which takes five or six from within an eighth of a turn."""
+STATES = 4
+"""Draws of joint values and parameters where numbers decide."""
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Two arms as one: truth(senses q + offsets) = B answer(q) W."""
+
+    truth: TableArm
+    answer: TableArm
+    senses: Array
+    offsets: Array
+    B: Array
+
+    @cached_property
+    def differences(self) -> Array:
+        """The answer's frames in the truth's, shape (n + 1, 4, 4)."""
+        own = self.truth.frames(self.offsets)
+        D: Array = np.linalg.inv(own) @ self.B @ self.answer.frames(np.zeros(self.answer.n))
+        return D
+
+    def holds(self, scale: float) -> bool:
+        """Return whether both arms move alike in states that were not used to find out."""
+        W = np.linalg.inv(self.differences[-1])
+        for q in np.random.default_rng(1).uniform(-2, 2, (STATES, self.answer.n)):
+            gap = self.truth.frames(self.senses * q + self.offsets)[-1] - self.B @ self.answer.frames(q)[-1] @ W
+            gap[:3, 3] /= scale
+            if not np.max(np.abs(gap)) <= SAME:
+                return False
+        return True
+
+    def allowed(self, strict: bool, scale: float) -> bool:
+        """Return whether the ends differ as free choices do, and not by a wrong number.
+
+        Frames 0 and n may be elsewhere by the file's own numbers, which the answer then leaves to base and tool. A last
+        link of another length, where the file gives it one (``strict``), is wrong in any case.
+        """
+        tolerance, standard = SAME * scale, self.answer.convention is Convention.STANDARD
+        first, last = self.differences[0], self.differences[-1]
+        numbers, own = self.answer.entries, self.truth.entries
+        if strict and standard and abs(abs(numbers[-1, 2]) - abs(own[-1, 2])) > tolerance:
+            return False
+        # A wrong length elsewhere is no other zero of a sliding joint, though that could make up for it.
+        if np.any(np.abs(self.offsets[~_free(self.answer, self.truth)]) > tolerance):
+            return False
+        turns = np.abs(np.concatenate([first[:3, :3].ravel(), last[:3, :3].ravel()]))
+        if np.any(np.minimum(turns, np.abs(1 - turns)) > SAME):
+            return False
+        columns = slice(1, 2) if standard else slice(1, 3)
+        return all(
+            abs(np.linalg.norm(D[:3, 3]) - np.linalg.norm(np.where(given == 0, known, 0))) <= tolerance
+            for D, given, known in (
+                (first, numbers[0, columns], own[0, columns]),
+                (last, numbers[-1, 1:2], own[-1, 1:2]),
+            )
+            if np.max(np.abs(D[:3, 3])) > tolerance
+        )
+
+    def length(self) -> tuple[int, int]:
+        """Return how much there is to say: of all, and of joint variables."""
+        words = self.words()
+        return len(words), sum(word.startswith("q") for word in words)
+
+    def words(self) -> tuple[str, ...]:
+        """Say which frames and joint variables differ, and how."""
+        said = [word for i, D in enumerate(self.differences) for word in _frame_words(i, D)]
+        for i, (sense, offset) in enumerate(zip(self.senses, self.offsets, strict=True), start=1):
+            if sense < 0:
+                said.append(f"q{i} is counted the other way round")
+            turning = self.truth.kinds[i - 1] == "R"
+            offset = _wrapped(offset) if turning else offset
+            if turning and abs(abs(offset) - np.pi) < SAME:
+                said.append(f"q{i} is counted from the other end: by 180 degrees")
+            elif abs(offset) > SAME:
+                shown = f"{np.degrees(offset):.6g} degrees" if turning else f"{offset:.6g} m"
+                said.append(f"q{i} is counted from another zero: there the file's q{i} is {shown}")
+        return tuple(said)
+
+
+def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
+    """Return which joints may count from another zero, shape (n,): not those that slide from the file's own d."""
+    slides = np.array([kind != "R" for kind in truth.kinds])
+    free: NDArray[np.bool_] = ~slides | (np.abs(answer.entries[:, 1] - truth.entries[:, 1]) > SAME)
+    return free
+
+
+def _frame_words(i: int, D: Array) -> Iterator[str]:
+    """Say how frame i differs from the file's."""
+    if abs(abs(D[2, 2]) - 1) > SAME:
+        yield f"frame {i}'s z axis points elsewhere: along {_shown(D[:3, 2])} of the file's frame {i}"
+    elif D[2, 2] < 0:
+        yield f"frame {i}'s z axis points the other way"
+    angle = float(np.arctan2(D[1, 0], D[0, 0])) if abs(D[2, 0]) < SAME else np.nan
+    if abs(abs(angle) - np.pi) < SAME:
+        yield f"frame {i}'s x axis points the other way"
+    elif not abs(angle) < SAME:
+        shown = f"along {_shown(D[:3, 0])}" if np.isnan(angle) else f"turned by {np.degrees(angle):.6g} degrees about z"
+        yield f"frame {i}'s x axis is another: {shown}"
+    if np.max(np.abs(D[:2, 3])) > SAME:
+        yield f"frame {i}'s origin is elsewhere: at {_shown(D[:3, 3])} m in the file's frame {i}"
+    elif abs(D[2, 3]) > SAME:
+        yield f"frame {i} is slid along its z axis, by {D[2, 3]:.6g} m"
+
+
+def _shown(vector: Array) -> str:
+    return "(" + ", ".join(f"{x + 0.0:.4g}" for x in np.where(np.abs(vector) < SAME, 0.0, vector)) + ")"
+
+
+def _wrapped(angle: float) -> float:
+    return float(np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
+    """Return how two arms are one, in the fewest words; None where they are not."""
+    scale = float(np.sum(np.abs(truth.entries[:, 1:3]))) or 1.0
+    matching = _Matching(answer, truth, scale)
+    if not matching.links_agree:
+        return None
+    best = None
+    for senses, B, offsets in matching.found(np.ones(0), np.eye(4), np.zeros(truth.n)):
+        found = _at_the_ends(Overlay(truth, answer, senses, offsets, B), scale)
+        for overlay in (found, _slid(found), matching.fitted(found)):
+            if overlay is not None and overlay.holds(scale) and overlay.allowed(strict, scale):
+                best = min(best or overlay, overlay, key=Overlay.length)
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Matching:
+    """The search for a rigid motion and joint values that bring the axes of one arm, or their reverses, to another's.
+
+    Axis after axis: Newton's method in the rigid motion and the offsets of the joints before, from four positions a
+    quarter turn apart.
+    """
+
+    answer: TableArm
+    truth: TableArm
+    scale: float
+
+    @cached_property
+    def own(self) -> Array:
+        return self.answer.screws(np.zeros(self.answer.n), self.scale)
+
+    @property
+    def links_agree(self) -> bool:
+        """Whether neighbouring axes lie alike in both arms: their angle and common normal, whatever the senses."""
+        invariants = [_invariants(arm.screws(np.zeros(arm.n), self.scale)) for arm in (self.answer, self.truth)]
+        return bool(np.max(np.abs(invariants[0] - invariants[1]), initial=0.0) < SAME)
+
+    def found(self, senses: Array, B: Array, offsets: Array) -> Iterator[tuple[Array, Array, Array]]:
+        """Yield senses, motion and offsets that match all axes, given those that match the first few."""
+        k = len(senses)
+        if k == self.truth.n:
+            yield senses, B, offsets
+            return
+        for sense in (1.0, -1.0):
+            tried = np.append(senses, sense)
+            for guess in self.guesses(k, B, offsets, sense):
+                solved = self.solved(tried, *guess)
+                if solved is not None:
+                    yield from self.found(tried, *solved)
+                    break
+
+    def guesses(self, k: int, B: Array, offsets: Array, sense: float) -> Iterator[tuple[Array, Array]]:
+        """Yield where to begin with axis k, from 0: the joint before it in four positions."""
+        if k == 0:
+            for turn in (np.eye(4), *(_half_turn(axis) for axis in range(3)), *_quarter_turns()):
+                yield turn @ B, offsets
+            return
+        for quarter in (0, 2, 1, -1):
+            angle = quarter * np.pi / 2
+            if self.truth.kinds[k - 1] != "R":
+                yield B, offsets
+                return
+            if k == 1:
+                screw = self.truth.screws(offsets, self.scale)[0]
+                yield _exponential(screw * angle, self.scale) @ B, offsets
+                continue
+            turned = offsets.copy()
+            turned[k - 1] += angle
+            yield B, turned
+
+    def solved(self, senses: Array, B: Array, offsets: Array) -> tuple[Array, Array] | None:
+        """Return a rigid motion and offsets that match the first axes; None where there are none nearby."""
+        k = len(senses)
+        for _ in range(STEPS):
+            target = self.truth.screws(offsets, self.scale)[:k]
+            moved = self.own[:k] @ _adjoint(B, self.scale).T
+            gap = (moved - senses[:, None] * target).ravel()
+            if not np.all(np.isfinite(gap)):
+                return None
+            if np.max(np.abs(gap)) < SAME / 100:
+                return B, offsets
+            before = range(1, k - 1)
+            later = senses[:, None] * (np.arange(k) > np.array(before, dtype=int)[:, None])[..., None]
+            later = later * _free(self.answer, self.truth)[1 : len(later) + 1, None, None]
+            columns = np.concatenate([moved @ BRACKETS, -(target @ np.tensordot(target[1:-1], BRACKETS, 1)) * later])
+            step = -np.linalg.lstsq(columns.reshape(len(columns), -1).T, gap, rcond=1e-8)[0]
+            step *= min(1.0, 1.5 / max(float(np.max(np.abs(step))), 1e-300))
+            B = _exponential(step[:6], self.scale) @ B
+            offsets = offsets.copy()
+            offsets[1 : k - 1] += step[6:] * np.where([x == "R" for x in self.truth.kinds[1 : k - 1]], 1, self.scale)
+        return None
+
+    def fitted(self, overlay: Overlay) -> Overlay | None:
+        """Bring frames 0 and n to the file's, where the axes leave that open: joints on one line share an offset.
+
+        Newton's method as in :meth:`solved`, with the two frames next to the axes; None where they cannot be brought.
+        """
+        ends = [_squared(D) for D in overlay.differences[[0, -1]]]
+        B, offsets, senses = overlay.B, overlay.offsets, overlay.senses[:, None]
+        last = self.answer.frames(np.zeros(self.answer.n))[-1]
+        later = (np.arange(self.truth.n) > np.arange(self.truth.n)[:, None])[..., None] * senses
+        stroke = np.where([kind == "R" for kind in self.truth.kinds], 1, self.scale)
+        free = _free(self.answer, self.truth)
+        for _ in range(STEPS):
+            target, moved = self.truth.screws(offsets, self.scale), self.own @ _adjoint(B, self.scale).T
+            given = _scaled(np.array([B, B @ last]), self.scale)
+            wanted = _scaled(np.array([ends[0], self.truth.frames(offsets)[-1] @ ends[1]]), self.scale)
+            gap = np.concatenate([(moved - senses * target).ravel(), (given - wanted).ravel()])
+            if np.max(np.abs(gap)) < SAME / 100:
+                return replace(overlay, B=B, offsets=offsets)
+            turned = -(target @ np.tensordot(target, BRACKETS, 1)) * later
+            at_end = np.array([[0 * wanted[1], -_rate(screw) @ wanted[1]] for screw in target])
+            turned, at_end = turned * free[:, None, None], at_end * free[:, None, None, None]
+            whole = np.array([_rate(unit) @ given for unit in np.eye(6)])
+            columns = np.vstack(
+                [
+                    np.hstack([(moved @ BRACKETS).reshape(6, -1), whole.reshape(6, -1)]),
+                    np.hstack([turned.reshape(len(turned), -1), at_end.reshape(len(turned), -1)]),
+                ]
+            )
+            step = -np.linalg.lstsq(columns.T, gap, rcond=1e-8)[0]
+            step *= min(1.0, 1.5 / max(float(np.max(np.abs(step))), 1e-300))
+            B = _exponential(step[:6], self.scale) @ B
+            offsets = offsets + step[6:] * stroke
+        return None
+
+
+def _squared(D: Array) -> Array:
+    """Return the nearest rotation by right angles, if there is one, without a translation, shape (4, 4)."""
+    square = np.eye(4)
+    turned = np.rint(D[:3, :3])
+    if np.array_equal(turned @ turned.T, np.eye(3)):
+        square[:3, :3] = turned
+    return square
+
+
+def _scaled(T: Array, scale: float) -> Array:
+    """Return transforms with lengths over a scale."""
+    scaled = T.copy()
+    scaled[..., :3, 3] /= scale
+    return scaled
+
+
+def _rate(screw: NDArray[np.floating[Any]]) -> Array:
+    """Return the matrix by which transforms change along a screw, shape (4, 4)."""
+    rate = np.zeros((4, 4))
+    rate[:3, :3], rate[:3, 3] = _skew(screw[:3]), screw[3:]
+    return rate
+
+
+def _at_the_ends(overlay: Overlay, scale: float) -> Overlay:
+    """Choose the first and the last offset, which base and tool could take up, so that the frames agree."""
+    truth, n = overlay.truth, overlay.truth.n
+    own, other = truth.frames(overlay.offsets), overlay.B @ overlay.answer.frames(np.zeros(n))
+    screws = truth.screws(overlay.offsets, 1.0)
+    first, last = (_amount(screws[k], own[k], other[k], scale) for k in (0, -1))
+    offsets = overlay.offsets.copy()
+    # The first joint's move is one of the whole: truth(q + o1) = exp(o1) truth(q).
+    offsets[0] -= first
+    offsets[-1] += last if n > 1 else 0.0
+    return replace(overlay, offsets=offsets, B=_exponential(-screws[0] * first, 1.0) @ overlay.B)
+
+
+def _slid(overlay: Overlay) -> Overlay:
+    """Move all of the answer along the first axis until frames n are level: a choice where all axes are parallel."""
+    screw = overlay.truth.screws(overlay.offsets, 1.0)[0]
+    axis = screw[:3] if np.any(screw[:3]) else screw[3:]
+    own = overlay.truth.frames(overlay.offsets)[-1]
+    other = overlay.B @ overlay.answer.frames(np.zeros(overlay.answer.n))[-1]
+    B = overlay.B.copy()
+    B[:3, 3] += axis * (axis @ (own[:3, 3] - other[:3, 3]))
+    return replace(overlay, B=B)
+
+
+def _amount(screw: Array, start: Array, end: Array, scale: float) -> float:
+    """Return how far a joint moves to bring the origin of one frame to another's; its x axis where that is no help."""
+    axis, moment = screw[:3], screw[3:]
+    if not np.any(axis):
+        return float(moment @ (end[:3, 3] - start[:3, 3]))
+    point = np.cross(axis, moment)
+    levers = [_across(axis, T[:3, 3] - point) for T in (start, end)]
+    if min(float(np.linalg.norm(lever)) for lever in levers) <= SAME * scale:
+        levers = [_across(axis, T[:3, 0]) for T in (start, end)]
+    a, b = levers
+    return float(np.arctan2(axis @ np.cross(a, b), a @ b))
+
+
+def _across(axis: Array, vector: Array) -> Array:
+    """Return what of a vector is at right angles to an axis."""
+    across: Array = vector - (axis @ vector) * axis
+    return across
+
+
+def _invariants(screws: Array) -> Array:
+    """Return what no motion and no sense changes of neighbouring screws, shape (n - 1, 3).
+
+    The sines and cosines of their angles, their distance times the sine, and for parallel ones the distance.
+    """
+    first, second = screws[:-1], screws[1:]
+    angle = np.sum(first[:, :3] * second[:, :3], axis=1)
+    moment = np.sum(first[:, :3] * second[:, 3:] + first[:, 3:] * second[:, :3], axis=1)
+    turning = np.any(first[:, :3], axis=1) & np.any(second[:, :3], axis=1)
+    parallel = turning & (np.abs(np.abs(angle) - 1) < SAME)
+    apart = np.linalg.norm(second[:, 3:] * np.sign(angle)[:, None] - first[:, 3:], axis=1)
+    return np.stack([np.abs(angle), np.abs(moment), np.where(parallel, apart, 0)], axis=1)
+
+
+def _brackets() -> Array:
+    """Return the matrices by which screws, as rows, change along each of the six unit screws, shape (6, 6, 6)."""
+    brackets = np.zeros((6, 6, 6))
+    for k, unit in enumerate(np.eye(3)):
+        crossed = _skew(unit).T
+        brackets[k, :3, :3] = brackets[k, 3:, 3:] = brackets[k + 3, :3, 3:] = crossed
+    return brackets
+
+
+def _skew(p: NDArray[np.floating[Any]]) -> Array:
+    return np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]])
+
+
+def _adjoint(T: Array, scale: float) -> Array:
+    """Return what maps screws as a motion moves them, shape (6, 6)."""
+    R = T[:3, :3]
+    return np.block([[R, np.zeros((3, 3))], [_skew(T[:3, 3]) @ R / scale, R]])
+
+
+def _exponential(screw: NDArray[np.floating[Any]], scale: float) -> Array:
+    """Return the motion along a screw (angles; lengths / scale), shape (4, 4)."""
+    w, v = screw[:3], screw[3:] * scale
+    angle = float(np.linalg.norm(w))
+    K = _skew(w)
+    if angle < 1e-12:
+        R, V = np.eye(3) + K, np.eye(3) + K / 2
+    else:
+        s, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
+        R, V = np.eye(3) + s * K + c * K @ K, np.eye(3) + c * K + (1 - s) / angle**2 * K @ K
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, V @ v
+    return T
+
+
+def _half_turn(axis: int) -> Array:
+    signs = np.full(4, -1.0)
+    signs[[axis, 3]] = 1
+    return np.diag(signs)
+
+
+def _quarter_turns() -> list[Array]:
+    units: Array = np.eye(6)
+    return [_exponential(angle * unit, 1.0) for unit in units[:3] for angle in (np.pi / 2, -np.pi / 2)]
+
+
+BRACKETS = _brackets()
+"""See :func:`_brackets`."""

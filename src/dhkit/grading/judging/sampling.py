@@ -1,0 +1,156 @@
+"""Answers that the exact ring does not have, held against the truth at many random states in many digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dhkit.errors import AnswerError
+from dhkit.expressions import Expression
+from dhkit.expressions.exact import Atom
+from dhkit.symbolic import ExactArm
+from dhkit.symbolic.ring import Element
+
+if TYPE_CHECKING:
+    from mpmath import mpf
+
+__all__ = ["DIGITS", "SAMPLES", "Sample", "checked", "differ", "element_value", "samples", "show_state"]
+
+SAMPLES = 1_000
+DIGITS = 50
+TOLERANCE = 1e-25
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A random state and random parameters.
+
+    Attributes
+    ----------
+    names
+        Values by name: q1, qd1, qdd1, parameters.
+    generators
+        Values of the ring's generators, in their order.
+    """
+
+    names: Mapping[str, Any]
+    generators: Sequence[Any]
+
+
+def samples(arm: ExactArm, numbers: frozenset[str], every: int = 1, count: int = SAMPLES) -> list[Sample]:
+    """Return random states.
+
+    Parameters
+    ----------
+    arm
+        The robot.
+    numbers
+        Parameters that keep the file's values; others come within a factor of two of them.
+    every
+        After how many states parameters change.
+    count
+        How many.
+    """
+    import mpmath
+
+    rng = np.random.default_rng(0)
+    found = []
+    parameters: dict[str, Any] = {name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()}
+    for k in range(count):
+        if k % every == 0:
+            for name, value in arm.parameters.items():
+                parameters[name] = mpmath.mpf(value if name in numbers else value * rng.uniform(0.5, 2.0))
+        names = dict(parameters)
+        for i in range(arm.n):
+            for kind, size in (("q", 3.0), ("qd", 2.0), ("qdd", 2.0)):
+                names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
+        found.append(Sample(names, _generators(arm, names)))
+    return found
+
+
+def element_value(element: Element, sample: Sample) -> mpf:
+    """Return the number that an element is, in the digits that are set."""
+    import mpmath
+
+    total = mpmath.mpf(0)
+    for monomial, coefficient in element.terms.items():
+        product = mpmath.mpf(coefficient.numerator) / coefficient.denominator
+        for k, exponent in enumerate(monomial):
+            if exponent:
+                product *= sample.generators[k] ** exponent
+        total += product
+    return total
+
+
+def _generators(arm: ExactArm, names: Mapping[str, Any]) -> list[Any]:
+    import mpmath
+
+    values: list[Any] = []
+    for generator in arm.ring.generators:
+        if generator.kind in ("sine", "cosine"):
+            angle = sum(names[f"q{joint + 1}"] for joint in generator.joints)
+            values.append(mpmath.sin(angle) if generator.kind == "sine" else mpmath.cos(angle))
+        elif generator.kind == "constant":
+            values.append(names[generator.text] if generator.meaning is None else _value(generator.meaning, names))
+        else:
+            values.append(names[generator.text])
+    return values
+
+
+def _value(expression: Expression, names: Mapping[str, Any]) -> Any:
+    import mpmath
+
+    total = mpmath.mpf(0)
+    for monomial, coefficient in expression.terms:
+        product = mpmath.mpf(coefficient.numerator) / coefficient.denominator
+        for atom, exponent in monomial:
+            product *= _atom(atom, names) ** exponent
+        total += product
+    return total
+
+
+def _atom(atom: Atom, names: Mapping[str, Any]) -> Any:
+    import mpmath
+
+    if atom.name == "pi":
+        return +mpmath.pi
+    if atom.is_symbol:
+        return names[atom.name]
+    arguments = [_value(argument, names) for argument in atom.arguments]
+    if atom.name == "group":
+        return arguments[0]
+    function: Callable[..., Any] = abs if atom.name == "abs" else getattr(mpmath, atom.name)
+    return function(*arguments)
+
+
+def differ(answer: Any, truth: Any) -> bool:
+    """Whether two numbers in many digits are not the same."""
+    size = max(abs(answer), abs(truth), 1e-3)
+    return bool(abs(answer - truth) > TOLERANCE * size)
+
+
+def show_state(sample: Sample, names: set[str]) -> dict[str, float]:
+    """Return those of a sample's values that are named, as doubles."""
+    return {name: float(value) for name, value in sample.names.items() if name in names}
+
+
+def checked(value: Any) -> Any:
+    """Return a real, finite number.
+
+    Raises
+    ------
+    AnswerError
+        It is complex, infinite or no number.
+    """
+    import mpmath
+
+    if isinstance(value, mpmath.mpc):
+        if value.imag:
+            raise AnswerError("no real value")
+        value = value.real
+    if not mpmath.isfinite(value):
+        raise AnswerError("no finite value")
+    return value

@@ -1,0 +1,134 @@
+"""The marks that a rubric gives a judgement: a pure function of both, so that a report can be marked again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
+from dhkit.grading.rubric import QUANTITY, Credit, Rubric
+
+__all__ = ["Mark", "Marks", "marks"]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """The points of an entry or of a quantity, of at most so many, and the rule that gave them."""
+
+    name: str
+    points: float
+    most: float
+    rule: str = ""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """The points of a sheet.
+
+    Attributes
+    ----------
+    points, most
+        Of the sheet.
+    entries
+        One an entry, in the report's order.
+    quantities
+        Their sums, and those that are asked for and missing.
+    """
+
+    points: float
+    most: float
+    entries: tuple[Mark, ...] = ()
+    quantities: tuple[Mark, ...] = ()
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return asdict(self)
+
+    def without_rules(self) -> Marks:
+        """Return the points alone: a rule may name the mistake that a student is to find."""
+        return replace(self, entries=tuple(replace(mark, rule="") for mark in self.entries))
+
+
+def marks(report: GradeReport, rubric: Rubric) -> Marks:
+    """Return the points of a judged sheet; a sheet that could not be judged gets 0.
+
+    The sums are exact before they are made floats, so that what is right throughout gets all points and not nearly all.
+    """
+    if report.error or not report.entries:
+        return Marks(0.0, rubric.points)
+    weights = _quantity_weights(report, rubric)
+    total = sum(weights.values()) or Fraction(1)
+    points = _exact(rubric.points)
+    entries, sums = [], {quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()}
+    for entry in report.entries:
+        most = sums[entry.quantity][1] * _part(entry, report, rubric)
+        share, rule = _share(entry, report.diagnosis, rubric.credit)
+        sums[entry.quantity][0] += share * most
+        entries.append(Mark(entry.name, float(share * most), float(most), rule if most else "counts nothing"))
+    missing = weights.keys() - set(report.quantities)
+    quantities = tuple(
+        Mark(quantity, float(got), float(most), "not on the sheet" if quantity in missing else "")
+        for quantity, (got, most) in sums.items()
+    )
+    return Marks(float(sum(got for got, _ in sums.values())), rubric.points, tuple(entries), quantities)
+
+
+def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction]:
+    """Return the weights of what is on the sheet, and of what should be."""
+    named = {name: _exact(weight) for name, weight in rubric.weights.items() if QUANTITY.fullmatch(name)}
+    others = Fraction(0 if any(named.values()) else 1)
+    weights = {quantity: named.get(quantity, others) for quantity in report.quantities}
+    for quantity in weights:
+        if not any(_entry_weight(entry, rubric) for entry in report.of(quantity)):
+            weights[quantity] = Fraction(0)
+    return weights | {quantity: weight for quantity, weight in named.items() if weight and quantity not in weights}
+
+
+def _entry_weight(entry: Entry, rubric: Rubric) -> Fraction:
+    return _exact(rubric.weights.get(entry.name, 1.0)) if entry.index else Fraction(1)
+
+
+def _part(entry: Entry, report: GradeReport, rubric: Rubric) -> Fraction:
+    """Return which part of its quantity an entry is."""
+    total = sum(_entry_weight(other, rubric) for other in report.of(entry.quantity))
+    return _entry_weight(entry, rubric) / total if total else Fraction(0)
+
+
+def _share(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> tuple[Fraction, str]:
+    """Return the share that an entry gets of its points, and why: of several reasons the best."""
+    simple = {
+        Verdict.CORRECT: 1.0,
+        Verdict.ROUNDED: credit.rounding,
+        Verdict.UNDECIDED: credit.undecided,
+        Verdict.UNREADABLE: 0.0,
+    }
+    if entry.verdict in simple:
+        reasons = [(_exact(simple[entry.verdict]), entry.verdict.value)]
+    else:
+        reasons = [(Fraction(0), "wrong"), *_reasons(entry, diagnosis, credit)]
+    share, rule = max(reasons, key=lambda reason: reason[0])
+    return share, rule if share in (0, 1) else f"{rule}: {100 * float(share):g} %"
+
+
+def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> list[tuple[Fraction, str]]:
+    """Return what speaks for a wrong entry."""
+    found = [one for one in diagnosis if one.mistake and entry.name in one.entries]
+    reasons = [(_exact(credit.follow_on), f"follows from {entry.follows}")] if entry.follows else []
+    if any(one.mistake == "other_frames" for one in found):
+        reasons.append((_exact(credit.other_frames), "right in other frames"))
+    elif found:
+        shares = [_mistake_share(one, credit, credit.diagnosed if len(found) == 1 else 0.0) for one in found]
+        reasons.append((_exact(min(shares)), " and ".join(str(one.mistake) for one in found)))
+    return reasons
+
+
+def _mistake_share(found: Diagnosis, credit: Credit, otherwise: float) -> float:
+    """Return what the rubric gives for a mistake, or for one that gives the same answers and is worth more."""
+    names = (str(found.mistake), *found.equivalent)
+    bare = [name if name in credit.mistakes else name.partition("@")[0] for name in names]  # half_forgotten@2
+    return max((credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise)
+
+
+def _exact(number: float) -> Fraction:
+    return Fraction(repr(float(number)))

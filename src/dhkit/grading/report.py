@@ -1,0 +1,249 @@
+"""What a judgement says: verdicts entry by entry, and which mistakes would give these answers; plain data."""
+
+from __future__ import annotations
+
+import json as jsons
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import Enum
+from typing import Any
+
+__all__ = ["Diagnosis", "Entry", "GradeReport", "Verdict", "Witness"]
+
+
+MOST_NAMED = 6
+
+
+class Verdict(Enum):
+    """What is decided of an entry, or of a sheet; the worst last."""
+
+    CORRECT = "correct"
+    ROUNDED = "correct within rounding"
+    UNDECIDED = "undecided"
+    WRONG = "wrong"
+    UNREADABLE = "unreadable"
+
+    @property
+    def severity(self) -> int:
+        """How bad it is, from 0."""
+        return list(Verdict).index(self)
+
+    @property
+    def passes(self) -> bool:
+        """Whether nothing was found wrong."""
+        return self.severity <= Verdict.UNDECIDED.severity
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A state in which an answer and the truth differ, SI and radians.
+
+    Attributes
+    ----------
+    state
+        Values by name: q1, qd1, parameters, or px ... r33 for inverse kinematics.
+    answer, truth
+        What each gives there; None where the answer has no value.
+    """
+
+    state: Mapping[str, float]
+    answer: float | None
+    truth: float | None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The judgement of one entry of a quantity.
+
+    Attributes
+    ----------
+    quantity
+        M, C, h, g, tau, K, V, L, A1 ... An, T, J, dh or ik.
+    index
+        Where it stands, from 0; empty for a number such as K.
+    verdict
+        What is decided of it.
+    answer
+        The text as it was handed in.
+    latex
+        The answer as it was read, in LaTeX; empty where it is not in the exact ring.
+    statement
+        Why the verdict holds, in a line: proved, sampled, within which rounding.
+    difference
+        The answer less the truth, as text, where it is wrong; None where it cannot be written.
+    difference_latex
+        The same in LaTeX; empty without one.
+    witness
+        A state in which both differ, where it is wrong.
+    follows
+        Which earlier answers of the same sheet this follows from: right in itself, wrong because they are.
+    """
+
+    quantity: str
+    index: tuple[int, ...]
+    verdict: Verdict
+    answer: str = ""
+    latex: str = ""
+    statement: str = ""
+    difference: str | None = None
+    difference_latex: str = ""
+    witness: Witness | None = None
+    follows: str = ""
+
+    @property
+    def name(self) -> str:
+        """The entry as people write it, counted from 1: M12, g1, K."""
+        return self.quantity + ("_" if any(k > 8 for k in self.index) else "").join(str(k + 1) for k in self.index)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A mistake that gives exactly these answers, or what the terms show where none does.
+
+    Attributes
+    ----------
+    mistake
+        A stable name; None where only terms are described.
+    sentence
+        What a student learns from it.
+    where
+        The quantity and, where it is one alone, the link: ``g, link 2``.
+    entries
+        Names of the wrong entries that it explains.
+    hint
+        Where to look, without saying what is wrong.
+    equivalent
+        Other mistakes of the library that give the same answers.
+    """
+
+    mistake: str | None
+    sentence: str
+    where: str
+    entries: tuple[str, ...] = ()
+    hint: str = ""
+    equivalent: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """The entries in a few words, for messages."""
+        if len(self.entries) > MOST_NAMED:
+            return f"{', '.join(self.entries[: MOST_NAMED - 1])} and {len(self.entries) - MOST_NAMED + 1} more"
+        return ", ".join(self.entries) or self.where
+
+
+@dataclass(frozen=True)
+class GradeReport:
+    """What is decided of an answer sheet.
+
+    Attributes
+    ----------
+    robot
+        The robot's name.
+    digest
+        Of the robot as data: two reports with one digest judged by the same truth.
+    version
+        Of dhkit.
+    entries
+        One an entry, in the order of the sheet.
+    diagnosis
+        What went wrong, quantity by quantity.
+    notes
+        What a reader should know: numbers taken from the file, a different valid factorization, conventions.
+    sheet
+        The file, or what else it was; None for answers of the Python API.
+    student
+        Whose it is; empty where nobody says.
+    error
+        Why the sheet could not be judged; empty where it was.
+    seconds
+        How long it took.
+
+    Examples
+    --------
+    >>> from dhkit.grading.report import Entry, GradeReport, Verdict
+    >>> report = GradeReport("planar2r", entries=(Entry("V", (), Verdict.CORRECT),))
+    >>> report.verdict.value, bool(report)
+    ('correct', True)
+    """
+
+    robot: str = ""
+    digest: str = ""
+    version: str = ""
+    entries: tuple[Entry, ...] = ()
+    diagnosis: tuple[Diagnosis, ...] = ()
+    notes: tuple[str, ...] = ()
+    sheet: str | None = None
+    student: str = ""
+    error: str = ""
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the entries."""
+        if self.error or not self.entries:
+            return Verdict.UNREADABLE
+        return max((entry.verdict for entry in self.entries), key=lambda verdict: verdict.severity)
+
+    def __bool__(self) -> bool:
+        """Whether nothing was found wrong."""
+        return self.verdict.passes
+
+    @property
+    def fault(self) -> str:
+        """Why the sheet, or its first entry that could not be read, was not judged; empty where all was."""
+        unread = (entry for entry in self.entries if entry.verdict is Verdict.UNREADABLE)
+        return self.error or next((f"{entry.name}: {entry.statement}" for entry in unread), "")
+
+    def __str__(self) -> str:
+        """Return the verdict, what is wrong, and why, in a few lines."""
+        if self.error:
+            return f"{self.robot or self.sheet}: unreadable: {self.error}"
+        failed = [entry.name for entry in self.entries if not entry.verdict.passes]
+        head = f"{self.robot}: {self.verdict.value}" + (f": {', '.join(failed)}" if failed else "")
+        return "\n".join([head, *(f"  {found.place}: {found.sentence}" for found in self.diagnosis)])
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Which quantities were judged, in the order of the sheet."""
+        return tuple(dict.fromkeys(entry.quantity for entry in self.entries))
+
+    def of(self, quantity: str) -> tuple[Entry, ...]:
+        """Return a quantity's entries."""
+        return tuple(entry for entry in self.entries if entry.quantity == quantity)
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data, which :meth:`from_data` reads back."""
+        data = asdict(self)
+        for entry, own in zip(data["entries"], self.entries, strict=True):
+            entry["verdict"] = own.verdict.value
+        return data
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> GradeReport:
+        """Return the report that :meth:`data` was made of, by way of JSON perhaps.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            Other data.
+        """
+        entries = tuple(
+            Entry(
+                **{
+                    **entry,
+                    "index": tuple(entry["index"]),
+                    "verdict": Verdict(entry["verdict"]),
+                    "witness": Witness(**entry["witness"]) if entry["witness"] else None,
+                }
+            )
+            for entry in data["entries"]
+        )
+        diagnosis = tuple(
+            Diagnosis(**{**found, "entries": tuple(found["entries"]), "equivalent": tuple(found["equivalent"])})
+            for found in data["diagnosis"]
+        )
+        return cls(**{**data, "entries": entries, "diagnosis": diagnosis, "notes": tuple(data["notes"])})
+
+    def to_json(self) -> str:
+        """Return :meth:`data` as JSON."""
+        return jsons.dumps(self.data(), ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,103 @@
+"""A judgement as JSON: what programs read, and what can be marked again."""
+
+from __future__ import annotations
+
+import json as jsons
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from dhkit.description.files import read_bounded
+from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.marks import Marks
+from dhkit.grading.report import GradeReport
+from dhkit.grading.rubric import Feedback
+
+__all__ = ["json_report", "read_reports", "report_of"]
+
+MAX_BYTES = 500_000_000
+"""Of a file of reports, one a line: a class of a thousand with long answers."""
+
+FORM = TypeAdapter(GradeReport)
+
+
+def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") -> dict[str, Any]:
+    """Return a report with its marks as plain data.
+
+    Parameters
+    ----------
+    report, marks
+        As far as they are to be told.
+    feedback
+        How far that is: only ``"full"`` reports can be marked again.
+    """
+    told = {"verdict": report.verdict.value, "points": marks.points, "most": marks.most}
+    return told | report.data() | {"marks": marks.data(), "feedback": feedback}
+
+
+def report_of(text: str | bytes) -> GradeReport:
+    """Return the report in a JSON text, every field checked: its writer need not be trusted.
+
+    Raises
+    ------
+    ValueError
+        No JSON, or no report: a field is missing, of another type, or not finite.
+    """
+    try:
+        report = FORM.validate_python(jsons.loads(text))
+        report.to_json().encode()  # refuses what is not finite, and halves of characters
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+    return report
+
+
+def read_reports(path: Path) -> Iterator[GradeReport]:
+    """Yield the reports of a file of JSON: one a line, or one alone.
+
+    Raises
+    ------
+    AnswerError
+        No such file, no reports, or reports of which something was left out for the students.
+    """
+    try:
+        text = read_bounded(path, MAX_BYTES).decode().strip()
+    except DescriptionError as error:
+        raise AnswerError(str(error).replace("expected a robot file", "expected reports")) from None
+    except UnicodeDecodeError as error:
+        raise AnswerError(f"{path}: byte {error.start} is no UTF-8; expected reports in JSON") from None
+    lines = [text] if _is_json(text) else text.splitlines()
+    for number, line in enumerate(lines, start=1):
+        if line.strip():
+            yield _read(line, f"{path}: line {number}" if len(lines) > 1 else str(path))
+
+
+def _read(text: str, place: str) -> GradeReport:
+    try:
+        feedback = jsons.loads(text).get("feedback", "full")
+        report = report_of(text)
+    except (ValueError, AttributeError, RecursionError) as error:
+        raise AnswerError(f"{place}: {_fault(error)}; expected a report as `dhkit grade --json` writes it") from None
+    if feedback != "full":
+        raise AnswerError(
+            f"{place}: feedback: found {str(feedback)[:60]!r}; expected 'full': no other can be marked again"
+        )
+    return report
+
+
+def _fault(error: Exception) -> str:
+    """Say in a line what is wrong with a report."""
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        place = ".".join(str(part)[:80] for part in first["loc"])
+        return f"{place}: {first['msg']}" if place else first["msg"]
+    return "no JSON" if isinstance(error, jsons.JSONDecodeError) else "no report"
+
+
+def _is_json(text: str) -> bool:
+    try:
+        jsons.loads(text)
+    except (ValueError, RecursionError):
+        return False
+    return True

@@ -1,0 +1,169 @@
+"""What answers are worth: a rubric, read strictly from a file or a sheet's table."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+from pydantic_core import ErrorDetails
+
+from dhkit.description.files import read_bounded
+from dhkit.description.toml_text import plain_numbers, toml_document
+from dhkit.errors import AnswerError, DescriptionError
+
+__all__ = ["QUANTITY", "Credit", "Feedback", "Rubric"]
+
+MAX_BYTES = 100_000
+STRICT = ConfigDict(extra="forbid")
+QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
+"""Names of quantities."""
+WEIGHED = re.compile(rf"({QUANTITY.pattern})(_?[0-9]+)?")
+QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A1")
+
+Feedback: TypeAlias = Literal["full", "hint", "verdict"]
+"""How much a report tells: everything; verdicts and where to look; verdicts alone."""
+
+Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
+Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Credit:
+    """Which share of its points an entry gets that is not simply right, from 0 to 1.
+
+    Attributes
+    ----------
+    rounding
+        Correct within rounding.
+    undecided
+        Neither proved nor refuted.
+    follow_on
+        Wrong only because earlier answers of the sheet are.
+    other_frames
+        Right in frames other than the table's.
+    diagnosed
+        Wrong by a single mistake that is named.
+    mistakes
+        Wrong by these mistakes, by name; goes before ``diagnosed``.
+    """
+
+    rounding: Share = 1.0
+    undecided: Share = 1.0
+    follow_on: Share = 0.5
+    other_frames: Share = 0.5
+    diagnosed: Share = 0.0
+    mistakes: dict[str, Share] = Field(default_factory=dict, max_length=200)
+
+
+@dataclass(frozen=True, config=STRICT)
+class Rubric:
+    """What answers are worth.
+
+    Attributes
+    ----------
+    points
+        For a sheet that is right throughout.
+    weights
+        Of quantities (``M = 4``) and of entries within their quantity (``M12 = 0``; 1 unless given). Where a quantity
+        has a weight above 0, those are what is asked for: one that is missing from a sheet gets none of its points,
+        and one that is not named counts nothing. Otherwise the quantities of the sheet weigh the same.
+    credit
+        Shares for what is not simply right.
+    digits
+        Significant digits from which a decimal may be rounded.
+    feedback
+        How much a report tells.
+
+    Examples
+    --------
+    >>> Rubric.from_data({"points": 10, "weights": {"M": 4, "g": 2}}).weights["g"]
+    2.0
+    """
+
+    points: Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)] = 100.0
+    weights: dict[str, Weight] = Field(default_factory=dict, max_length=1000)
+    credit: Credit = Field(default_factory=Credit)
+    digits: Annotated[int, Field(strict=True, ge=3, le=15)] = 4
+    feedback: Feedback = "full"
+
+    @classmethod
+    def read(cls, path: Path) -> Rubric:
+        """Return the rubric of a TOML file.
+
+        Raises
+        ------
+        AnswerError
+            No such file, one over 100 kB, no TOML, or anything that :meth:`from_data` refuses; names the file.
+        """
+        try:
+            content = read_bounded(path, MAX_BYTES, "a rubric")
+        except DescriptionError as error:
+            raise AnswerError(str(error)) from None
+        try:
+            document = plain_numbers(toml_document(content.decode()))
+        except (DescriptionError, UnicodeDecodeError) as error:
+            raise AnswerError(f"{path}: no TOML: {error}") from None
+        return cls.from_data(document, f"{path}: ")
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any], place: str = "rubric: ") -> Rubric:
+        """Return the rubric of a parsed table, such as a sheet's ``[rubric]``.
+
+        Raises
+        ------
+        AnswerError
+            The first thing wrong, after ``place``: key, what was found, what was expected.
+        """
+        if not isinstance(data, Mapping):
+            raise AnswerError(f"{place}found {_shown(data)}; expected a table")
+        try:
+            rubric = TypeAdapter(cls).validate_python(dict(data))
+        except ValidationError as error:
+            # A mistyped key says more than what else is wrong.
+            found = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
+            raise AnswerError(place + _one_line(found[0])) from None
+        for name in rubric.weights:
+            if not WEIGHED.fullmatch(name):
+                unknown = f"weights: no quantity {name[:80]!r}"
+                raise AnswerError(f"{place}{unknown}{_hint(name, QUANTITIES)}")
+        return rubric
+
+    def require_mistakes(self, known: Collection[str], place: str = "rubric: ") -> None:
+        """Refuse a share for a mistake that the library does not have: it would never be given.
+
+        Raises
+        ------
+        AnswerError
+            Names it, and the known one that it is nearest to.
+        """
+        for name in self.credit.mistakes:
+            if name not in known:
+                raise AnswerError(f"{place}credit.mistakes: no mistake {name[:80]!r}{_hint(name, sorted(known))}")
+
+
+def _one_line(error: ErrorDetails) -> str:
+    path = [str(part)[:80] for part in error["loc"] if part != "[key]"]
+    if error["type"] == "unexpected_keyword_argument":
+        known = [field.name for field in fields(Credit if path[:-1] == ["credit"] else Rubric)]
+        place = "".join(f"{part}: " for part in path[:-1])
+        return f"{place}unknown key {path[-1]!r}{_hint(path[-1], known)}"
+    expected = {"dataclass_type": "a table", "dict_type": "a table", "float_type": "a number"}.get(
+        error["type"], error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    )
+    return f"{'.'.join(path)}: found {_shown(error['input'])}; expected {expected}"
+
+
+def _hint(name: str, known: Collection[str]) -> str:
+    close = difflib.get_close_matches(name[:80], known, n=1) or [one for one in known if one.lower() == name.lower()]
+    return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
+
+
+def _shown(found: object) -> str:
+    text = repr(found)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,165 @@
+"""Which files of a folder are answer sheets, and whose."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dhkit.errors import AnswerError
+
+__all__ = ["SUFFIXES", "Sheet", "find_sheets"]
+
+SUFFIXES = frozenset((".toml", ".py", ".m", ".tex", ".ipynb"))
+DOCUMENTS = frozenset((".pdf", ".doc", ".docx", ".odt", ".rtf", ".zip", ".jpg", ".jpeg", ".png", ".heic"))
+"""What students hand in that cannot be judged, and must not be lost."""
+MAX_DEPTH = 8
+MAX_SHEETS = 10_000
+MAX_FILES = 200_000
+"""Entries of folders that are looked at: a student may hand in a whole disk."""
+ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
+ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
+PEEK = 1_000_000
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """An answer sheet.
+
+    Attributes
+    ----------
+    path
+        The file.
+    student
+        Whose it is: the name of the file, or of the folder of a student's own.
+    error
+        Why it is not to be judged; empty where it is.
+    """
+
+    path: Path
+    student: str = ""
+    error: str = ""
+
+
+def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[Sheet]:
+    """Return the sheets among files and folders, each once, in the order given and by name within a folder.
+
+    Files are taken as they are. Of folders, those files whose names end as sheets' do, in folders below as well;
+    hidden files and robot files are passed over. A link that leaves the folder is not followed, and becomes a sheet
+    with an error; a link to a folder within is passed over, since that folder is read anyway.
+
+    A sheet right in a folder is its file's name's, one further below that of the first folder below; a file given is
+    its own name's, and of several with one name (``*/answer.toml``) each its folder's. What a sheet says itself counts
+    for a single file alone: in a class anybody could sign as another.
+
+    Parameters
+    ----------
+    paths
+        Files and folders.
+    exclude
+        Files in them that are no sheets, such as the rubric.
+
+    Raises
+    ------
+    AnswerError
+        No such file; a folder without sheets, or with too many.
+    """
+    found: dict[Path, Sheet] = {}
+    stems = Counter(path.stem for path in paths)
+    passed_over = {path.resolve() for path in exclude}
+    for path in paths:
+        if not path.exists():
+            raise AnswerError(f"{path}: no such file; expected an answer sheet or a folder of them")
+        for sheet in _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]:
+            found.setdefault(sheet.path.absolute(), sheet)
+            if len(found) > MAX_SHEETS:
+                raise AnswerError(f"{path}: more than {MAX_SHEETS} answer sheets")
+    return list(found.values())
+
+
+def _is_document(sheet: Sheet) -> bool:
+    return sheet.path.suffix.lower() in DOCUMENTS
+
+
+def _student(path: Path, stems: Counter[str]) -> str:
+    if stems.total() == 1:
+        return ""
+    return path.absolute().parent.name if stems[path.stem] > 1 else path.stem
+
+
+def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
+    sheets = [sheet for sheet in _seen(root) if sheet.error or sheet.path.resolve() not in passed_over]
+    handed_in = {sheet.student for sheet in sheets if not _is_document(sheet)}
+    # A figure beside a sheet is no answer of its own.
+    sheets = [sheet for sheet in sheets if not _is_document(sheet) or sheet.student not in handed_in]
+    if all(map(_is_document, sheets)):
+        raise AnswerError(f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SUFFIXES))}")
+    return sheets
+
+
+def _seen(root: Path) -> Iterator[Sheet]:
+    inside = root.resolve()
+    for looked_at, path in enumerate(_walk(root, 0)):
+        if looked_at >= MAX_FILES:
+            raise AnswerError(f"{root}: more than {MAX_FILES} files; expected a folder of answer sheets")
+        parts = path.relative_to(root).parts
+        student = path.stem if len(parts) == 1 else parts[0]
+        if path.is_symlink() and (fault := _fault_of_link(path, inside)):
+            yield Sheet(path, student, fault)
+        elif path.is_dir():
+            if fault := _fault_of_folder(path, len(parts)):
+                yield Sheet(path, student, fault)
+        elif path.suffix.lower() in DOCUMENTS:
+            yield Sheet(path, student, f"a {path.suffix.lower()} file; expected {', '.join(sorted(SUFFIXES))}")
+        elif path.suffix.lower() in SUFFIXES and not _is_robot(path):
+            yield Sheet(path, student, "" if path.is_file() else "not a regular file")
+
+
+def _walk(folder: Path, depth: int) -> Iterator[Path]:
+    """Yield what is in a folder, sorted, and after each folder what is in it; follow no links."""
+    try:
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+    except OSError:
+        return
+    for entry in entries:
+        if entry.name.startswith("."):
+            continue
+        path = folder / entry.name
+        yield path
+        if entry.is_dir(follow_symlinks=False) and depth + 1 < MAX_DEPTH:
+            yield from _walk(path, depth + 1)
+
+
+def _fault_of_link(path: Path, inside: Path) -> str:
+    """Return what is wrong with a link; nothing where what it leads to would be no sheet, or is in the folder."""
+    try:
+        target = path.resolve(strict=True)
+    except (OSError, RuntimeError):
+        return "a link that leads nowhere" if path.suffix.lower() in SUFFIXES else ""
+    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in SUFFIXES):
+        return ""
+    return "a link out of the folder; it is not followed"
+
+
+def _fault_of_folder(path: Path, depth: int) -> str:
+    """Return why a folder is not looked into; nothing where it is, or where a link leads to it."""
+    if path.is_symlink():
+        return ""
+    if depth >= MAX_DEPTH:
+        return f"nested deeper than {MAX_DEPTH} folders; not looked into"
+    return "" if os.access(path, os.R_OK | os.X_OK) else "a folder that cannot be read"
+
+
+def _is_robot(path: Path) -> bool:
+    """Return whether a file is a robot's, which sheets beside it may name."""
+    if path.suffix.lower() != ".toml" or not path.is_file():
+        return False
+    try:
+        with path.open("rb") as file:
+            start = file.read(PEEK)
+    except OSError:
+        return False
+    return bool(ROBOT.search(start)) and not ANSWER.search(start)

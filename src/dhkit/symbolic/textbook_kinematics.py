@@ -1,0 +1,408 @@
+"""Forward kinematics and the Jacobian as a textbook derives them, exactly, with the places where students go wrong.
+
+Link transforms from the table's four elementary motions, their product from base to tool, and the Jacobian column by
+column from the joints' axes and the levers to the tool (Spong, Hutchinson & Vidyasagar, Robot Modeling and Control,
+2006, sections 3.2 and 4.6; Craig, Introduction to Robotics, 2005, section 3.4, for modified tables).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from dhkit.description import Body, Description, Placement
+from dhkit.expressions import ZERO, Expression, cos, exact_angle, sin
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm
+from dhkit.symbolic.exact.naming import Naming
+from dhkit.symbolic.mistakes import has
+from dhkit.symbolic.ring import Direction, Element, Elements, Ring, RingError
+
+__all__ = [
+    "JACOBIAN_MISTAKES",
+    "KINEMATIC_MISTAKES",
+    "LINK_MISTAKES",
+    "POSE_MISTAKES",
+    "TextbookKinematics",
+    "check_kinematic_mistake",
+    "derive_kinematics",
+    "with_massless_links",
+]
+
+LINK_MISTAKES: Mapping[str, str] = {
+    "a_d_exchanged": "a and d are exchanged: a is measured along the x axis, d along the z axis",
+    "a_forgotten": "the length a along the x axis is missing",
+    "d_forgotten": "the offset d along the z axis is missing",
+    "alpha_sign": "the twist alpha has the wrong sign: it turns from one z axis to the next about x, by the right hand",
+    "alpha_forgotten": "the twist alpha is missing: the next z axis is taken parallel to this one",
+    "alpha_sin_cos": "sine and cosine of alpha are exchanged",
+    "theta_offset_forgotten": "theta lacks its constant offset: at joint value 0 the x axes are not aligned",
+    "theta_offset_sign": "theta's constant offset has the wrong sign",
+    "theta_sign": "theta has the wrong sign: the joint turns the wrong way round",
+    "theta_sin_cos": "sine and cosine of theta are exchanged: the angle is measured from the y axis, 90 deg - theta",
+    "theta_quarter_more": "the zero pose is shifted: theta is 90 degrees too large",
+    "theta_quarter_less": "the zero pose is shifted: theta is 90 degrees too small",
+    "variable_forgotten": "the joint's variable is missing: the joint is taken for fixed",
+    "rotations_first": "both rotations come before both translations: a and d are measured along turned axes",
+    "translations_first": "both translations come before both rotations: a and d are measured along unturned axes",
+    "rotation_transposed": "the rotation inside A_i is transposed: it maps frame i - 1 to frame i",
+    "translations_unrotated": "translations are added up without turning them into the axes of the frames before",
+}
+"""Mistakes inside one A_i, or in multiplying by it: made at every link, or ``NAME@2`` at link 2 alone."""
+
+POSE_MISTAKES: Mapping[str, str] = {
+    "convention_exchanged": "the table's numbers are put into the A_i of the other convention (standard, modified)",
+    "product_reversed": "the product runs the wrong way: A_n ... A_1 in place of A_1 ... A_n",
+    "tool_forgotten": "the tool's transform is missing: the product ends at frame n",
+    "tool_inverted": "the tool's transform is inverted",
+    "base_forgotten": "the base's transform is missing: the product begins at frame 0",
+    "base_inverted": "the base's transform is inverted",
+    "pose_inverted": "the pose is inverted: it maps the world to the tool in place of the tool to the world",
+}
+"""Mistakes in the pose of the tool, and in what follows from it."""
+
+JACOBIAN_MISTAKES: Mapping[str, str] = {
+    "rows_exchanged": "angular rows stand above linear ones: here the linear velocity comes first",
+    "point_frame_n": "the linear velocity is that of frame n's origin in place of the tool's",
+    "point_frame_0": "the linear velocity is that of the point at frame 0's origin in place of the tool's",
+    "point_world": "the linear velocity is that of the point at the world's origin (the spatial Jacobian), "
+    "in place of the tool's",
+    "lever_not_subtracted": "the lever is the tool's position from frame 0: the joint's position is not subtracted",
+    "lever_own": "the lever is frame i's position from frame 0, in place of that from the joint to the tool",
+    "lever_neighbour": "the lever begins at the neighbouring frame: at p_i in place of p_(i-1) (modified: the reverse)",
+    "axis_neighbour": "the axis is that of the neighbouring frame: z_i in place of z_(i-1) (modified: the reverse)",
+    "axis_unturned": "every axis is taken as (0, 0, 1): the joints before do not turn it",
+    "cross_product_order": "the cross product is lever x axis in place of axis x lever: the linear rows change sign",
+    "prismatic_as_revolute": "a sliding joint's column is that of a turning one: it should be (axis; 0)",
+    "prismatic_angular": "a sliding joint turns the tool: the lower half of its column should be 0",
+    "revolute_as_prismatic": "a turning joint's column is that of a sliding one: it should be (axis x lever; axis)",
+    "axes_of_tool": "the Jacobian is in the tool's axes in place of the world's",
+    "axes_of_frame_0": "the Jacobian is in frame 0's axes in place of the world's",
+}
+"""Mistakes in the Jacobian alone."""
+
+KINEMATIC_MISTAKES: Mapping[str, str] = {**LINK_MISTAKES, **POSE_MISTAKES, **JACOBIAN_MISTAKES}
+"""Places where a derivation goes wrong, by stable names, each with what is then the case."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TextbookKinematics:
+    """A derivation of an arm's forward kinematics and Jacobian, step by step.
+
+    Attributes
+    ----------
+    arm
+        The description in the ring.
+    mistakes
+        What was done wrong.
+    """
+
+    arm: ExactArm
+    mistakes: frozenset[str] = field(default=frozenset())
+
+    def __repr__(self) -> str:
+        made = ", ".join(sorted(self.mistakes)) or "no mistakes"
+        return f"<TextbookKinematics of {self.arm.description.name}: {made}>"
+
+    @cached_property
+    def A(self) -> tuple[Elements, ...]:
+        """The link transforms A_1 ... A_n, each of shape (4, 4): frame i in frame i - 1, m."""
+        return tuple(self._link(i) for i in range(self.arm.n))
+
+    @cached_property
+    def frames(self) -> tuple[Elements, ...]:
+        """Frames 0 ... n in the world, each of shape (4, 4), m."""
+        order = range(self.arm.n - 1, -1, -1) if self._has("product_reversed") else range(self.arm.n)
+        frames = [self.base]
+        for i in order:
+            frames.append(_product(frames[-1], self.A[i], self._has("translations_unrotated", i)))
+        return tuple(frames)
+
+    @cached_property
+    def T(self) -> Elements:
+        """The tool in the world, shape (4, 4): base A_1 ... A_n tool, m."""
+        return _inverse(self._pose) if self._has("pose_inverted") else self._pose
+
+    @cached_property
+    def J(self) -> Elements:
+        """The Jacobian, shape (6, n): linear velocity of the tool's origin, then angular velocity, in world axes."""
+        columns = [self._column(i) for i in range(self.arm.n)]
+        linear, angular = (np.array([column[half] for column in columns], dtype=object).T for half in (0, 1))
+        if self._has("axes_of_tool"):
+            linear, angular = (self._pose[:3, :3].T @ rows for rows in (linear, angular))
+        if self._has("axes_of_frame_0"):
+            linear, angular = (self.base[:3, :3].T @ rows for rows in (linear, angular))
+        halves = (angular, linear) if self._has("rows_exchanged") else (linear, angular)
+        return np.concatenate(halves)
+
+    @cached_property
+    def base(self) -> Elements:
+        """Frame 0 in the world."""
+        if self._has("base_forgotten"):
+            return _identity(self.arm.ring)
+        base = _placement(self.arm, self.arm.description.base.placement)
+        return _inverse(base) if self._has("base_inverted") else base
+
+    @cached_property
+    def tool(self) -> Elements:
+        """The tool in frame n."""
+        if self._has("tool_forgotten"):
+            return _identity(self.arm.ring)
+        tool = _placement(self.arm, self.arm.description.tool.placement)
+        return _inverse(tool) if self._has("tool_inverted") else tool
+
+    @cached_property
+    def _pose(self) -> Elements:
+        return _product(self.frames[-1], self.tool, self._has("translations_unrotated"))
+
+    @property
+    def _standard(self) -> bool:
+        """Whether the table is read as a distal one."""
+        return self.arm.is_standard != self._has("convention_exchanged")
+
+    def _has(self, mistake: str, i: int | None = None) -> bool:
+        return has(self.mistakes, mistake, i)
+
+    def _link(self, i: int) -> Elements:
+        """Return A_i, i from 0: the four elementary motions in their order."""
+        ring, row = self.arm.ring, self._lengths(i, self._angles(i, self.arm.rows[i]))
+        Rz, Rx = _turn(ring, 0, 1, row.theta), _turn(ring, 1, 2, row.alpha)
+        Tz, Tx = _shift(ring, 2, row.d), _shift(ring, 0, row.a)
+        turned = Rz @ Rx if self._standard else Rx @ Rz
+        if self._has("rotations_first", i):
+            A = turned @ Tx @ Tz
+        elif self._has("translations_first", i):
+            A = Tx @ Tz @ turned
+        else:
+            A = Rz @ Tz @ Tx @ Rx if self._standard else Rx @ Tx @ Rz @ Tz
+        if self._has("rotation_transposed", i):
+            A[:3, :3] = A[:3, :3].T.copy()
+        return A
+
+    def _lengths(self, i: int, row: ExactRow) -> ExactRow:
+        """Put the mistakes in that concern a and d."""
+        ring, (a, d) = self.arm.ring, (row.a, row.d)
+        if ring.kinds[i] != "R" and self._has("variable_forgotten", i):
+            d = d - ring.position(i)
+        if self._has("a_forgotten", i):
+            a = ring.zero
+        if self._has("d_forgotten", i):
+            d = ring.zero if ring.kinds[i] == "R" else ring.position(i)
+        return replace(row, a=d, d=a) if self._has("a_d_exchanged", i) else replace(row, a=a, d=d)
+
+    def _angles(self, i: int, row: ExactRow) -> ExactRow:
+        """Put the mistakes in that concern theta and alpha."""
+        ring = self.arm.ring
+        (ca, sa), theta = row.alpha, row.theta
+        if self._has("alpha_forgotten", i):
+            ca, sa = ring.one, ring.zero
+        if self._has("alpha_sign", i):
+            sa = -sa
+        if self._has("alpha_sin_cos", i):
+            ca, sa = sa, ca
+        variable = (ring.cosine(i), ring.sine(i)) if ring.kinds[i] == "R" else (ring.one, ring.zero)
+        offset = _sum(theta, _negative(variable))
+        if self._has("theta_offset_forgotten", i):
+            theta = variable
+        if self._has("theta_offset_sign", i):
+            theta = _sum(variable, _negative(offset))
+        if self._has("variable_forgotten", i):
+            theta = offset
+        if self._has("theta_sign", i):
+            theta = _negative(theta)
+        if self._has("theta_quarter_more", i):
+            theta = -theta[1], theta[0]
+        if self._has("theta_quarter_less", i):
+            theta = theta[1], -theta[0]
+        if self._has("theta_sin_cos", i):
+            theta = theta[1], theta[0]
+        return replace(row, alpha=(ca, sa), theta=theta)
+
+    def _column(self, i: int) -> tuple[Elements, Elements]:
+        """Return the linear and the angular half of column i, from 0."""
+        ring, axis = self.arm.ring, self._axis(i)
+        nothing = np.array([ring.zero] * 3, dtype=object)
+        turning = _cross(axis, self._lever(i))
+        if self._has("cross_product_order"):
+            turning = -turning
+        slides = ring.kinds[i] != "R"
+        if slides and not self._has("prismatic_as_revolute"):
+            return axis, axis if self._has("prismatic_angular") else nothing
+        if not slides and self._has("revolute_as_prismatic"):
+            return axis, nothing
+        return turning, axis
+
+    def _axis(self, i: int) -> Elements:
+        """Return the direction of joint i's axis in the world, shape (3,)."""
+        if self._has("axis_unturned"):
+            return _identity(self.arm.ring)[:3, 2]
+        own, neighbour = (i, i + 1) if self._standard else (i + 1, i)
+        return self.frames[neighbour if self._has("axis_neighbour") else own][:3, 2]
+
+    def _lever(self, i: int) -> Elements:
+        """Return the vector from joint i to the point whose velocity is meant, in world axes, shape (3,)."""
+        places = [frame[:3, 3] for frame in self.frames]
+        own, neighbour = (i, i + 1) if self._standard else (i + 1, i)
+        if self._has("lever_own"):
+            return places[i + 1] - places[0]
+        point = self._pose[:3, 3]
+        if self._has("point_frame_n"):
+            point = places[-1]
+        if self._has("point_frame_0"):
+            point = places[0]
+        if self._has("point_world"):
+            point = point - point
+        if self._has("lever_not_subtracted"):
+            return point - places[0]
+        return point - places[neighbour if self._has("lever_neighbour") else own]
+
+
+def derive_kinematics(
+    description: Description, mistakes: Iterable[str] = frozenset(), symbols: Symbols = "file"
+) -> TextbookKinematics:
+    """Derive an arm's link transforms, the pose of its tool and its Jacobian as a textbook does.
+
+    The ring is that of the dynamics, :func:`dhkit.symbolic.exact_arm` of ``description`` and ``symbols``, unless the
+    tool's angles need constants that it has not.
+
+    Parameters
+    ----------
+    description
+        The robot; links may lack bodies.
+    mistakes
+        Names of :data:`KINEMATIC_MISTAKES`, those of :data:`LINK_MISTAKES` made at every link or, as ``NAME@2``, at
+        link 2 alone.
+    symbols
+        See :func:`dhkit.symbolic.exact_arm`.
+
+    Raises
+    ------
+    ValueError
+        No such mistake, no such link, or a mistake that is made at no single link.
+    TypeError
+        Mistakes that are no names.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> print(derive_kinematics(arm).T[0, 3])
+    l1*c1 + l2*(c1*c2 - s1*s2)
+    >>> print(derive_kinematics(arm, {"translations_unrotated"}).T[0, 3])
+    l1*c1 + l2*c2
+    """
+    if isinstance(mistakes, str):
+        raise TypeError(f"mistakes is {mistakes!r}; expected a set of names, as in {{{mistakes!r}}}")
+    made = frozenset(mistakes)
+    for mistake in made:
+        check_kinematic_mistake(mistake, description.n)
+    return TextbookKinematics(_arm_with_tool(with_massless_links(description), symbols), made)
+
+
+def with_massless_links(description: Description) -> Description:
+    """Return a description whose links all have bodies: massless ones where there were none; itself where none was.
+
+    Kinematics need no bodies, and the exact arm, which is the dynamics' as well, needs all of them.
+    """
+    if all(joint.body is not None for joint in description.joints):
+        return description
+    massless = Body(ZERO)
+    joints = tuple(joint if joint.body is not None else replace(joint, body=massless) for joint in description.joints)
+    return replace(description, joints=joints)
+
+
+def check_kinematic_mistake(mistake: object, n: int) -> None:
+    """Refuse what is no mistake of :data:`KINEMATIC_MISTAKES`, or made at no link of an arm of n joints.
+
+    Raises
+    ------
+    TypeError
+        Not a name.
+    ValueError
+        No such mistake, no such link, or a link given for a mistake that concerns the whole arm.
+    """
+    if not isinstance(mistake, str):
+        raise TypeError(f"mistake {mistake!r}: expected a name")
+    name, at, link = mistake.partition("@")
+    if name not in KINEMATIC_MISTAKES:
+        raise ValueError(f"no mistake {name!r}; expected one of {', '.join(KINEMATIC_MISTAKES)}")
+    if at and name not in LINK_MISTAKES:
+        raise ValueError(f"mistake {mistake!r}: {name} concerns the whole arm, no single link")
+    if at and (not link.isdecimal() or not 1 <= int(link) <= n):
+        raise ValueError(f"mistake {mistake!r}: no link {link!r}; expected 1 to {n}")
+
+
+def _arm_with_tool(description: Description, symbols: Symbols) -> ExactArm:
+    """Return the exact arm, its ring with the constants of the tool's angles where it lacks them."""
+    arm = exact_arm(description, symbols)
+    try:
+        _placement(arm, description.tool.placement)
+    except RingError:
+        angles = _known_angles(arm, description.tool.placement)
+        return exact_arm(description, symbols, tuple(function(x) for x in angles for function in (cos, sin)))
+    return arm
+
+
+def _known_angles(arm: ExactArm, placement: Placement) -> list[Expression]:
+    """Return roll, pitch and yaw in the symbols that the arm keeps."""
+    naming = Naming(arm.description, arm.symbols)
+    return [exact_angle(naming.known(x)) for x in placement.rpy]
+
+
+def _placement(arm: ExactArm, placement: Placement) -> Elements:
+    """Return a placement's matrix, shape (4, 4): Rz(yaw) Ry(pitch) Rx(roll), then the origin."""
+    ring, naming = arm.ring, Naming(arm.description, arm.symbols)
+    roll, pitch, yaw = (ring.direction(angle) for angle in _known_angles(arm, placement))
+    T: Elements = _turn(ring, 0, 1, yaw) @ _turn(ring, 2, 0, pitch) @ _turn(ring, 1, 2, roll)
+    T[:3, 3] = [ring.read(naming.known(x)) for x in placement.xyz]
+    return T
+
+
+def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
+    """Return the product of two transforms, or that with the second's translation left unturned."""
+    product: Elements = first @ second
+    if unrotated:
+        product[:3, 3] = first[:3, 3] + second[:3, 3]
+    return product
+
+
+def _inverse(T: Elements) -> Elements:
+    """Return the inverse of a rigid transform, shape (4, 4)."""
+    inverse = T.copy()
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -(T[:3, :3].T @ T[:3, 3])
+    return inverse
+
+
+def _identity(ring: Ring) -> Elements:
+    return np.array([[ring.one if i == j else ring.zero for j in range(4)] for i in range(4)], dtype=object)
+
+
+def _turn(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
+    """Return the rotation by an angle from one axis to another, shape (4, 4)."""
+    T, (c, s) = _identity(ring), direction
+    T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
+    return T
+
+
+def _shift(ring: Ring, axis: int, length: Element) -> Elements:
+    """Return the translation along an axis, shape (4, 4)."""
+    T = _identity(ring)
+    T[axis, 3] = length
+    return T
+
+
+def _cross(a: Elements, b: Elements) -> Elements:
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
+
+
+def _sum(first: Direction, second: Direction) -> Direction:
+    """Return cosine and sine of the sum of two angles."""
+    (c, s), (x, y) = first, second
+    return c * x - s * y, s * x + c * y
+
+
+def _negative(direction: Direction) -> Direction:
+    return direction[0], -direction[1]

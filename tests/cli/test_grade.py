@@ -1,0 +1,193 @@
+"""`dhkit grade`: what it prints and writes, with a judge that knows what it is to say."""
+
+import csv
+import json
+import re
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+
+from dhkit.cli import grade
+from dhkit.errors import AnswerError
+from dhkit.grading.report import Entry, GradeReport, Verdict
+from dhkit.grading.rubric import Credit, Rubric
+from grading.judged import REPORT
+
+RIGHT = GradeReport("planar2r", "abc123", "0.1.0", (Entry("V", (), Verdict.CORRECT, "m1*g*y"),))
+
+
+def judge(path):
+    """Judge a sheet by what it holds."""
+    text = path.read_text()
+    if text == "broken":
+        raise AnswerError(f"{path}: no TOML: line 1")
+    return RIGHT if text == "right" else replace(REPORT, sheet=None, student="")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A class of three in a folder, which is the one we are in."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in {"ada": "wrong", "bob": "right", "cleo": "broken"}.items():
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "answer.toml").write_text(text)
+    return tmp_path / "class"
+
+
+@pytest.fixture
+def dhkit(capsys):
+    """Grade; return the status, stdout and stderr."""
+
+    def run(*sheets, rubric=None, **options):
+        status = grade.run(sheets, judge=judge, rubric=rubric or Rubric(), **options)
+        return status, *capsys.readouterr()
+
+    return run
+
+
+def test_one_sheet(dhkit, folder):
+    status, out, err = dhkit(folder / "ada" / "answer.toml")
+    assert (status, err) == (1, "")
+    assert "wrong (62.5 of 100 points)" in out
+    assert "g1: gravity has the wrong sign" in out
+
+
+def test_the_status_says_the_worst(dhkit, folder):
+    assert dhkit(folder / "bob" / "answer.toml")[0] == 0
+    assert dhkit(folder / "ada" / "answer.toml", folder / "bob" / "answer.toml")[0] == 1
+    assert dhkit(folder)[0] == 2
+
+
+def test_a_sheet_that_cannot_be_read_is_a_line_on_stderr(dhkit, folder):
+    path = folder / "cleo" / "answer.toml"
+    assert dhkit(path) == (2, "", f"dhkit: {path}: no TOML: line 1\n")
+
+
+def test_json_is_an_object_a_line(dhkit, folder):
+    status, out, _ = dhkit(folder, json=True)
+    ada, bob, cleo = map(json.loads, out.splitlines())
+    assert status == 2
+    assert [one["student"] for one in (ada, bob, cleo)] == ["ada", "bob", "cleo"]
+    assert [one["verdict"] for one in (ada, bob, cleo)] == ["wrong", "correct", "unreadable"]
+    assert ada["sheet"] == str(folder / "ada" / "answer.toml")
+    assert (ada["points"], bob["points"], cleo["points"]) == (62.5, 100, 0)
+    assert cleo["error"].endswith("no TOML: line 1")
+
+
+def test_a_class_is_a_table_and_its_mistakes(dhkit, folder):
+    _, out, err = dhkit(folder, jobs=2)
+    assert err == ""
+    assert re.search(r"^ada +wrong +62\.5 of 100 +\S*answer\.toml", out, re.MULTILINE)
+    assert re.search(r"^gravity_sign +1", out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("form", "sign"), [("text", "wrong (62.5"), ("json", '"verdict"'), ("junit", "<testsuites"), ("html", "<math")]
+)
+def test_formats(dhkit, folder, tmp_path, form, sign):
+    path = folder / "ada" / "answer.toml"
+    assert sign in dhkit(path, form=form)[1]
+    dhkit(path, form=form, output=tmp_path / "report")
+    assert sign in (tmp_path / "report").read_text("utf-8")
+
+
+def test_gradescope(dhkit, folder, tmp_path):
+    dhkit(folder / "ada" / "answer.toml", form="gradescope", output=tmp_path / "results.json")
+    assert json.loads((tmp_path / "results.json").read_text())["score"] == 62.5
+    with pytest.raises(AnswerError, match="several sheets; expected one"):
+        dhkit(folder, form="gradescope")
+
+
+def test_several_sheets_in_a_file(dhkit, folder, tmp_path):
+    dhkit(folder, form="junit", output=tmp_path / "class.xml")
+    assert len(ET.parse(tmp_path / "class.xml").getroot()) == 3
+    dhkit(folder, form="html", output=tmp_path / "class.html")
+    assert 'href="#sheet-3"' in (tmp_path / "class.html").read_text("utf-8")
+
+
+def test_an_output_folder(dhkit, folder, tmp_path):
+    out = tmp_path / "out"
+    status, printed, _ = dhkit(folder, output=out, feedback="hint")
+    assert status == 2
+    assert printed.endswith(f"wrote {out}\n")
+    rows = list(csv.DictReader((out / "marks.csv").read_text("utf-8").splitlines()))
+    assert [(row["student"], row["points"]) for row in rows] == [("ada", "62.5"), ("bob", "100"), ("cleo", "0")]
+    student, teacher = (out / "students" / "ada.html").read_text("utf-8"), (out / "class.html").read_text("utf-8")
+    assert "look at the sign of V" in student
+    assert "wrong sign" not in student
+    assert "wrong sign" in teacher
+    assert sorted(path.name for path in (out / "records").iterdir()) == ["ada.json", "bob.json", "cleo.json"]
+
+
+def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
+    dhkit(folder, output=tmp_path / "out", feedback="verdict")
+    kinder = Rubric(points=10, credit=Credit(mistakes={"gravity_sign": 1}, follow_on=1))
+    assert grade.remark([tmp_path / "out"], kinder, json=True) == 2
+    ada, bob, cleo = map(json.loads, capsys.readouterr().out.splitlines())
+    assert (ada["points"], bob["points"], cleo["points"]) == (10, 10, 0)
+    assert ada["verdict"] == "wrong"
+
+
+def test_marking_again_needs_reports(tmp_path):
+    with pytest.raises(AnswerError, match="no reports"):
+        grade.remark([tmp_path], Rubric())
+
+
+def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
+    """Students whose names are paths, hidden, long or alike get files of their own, in the folder."""
+    monkeypatch.setattr(
+        sys.modules[__name__], "judge", lambda path: replace(RIGHT, student=path.read_text(encoding="utf-8"))
+    )
+    names = ["../../up", "..", "", "Ada", "ada", "x" * 300, "a/b\n", "Zoë", "con\x1b[31m"]
+    for k, name in enumerate(names):
+        (tmp_path / f"{k}.toml").write_text(name, encoding="utf-8")
+    dhkit(*(tmp_path / f"{k}.toml" for k in range(len(names))), output=tmp_path / "out")
+    written = list((tmp_path / "out" / "students").iterdir())
+    assert len({path.name.casefold() for path in written}) == len(names)
+    assert all(re.fullmatch(r"\w[\w.-]*\.html", path.name) and len(path.name) < 100 for path in written)
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"form": "pdf"}, "--format: found 'pdf'; expected text, json, gradescope, junit, html"),
+        ({"feedback": "some"}, "--feedback: found 'some'; expected full, hint, verdict"),
+        ({"output": "ada.toml"}, "would overwrite an answer sheet"),
+        ({"output": "none/report", "form": "html"}, "none: no such folder"),
+        ({"output": "marks.csv"}, "expected a folder for the reports of several sheets"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_before_anything_is_judged(dhkit, folder, options, complaint):
+    if "output" in options:
+        options = options | {"output": folder.parent / options["output"]}
+    with pytest.raises(AnswerError, match=re.escape(complaint)):
+        dhkit(folder, **options)
+
+
+def test_the_bar_starts_no_thread(monkeypatch):
+    """Sheets' processes are forked while it is shown."""
+    import threading
+
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    before = threading.active_count()
+    with grade._progress(3) as progress:
+        progress(1, 3)
+        assert threading.active_count() == before
+
+
+def test_a_sheet_alone_may_bring_its_rubric(tmp_path, capsys):
+    path = tmp_path / "answer.toml"
+    path.write_text(
+        'robot = "planar2r"\n[rubric]\npoints = 7\n[answer]\nV = "m1*g*l1*s1/2 + m2*g*(l1*s1 + l2*s12/2)"\n'
+    )
+    assert grade.grade_files([path], None, None) == 0
+    assert "7 of 7 points" in capsys.readouterr().out
+    (tmp_path / "other.toml").write_text("points = 9\n")
+    assert grade.grade_files([path], None, tmp_path / "other.toml") == 0
+    assert "9 of 9 points" in capsys.readouterr().out
+    (tmp_path / "class").mkdir()
+    path.rename(tmp_path / "class" / "ada.toml")
+    assert grade.grade_files([tmp_path / "class"], None, None) == 0
+    assert "100 of 100" in capsys.readouterr().out

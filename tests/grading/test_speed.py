@@ -1,0 +1,85 @@
+"""How long judging takes, once everything is imported: figures that `make accept` holds to their limits."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from dhkit.description import library_robot
+from dhkit.grading import grade_answers
+from dhkit.grading.judging import truth as truths
+from dhkit.grading.judging.truth import truth_of
+from dhkit.grading.mistakes.diagnosis import variants_of
+from dhkit.symbolic.textbook import _motion, _places, derive
+from grading_answers import SHEETS, written
+
+DYNAMICS = ("M", "C", "g", "tau")
+
+
+def forget():
+    for cache in (truths.truth_of, variants_of, _motion, _places):
+        cache.cache_clear()
+
+
+def timed(description, answers):
+    begin = time.perf_counter()
+    report = grade_answers(description, answers)
+    return time.perf_counter() - begin, report
+
+
+def with_mistakes(description, quantities, mistakes):
+    truth = truth_of(description)
+    wrong = derive(description, mistakes)
+    found = {}
+    for quantity in quantities:
+        value = 2 * truth.lagrangian.C if quantity == "C" else getattr(wrong, quantity)
+        found[quantity] = written(value, truth.arm(quantity))
+    return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _started():
+    grade_answers(library_robot("polar_rp"), {"g": ["0.3333*q2", "sqrt(q2)"]})
+
+
+def test_a_right_entry(law):
+    description = library_robot("planar2r")
+    truth = truth_of(description)
+    answers = {quantity: written(truth.of(quantity), truth.arm(quantity)) for quantity in ("M", "g", "tau")}
+    seconds, report = min((timed(description, answers) for _ in range(5)), key=lambda pair: pair[0])
+    law.takes("a verdict, ms an entry", 1e3 * seconds / len(report.entries), 20)
+
+
+@pytest.mark.parametrize(
+    ("robot", "quantities", "mistakes", "first", "then"),
+    [
+        ("planar2r", DYNAMICS, {"half_forgotten@2", "gravity_sign"}, 1.0, 0.1),
+        ("planar3r", DYNAMICS, {"inertia_forgotten@2", "height_at_joint@3"}, 5.0, 5.0),
+        ("puma560", ("M",), {"inertia_forgotten@3"}, 30.0, 30.0),
+    ],
+)
+def test_a_sheet_with_its_full_diagnosis(robot, quantities, mistakes, first, then, law):
+    description = library_robot(robot)
+    answers = with_mistakes(description, quantities, mistakes)
+    forget()
+    seconds, report = timed(description, answers)
+    law.takes(f"{robot}, {', '.join(quantities)}, first, s", seconds, first)
+    assert report.verdict.value == "wrong" and all(found.mistake for found in report.diagnosis)
+    seconds = min(timed(description, answers)[0] for _ in range(3))
+    law.takes(f"{robot}, {', '.join(quantities)}, variants known, s", seconds, then)
+
+
+def test_a_thousand_sheets(law, tmp_path):
+    """Of planar2r, right and wrong, by two processes."""
+    sheets = sorted((SHEETS / "planar2r").glob("*.toml"))
+    count = law.samples(1000)
+    for k in range(count):
+        (tmp_path / f"s{k:04}.toml").write_text(sheets[k % len(sheets)].read_text())
+    begin = time.perf_counter()
+    run = "from dhkit.cli import main; main()"
+    command = [sys.executable, "-c", run, "grade", str(tmp_path), "--jobs", "2", "-o", str(tmp_path / "out")]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    law.takes("1,000 planar2r sheets by two jobs, s", (time.perf_counter() - begin) * 1000 / count, 300)
+    assert result.returncode in (1, 2), result.stderr
+    assert len((tmp_path / "out" / "marks.csv").read_text().splitlines()) >= count + 1
