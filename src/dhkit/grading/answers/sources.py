@@ -15,6 +15,8 @@ from dhkit.grading.answers.vocabulary import plain_name
 
 __all__ = ["LANGUAGES", "read_source"]
 
+MAX_CHARACTERS = 1_000_000
+"""A notebook may be longer: its figures do not count."""
 MAX_STATEMENTS = 5_000
 ENTRY = re.compile(r"([A-Za-z]+?\d*)(?:_?(\d)_?(\d)|_?(\d))", re.ASCII)
 INDEXED = re.compile(
@@ -57,6 +59,8 @@ def read_source(path: Path, n: int) -> AnswerSheet:
     suffix = path.suffix.lower()
     if suffix == ".ipynb":
         text, suffix = _notebook(text, path)
+    if len(text) > MAX_CHARACTERS:
+        raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
     statements = list(_assignments(text, suffix))
     if len(statements) > MAX_STATEMENTS:
         raise AnswerError(f"{path}: more than {MAX_STATEMENTS} assignments")
@@ -217,21 +221,22 @@ def _matlab(text: str) -> Iterator[tuple[int, str]]:
 def _latex(text: str) -> Iterator[tuple[int, str]]:
     r"""Yield equations: parts of displays, at \\ and at blank lines, outside matrices."""
     text = re.sub(r"(?<!\\)%.*", "", text)
-    matrix, line, statement = 0, 1, ""
+    matrix, line = 0, 1
+    statement: list[str] = []
     pieces = re.split(
         r"(\\begin\{\w*matrix\}|\\end\{\w*matrix\}|\\\\|\\(?:begin|end)\{\w+\*?\}|\$\$?|\\[\[\]()]|\n\s*\n)", text
     )
     for piece in pieces:
         if re.fullmatch(r"\\(?:begin|end)\{\w*matrix\}", piece):
             matrix += 1 if piece.startswith("\\begin") else -1
-            statement += piece
+            statement.append(piece)
         elif matrix or not re.fullmatch(r"\\\\|\\(?:begin|end)\{\w+\*?\}|\$\$?|\\[\[\]()]|\n\s*\n", piece):
-            statement += piece if matrix else piece.replace("&", " ")
+            statement.append(piece if matrix else piece.replace("&", " "))
         else:
-            yield line, statement.strip().rstrip(".,")
-            statement = ""
+            yield line, "".join(statement).strip().rstrip(".,")
+            statement = []
         line += piece.count("\n")
-    yield line, statement.strip().rstrip(".,")
+    yield line, "".join(statement).strip().rstrip(".,")
 
 
 LANGUAGES: Mapping[str, Callable[[str], Iterator[tuple[int, str]]]] = {".py": _python, ".m": _matlab, ".tex": _latex}
