@@ -184,7 +184,8 @@ def test_what_is_no_pose_is_said_and_disturbs_no_other():
     assert found.status.tolist() == ["not_a_pose"] * 5 + ["ok", "ok"]
     assert np.isnan(found.q[:5]).all() and np.isnan(found.distance[:5]).all()
     assert np.allclose(found.q[5:], expected.q[5:], rtol=0, atol=1e-6)
-    assert np.array_equal(found.q[6], expected.q[6])
+    # Not to the bit: a block's last items may be compiled for fewer lanes, with other products fused into sums.
+    assert np.allclose(found.q[6], expected.q[6], rtol=0, atol=1e-13)
     far = T.copy()
     far[:, :3, 3] = 1e300
     assert (solve_numerically(arm, far, restarts=1).status == "out_of_reach").all()
