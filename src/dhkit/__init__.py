@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from dhkit.dynamics import Friction
     from dhkit.grading import GradeReport, grade
     from dhkit.kinematics import IKFlag, IKSolutions, IKStatus
+    from dhkit.trajectories import Limits, Trajectory
     from dhkit.viewer import plot
 
 __version__ = "0.1.0"
@@ -37,8 +38,10 @@ __all__ = [
     "IKFlag",
     "IKSolutions",
     "IKStatus",
+    "Limits",
     "ModelError",
     "PlanningError",
+    "Trajectory",
     "UnreachableError",
     "__version__",
     "grade",
@@ -56,6 +59,8 @@ _HOMES = {
     "IKFlag": "dhkit.kinematics",
     "IKSolutions": "dhkit.kinematics",
     "IKStatus": "dhkit.kinematics",
+    "Limits": "dhkit.trajectories",
+    "Trajectory": "dhkit.trajectories",
     "grade": "dhkit.grading",
     "plot": "dhkit.viewer",
     "pose": "dhkit.description",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
+    from dhkit.trajectories import Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
 
@@ -324,6 +326,104 @@ class Arm:
         from dhkit.symbolic import CasadiFunctions
 
         return CasadiFunctions(self._description)
+
+    # Motions
+
+    def cubic(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        duration: float | None = None,
+        qd0: ArrayLike | None = None,
+        qd1: ArrayLike | None = None,
+        limits: Limits | None = None,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the cubic motion between two configurations; see :func:`dhkit.trajectories.cubic`."""
+        from dhkit.trajectories import cubic
+
+        return cubic(self._description, q0, q1, duration, qd0, qd1, limits, torques)
+
+    def quintic(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        duration: float | None = None,
+        qd0: ArrayLike | None = None,
+        qd1: ArrayLike | None = None,
+        qdd0: ArrayLike | None = None,
+        qdd1: ArrayLike | None = None,
+        limits: Limits | None = None,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the quintic motion between two configurations; see :func:`dhkit.trajectories.quintic`."""
+        from dhkit.trajectories import quintic
+
+        return quintic(self._description, q0, q1, duration, qd0, qd1, qdd0, qdd1, limits, torques)
+
+    def trapezoidal(
+        self,
+        q0: ArrayLike,
+        q1: ArrayLike,
+        duration: float | None = None,
+        blend: float | None = None,
+        limits: Limits | None = None,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the motion of trapezoidal velocity; see :func:`dhkit.trajectories.trapezoidal`.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> arm.trapezoidal([0, 0], [0.6, 0.3], duration=2.0, blend=0.25).qd(1.0)
+        array([0.4, 0.2])
+        """
+        from dhkit.trajectories import trapezoidal
+
+        return trapezoidal(self._description, q0, q1, duration, blend, limits, torques)
+
+    def spline(
+        self,
+        points: ArrayLike,
+        times: ArrayLike | None = None,
+        limits: Limits | None = None,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the cubic spline through configurations (m, n); see :func:`dhkit.trajectories.spline`."""
+        from dhkit.trajectories import spline
+
+        return spline(self._description, points, times, limits, torques)
+
+    def straight_line(
+        self,
+        T0: ArrayLike,
+        T1: ArrayLike,
+        q0: ArrayLike | None = None,
+        duration: float | None = None,
+        limits: Limits | None = None,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the motion of the tool straight between two poses; see :func:`dhkit.trajectories.straight_line`."""
+        from dhkit.trajectories import straight_line
+
+        return straight_line(self._description, T0, T1, q0, duration, limits, torques)
+
+    def circle(
+        self,
+        T0: ArrayLike,
+        centre: ArrayLike,
+        axis: ArrayLike,
+        angle: float = 2 * math.pi,
+        q0: ArrayLike | None = None,
+        duration: float | None = None,
+        limits: Limits | None = None,
+        turning: bool = False,
+        torques: Torques | None = None,
+    ) -> Trajectory:
+        """Return the motion of the tool along a circle or an arc; see :func:`dhkit.trajectories.circle`."""
+        from dhkit.trajectories import circle
+
+        return circle(self._description, T0, centre, axis, angle, q0, duration, limits, turning, torques)
 
     # Equations
 

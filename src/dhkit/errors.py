@@ -29,12 +29,12 @@ class ModelError(DhkitError):
     """A URDF, a mesh or a Pinocchio model that cannot be read or built."""
 
 
-class UnreachableError(DhkitError):
-    """A pose that the arm cannot reach, where one was required."""
-
-
 class PlanningError(DhkitError):
     """A trajectory that is infeasible or did not converge: names the constraint."""
+
+
+class UnreachableError(PlanningError):
+    """A pose that the arm cannot reach, where one was required."""
 
 
 class AnswerError(DhkitError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -78,6 +79,20 @@ class Description:
     def reach(self) -> float:
         """An upper bound of the distance from frame 0 to frame n: the sum of abs(a) + abs(d) + stroke, m."""
         return self.numbers.reach
+
+    @cached_property
+    def digest(self) -> str:
+        """What two descriptions of one robot have in common, in twelve characters: of its file's text.
+
+        Examples
+        --------
+        >>> from dhkit.description.library import library_robot
+        >>> len(library_robot("puma560").digest)
+        12
+        """
+        from dhkit.description.toml_writer import to_toml
+
+        return hashlib.sha256(to_toml(self).encode()).hexdigest()[:12]
 
     # Whatever is made once for a robot is found by its hash, on every call: it is worked out once.
     def __hash__(self) -> int:

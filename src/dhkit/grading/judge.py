@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
 import time
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.description import Description, to_toml
+from dhkit.description import Description
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.grading.answers.given import Given, given_branches, given_quantity, given_rows, vocabulary_of
 from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names
@@ -29,7 +28,7 @@ from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import latex_text
 from dhkit.symbolic.ring import RingError
 
-__all__ = ["LONGEST_LATEX", "judge", "robot_digest"]
+__all__ = ["LONGEST_LATEX", "judge"]
 
 LONGEST_LATEX = 200
 """Terms of an answer that is typeset in reports."""
@@ -79,7 +78,7 @@ def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> Grad
         notes += other.notes
     return GradeReport(
         description.name,
-        robot_digest(description),
+        description.digest,
         _version(),
         tuple(entries),
         tuple(diagnosis),
@@ -100,11 +99,6 @@ def _explained(
         return follows, parts.notes(), explain(truth, parts.judged, digits), []
     except RingError as error:
         return {}, [], [], [f"not explained, since an answer is too long: {error}"[:200]]
-
-
-def robot_digest(description: Description) -> str:
-    """Return what two descriptions of one robot have in common, in twelve characters."""
-    return hashlib.sha256(to_toml(description).encode()).hexdigest()[:12]
 
 
 def _version() -> str:

@@ -12,7 +12,7 @@ from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import AnswerSheet, quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sources import LANGUAGES, read_source
-from dhkit.grading.judge import judge, robot_digest
+from dhkit.grading.judge import judge
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.report import GradeReport
@@ -144,7 +144,7 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         if report.robot not in robots():
             return
         description = library_robot(report.robot)
-    if description.n > MOST_JOINTS or report.digest != robot_digest(description):
+    if description.n > MOST_JOINTS or report.digest != description.digest:
         return
     for quantity in report.quantities:
         if quantity in quantity_names(description.n):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["frame_space", "plot", "plot_arm", "plot_motion", "skeleton", "space"]
+__all__ = ["draw_path", "frame_space", "plot", "plot_arm", "plot_motion", "skeleton", "space"]
 
 AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
 """x, y and z, as in the viewer."""
@@ -125,7 +125,7 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
         _draw_curves(axes, description, times, q, chosen, unit)
         axes.set_ylabel(label)
     axes.set_xlabel("time [s]")
-    _draw_path(space(figure, grid[:, 1]), description, q)
+    draw_path(space(figure, grid[:, 1]), description, q)
     return figure
 
 
@@ -139,7 +139,8 @@ def _draw_curves(axes: Axes, description: Description, times: Array, q: Array, c
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
 
 
-def _draw_path(axes: Any, description: Description, q: Array) -> None:
+def draw_path(axes: Any, description: Description, q: Array) -> None:
+    """Draw the tool's path over q, shape (N, n), and the arm where it begins and ends."""
     path = world_to_tool(description, q)[:, :3, 3]
     lines = []
     for state, color, label in ((q[0], "#a9b1bf", "start"), (q[-1], LINK_COLOR, "end")):

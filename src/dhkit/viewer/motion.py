@@ -9,7 +9,7 @@ from dhkit.description import Description
 from dhkit.description.frames import joint_array
 from dhkit.description.numbers import Array
 
-__all__ = ["check_motion", "sampled"]
+__all__ = ["check_motion", "frame_times", "sampled"]
 
 RATE = 60.0
 """Frames a second: what a screen shows."""
@@ -51,10 +51,14 @@ def sampled(times: Array, q: Array) -> tuple[Array, Array]:
     times, q
         Shapes (N,), s, increasing, and (N, n), rad and m.
     """
-    duration = times[-1] - times[0]
-    count = int(np.clip(np.ceil(RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES))
-    grid = np.linspace(times[0], times[-1], count)
-    return grid - times[0], np.stack([np.interp(grid, times, column) for column in q.T], axis=1)
+    frames = frame_times(float(times[-1] - times[0]))
+    grid = times[0] + frames
+    return frames, np.stack([np.interp(grid, times, column) for column in q.T], axis=1)
+
+
+def frame_times(duration: float) -> Array:
+    """Return the times of a page's frames from 0 to a duration, shape (N,), s."""
+    return np.linspace(0.0, duration, int(np.clip(np.ceil(RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
 
 
 def _first(wrong: np.ndarray) -> int:

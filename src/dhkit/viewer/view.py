@@ -15,8 +15,9 @@ from dhkit.description import Description
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
+from dhkit.trajectories import Trajectory
 from dhkit.viewer import protocol
-from dhkit.viewer.motion import check_motion, sampled
+from dhkit.viewer.motion import check_motion, frame_times, sampled
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
@@ -115,14 +116,14 @@ class View:
             raise ValueError(f"q is {q.tolist()}; expected finite values")
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
-    def play(self, motion: tuple[ArrayLike, ArrayLike], *, trace: bool = True) -> None:
+    def play(self, motion: Trajectory | tuple[ArrayLike, ArrayLike], *, trace: bool = True) -> None:
         """Play a motion; the page can pause, repeat and slow it down.
 
         Parameters
         ----------
         motion
-            Times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m; between them joints move
-            evenly.
+            A trajectory of this arm; or times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m,
+            between which joints move evenly.
         trace
             Whether the tool draws its path.
 
@@ -130,8 +131,15 @@ class View:
         ------
         ValueError
             Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
+        DescriptionError
+            The trajectory is another robot's.
         """
-        times, q = sampled(*check_motion(self._description, *motion))
+        if isinstance(motion, Trajectory):
+            motion.require(self._description)
+            times = frame_times(motion.duration)
+            q = motion.q(times)
+        else:
+            times, q = sampled(*check_motion(self._description, *motion))
         transforms = node_transforms(self._description, q)
         self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace))
 

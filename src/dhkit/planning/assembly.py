@@ -1,0 +1,107 @@
+"""From a program's numbers to a trajectory that joins its configurations exactly."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.problem import Knots
+from dhkit.trajectories import Trajectory
+
+__all__ = ["assembled", "knots_along"]
+
+ROUNDS = 2
+"""Corrections: the first leaves what rounding makes of it."""
+
+
+def assembled(description: Description, mesh: Mesh, knots: Knots, *, fixed_ends: bool) -> Trajectory:
+    """Return the motion of a program's accelerations.
+
+    Ipopt leaves gaps of some 1e-8 between intervals. Integrated from the start, they would add up at the goal; so the
+    accelerations are changed, as little as possible, to lead exactly through every leg's end.
+
+    Parameters
+    ----------
+    fixed_ends
+        Whether the first and the last acceleration must not be changed.
+    """
+    h = mesh.shares * knots.durations[mesh.leg]
+    W, U = _weights(mesh.curve, mesh.intervals)
+    ends = np.array(mesh.ends)
+    qdd = knots.qdd.copy()
+    free = slice(1, -1) if fixed_ends else slice(None)
+    # The state at the legs' ends is linear in the accelerations: v = v0 + sum h W a, q = q0 + sum (h v + h^2 U a).
+    velocity = np.cumsum(h[:, None] * W, axis=0)
+    before = np.vstack([np.zeros(W.shape[1]), velocity[:-1]])
+    position = np.cumsum(h[:, None] * before + (h**2)[:, None] * U, axis=0)
+    length = max(float(h.sum()), 1e-12)
+    influence = np.vstack([position[ends - 1] / length, velocity[ends - 1]])[:, free]
+    for _ in range(ROUNDS):
+        q, qd = _integrated(knots, qdd, h, W, U)
+        gap = np.vstack([(knots.q[ends] - q[ends]) / length, knots.qd[ends] - qd[ends]])
+        qdd[free] += np.linalg.lstsq(influence, gap, rcond=None)[0]
+    q, qd = _integrated(knots, qdd, h, W, U)
+    first, slope, curvature = _acceleration_polynomials(mesh.curve, qdd, h)
+    coefficients = np.stack([q[:-1], qd[:-1], first / 2, slope / 6, curvature / 12], axis=1)
+    degree = (2, 3, 3, 4)[mesh.curve.value]
+    return Trajectory(description, np.concatenate([[0.0], np.cumsum(h)]), coefficients[:, : degree + 1])
+
+
+def _integrated(knots: Knots, qdd: Array, h: Array, W: Array, U: Array) -> tuple[Array, Array]:
+    steps = h[:, None] * (W @ qdd)
+    qd = np.vstack([knots.qd[:1], knots.qd[0] + np.cumsum(steps, axis=0)])
+    moves = h[:, None] * qd[:-1] + (h**2)[:, None] * (U @ qdd)
+    return np.vstack([knots.q[:1], knots.q[0] + np.cumsum(moves, axis=0)]), qd
+
+
+@lru_cache(maxsize=32)
+def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
+    """Return how an interval's accelerations change velocity (times h) and position (times h^2), (K, columns) each."""
+    step = (1, 2, 1, 2)[curve.value]
+    w = ((1.0,), (1 / 2, 1 / 2), (1 / 2, 1 / 2), (1 / 6, 4 / 6, 1 / 6))[curve.value]
+    u = ((1 / 2,), (1 / 3, 1 / 6), (1 / 3, 1 / 6), (1 / 6, 1 / 3, 0.0))[curve.value]
+    W, U = np.zeros((2, intervals, curve.columns(intervals)))
+    for k in range(intervals):
+        W[k, step * k : step * k + len(w)], U[k, step * k : step * k + len(u)] = w, u
+    return W, U
+
+
+def _acceleration_polynomials(curve: Curve, qdd: Array, h: Array) -> tuple[Array, Array, Array]:
+    """Return each interval's acceleration a, slope b and curvature c: qdd = a + b t + c t^2."""
+    h = h[:, None]
+    if curve is Curve.CONSTANT:
+        return qdd, 0 * qdd, 0 * qdd
+    if curve is Curve.LINEAR:
+        return qdd[:-1], (qdd[1:] - qdd[:-1]) / h, 0 * qdd[1:]
+    if curve is Curve.JUMPING:
+        return qdd[0::2], (qdd[1::2] - qdd[0::2]) / h, 0 * qdd[1::2]
+    a, b, c = qdd[0:-1:2], qdd[1::2], qdd[2::2]
+    return a, (-3 * a + 4 * b - c) / h, (2 * a - 4 * b + 2 * c) / h**2
+
+
+def knots_along(trajectory: Trajectory, mesh: Mesh, ends: Array) -> Knots:
+    """Return a trajectory's values on a mesh, to start a solution from.
+
+    Parameters
+    ----------
+    ends
+        When its legs end, shape (legs,), s.
+    """
+    durations = np.diff(np.concatenate([[0.0], ends]))
+    t = mesh.times(durations)
+    middle = (t[1:] + t[:-1]) / 2
+    match mesh.curve:
+        case Curve.CONSTANT:
+            qdd = trajectory.qdd(middle)
+        case Curve.JUMPING:
+            ends = [trajectory.qdd(t[:-1], "right"), trajectory.qdd(t[1:], "left")]
+            qdd = np.stack(ends, axis=1).reshape(-1, trajectory.n)
+        case Curve.LINEAR:
+            qdd = trajectory.qdd(t)
+        case Curve.QUADRATIC:
+            qdd = np.empty((2 * len(middle) + 1, trajectory.n))
+            qdd[0::2], qdd[1::2] = trajectory.qdd(t), trajectory.qdd(middle)
+    return Knots(durations, trajectory.q(t), trajectory.qd(t), qdd)

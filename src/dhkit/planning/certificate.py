@@ -1,0 +1,189 @@
+"""What a motion really keeps: its limits on a dense grid, by an independent path, and the slow-down that they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.planning.clear import Surroundings
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.states import States
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Limits, Trajectory
+
+__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker"]
+
+POINTS = 24
+"""States an interval, both its ends included: more than anybody will ask for."""
+ACCEPTED = 5e-7
+"""By what share of a limit a certified motion may exceed it: half of what is promised."""
+ACTIVE = 0.99
+"""From this share of a limit on, it counts as active."""
+HALVINGS = 40
+TINY = 1e-9
+"""m: an arm of no reach."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One kind of limit on one motion."""
+
+    what: str
+    excess: float
+    """By what share of the limit it is exceeded at worst; negative: what is left."""
+    row: int
+    """The joint from 0, or the row of a constraint, that comes nearest to its limit."""
+    time: float
+    """When, s."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A motion's limits as checked on a dense grid."""
+
+    checks: tuple[Check, ...]
+    states: int
+    reference: str
+    """Who worked out torques and poses."""
+    active: tuple[tuple[str, int, float], ...]
+    """Limit, joint from 0, and the share of time in which the joint is at it."""
+    any_active: float
+    """The share of time in which some joint is at some limit."""
+
+    @property
+    def violation(self) -> float:
+        """The largest excess, as a share of its limit; 0 where all limits are kept."""
+        return max((check.excess for check in self.checks), default=0.0) if self.checks else 0.0
+
+    @property
+    def ok(self) -> bool:
+        """Whether all limits are kept, up to half a millionth."""
+        return self.violation <= ACCEPTED
+
+    @property
+    def worst(self) -> Check:
+        """The check that comes nearest to its limit, or exceeds it most."""
+        return max(self.checks, key=lambda check: check.excess)
+
+
+@dataclass(frozen=True, eq=False)
+class Checker:
+    """The limits of a motion, ready to be checked."""
+
+    description: Description
+    """With its payload."""
+    limits: Limits
+    constraints: tuple[Constraint, ...] = ()
+    parameters: tuple[Array, ...] = ()
+    friction: Friction | None = None
+    surroundings: Surroundings = Surroundings()
+
+    def states(self, trajectory: Trajectory, points: int = POINTS) -> States:
+        """Return a motion's states on a grid of so many times an interval, both sides of each break."""
+        s = np.linspace(0.0, 1.0, points)
+        breaks = trajectory.breaks
+        t = breaks[:-1, None] + np.diff(breaks)[:, None] * s
+        # A break belongs to both its intervals: the last state of each comes from the left.
+        inner, last = t[:, :-1], t[:, -1:]
+        both = [States.of(self.description, trajectory, times, self.friction, side) for times, side in ((inner, "right"), (last, "left"))]
+        return both[0].beside(both[1], points)
+
+    def measured(self, states: States) -> list[tuple[str, Array]]:
+        """Return every kind of limit with its use, shape (N, k): 1 where the limit is reached."""
+        limits, found = self.limits, []
+        for what, values, limit in (
+            ("velocity", states.qd, limits.velocity),
+            ("acceleration", states.qdd, limits.acceleration),
+        ):
+            if np.isfinite(limit).any():
+                found.append((what, np.abs(values) / limit))
+        if np.isfinite(limits.torque).any():
+            found.append(("torque", np.abs(states.tau) / limits.torque))
+        for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
+            values = constraint.measured(states, parameters)
+            found.append((constraint.what, np.abs(values) if constraint.low == -1 else values))
+        if self.surroundings:
+            short = self.surroundings.clearance - self.surroundings.gaps(self.description, states.q)
+            found.append(("clearance", 1 + short[:, None] / max(self.description.reach, TINY)))
+        return found
+
+    def positions(self, states: States) -> Array:
+        """Return by what share of its range each joint leaves it, shape (N, n); negative inside."""
+        lower, upper = self.limits.lower, self.limits.upper
+        size = np.where(np.isfinite(upper - lower), np.maximum(np.abs(lower), np.abs(upper)), 1.0)
+        with np.errstate(invalid="ignore"):
+            return np.maximum(lower - states.q, states.q - upper) / np.where(size > 0, size, 1.0)
+
+    def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
+        """Check a motion; ``states``: those of it, where they are known."""
+        states = self.states(trajectory) if states is None else states
+        checks, active, anywhere = [], [], np.zeros(len(states.times), dtype=bool)
+        share = _time_shares(trajectory, states)
+        excess = self.positions(states)
+        if np.isfinite(excess).any():
+            checks.append(_check("position", excess, states.times))
+        if np.isfinite(self.limits.jerk).any():
+            jerk = np.abs(_jerks(trajectory)) / self.limits.jerk
+            k, i = np.unravel_index(int(np.argmax(jerk)), jerk.shape)
+            checks.append(Check("jerk", float(jerk[k, i] - 1), int(i), float(trajectory.breaks[k // 2])))
+        for what, use in self.measured(states):
+            checks.append(_check(what, use - 1, states.times))
+            reached = use >= ACTIVE
+            anywhere |= reached.any(axis=1)
+            active += [(what, i, float(share @ reached[:, i])) for i in range(use.shape[1]) if reached[:, i].any()]
+        return Certificate(tuple(checks), len(states.times), states.reference, tuple(active), float(share @ anywhere))
+
+    def slow_down(self, states: States) -> float:
+        """Return the least c >= 1 by which the motion must be slowed down to keep what depends on velocity.
+
+        Infinite where no slow-down helps: something is exceeded at rest. For motions from rest to rest.
+        """
+
+        def keeps(c: float) -> bool:
+            return all(np.nanmax(use, initial=0.0) <= 1.0 for _, use in self._moving(states.slowed(c)))
+
+        if keeps(1.0):
+            return 1.0
+        high = 1.001
+        while not keeps(high):
+            high = 1 + 4 * (high - 1)
+            if high > 1e3:
+                return np.inf
+        low = 1 + (high - 1) / 4 if high > 1.0011 else 1.0
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if keeps(middle) else (middle, high)
+            if high - low < 1e-9:
+                break
+        return high
+
+    def _moving(self, states: States) -> list[tuple[str, Array]]:
+        resting = {constraint.what for constraint in self.constraints if not constraint.moving}
+        moving = replace(self, surroundings=Surroundings())
+        return [(what, use) for what, use in moving.measured(states) if what not in resting]
+
+
+def _check(what: str, excess: Array, times: Array) -> Check:
+    k, i = np.unravel_index(int(np.nanargmax(excess)), excess.shape)
+    return Check(what, float(excess[k, i]), int(i), float(times[k]))
+
+
+def _jerks(trajectory: Trajectory) -> Array:
+    """Return the jerks at both ends of every interval, shape (2 K, n)."""
+    breaks = trajectory.breaks
+    ends = [trajectory.jerk(breaks[:-1], "right"), trajectory.jerk(breaks[1:], "left")]
+    return np.stack(ends, axis=1).reshape(-1, trajectory.n)
+
+
+def _time_shares(trajectory: Trajectory, states: States) -> Array:
+    """Return each state's share of the duration by the trapezoidal rule, shape (N,)."""
+    K = len(trajectory.breaks) - 1
+    weights = np.ones(len(states.times) // K)
+    weights[[0, -1]] = 0.5
+    weights /= weights.sum()
+    shares: Array = np.outer(np.diff(trajectory.breaks), weights).ravel() / trajectory.duration
+    return shares
+
+

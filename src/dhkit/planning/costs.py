@@ -1,0 +1,27 @@
+"""What a motion costs: objectives integrated over it, by the path that certifies."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.planning.objectives import Objective
+from dhkit.planning.states import States
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Trajectory
+
+__all__ = ["cost_of"]
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+"""Exact to degree 9: of a motion's squared jerk, and of its squared torques up to their curvature in an interval."""
+
+
+def cost_of(
+    objective: Objective, trajectory: Trajectory, description: Description, friction: Friction | None = None
+) -> float:
+    """Return an objective's value for a motion, in the units of its terms; ``description`` may carry a load."""
+    h = np.diff(trajectory.breaks)[:, None]
+    times = trajectory.breaks[:-1, None] + h * (NODES + 1) / 2
+    weights = (h * WEIGHTS / 2).ravel()
+    states = States.of(description, trajectory, times, friction)
+    return float(sum(term.weight * (weights @ term.measured(states)) for term in objective.terms))

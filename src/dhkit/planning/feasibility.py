@@ -1,0 +1,106 @@
+"""Why there is no motion: said before a solver would find out, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.errors import PlanningError
+from dhkit.planning.objectives import Objective
+from dhkit.planning.states import States
+from dhkit.trajectories import Limits
+
+__all__ = ["require_bounded", "require_holdable", "require_inside_limits", "require_speed"]
+
+EDGE = 1e-9
+"""rad and m: how far outside its limits rounding may put a joint."""
+
+
+def unit_of(description: Description, i: int) -> str:
+    """Return the unit of a joint's values."""
+    return "m" if description.numbers.prismatic[i] else "rad"
+
+
+def require_inside_limits(description: Description, limits: Limits, q: Array, where: str) -> None:
+    """Refuse a configuration outside the joint limits.
+
+    Raises
+    ------
+    PlanningError
+        Names the joint and the limit.
+    """
+    excess = np.maximum(limits.lower - q, q - limits.upper)
+    if not excess.max() > EDGE:
+        return
+    i = int(np.argmax(excess))
+    side, limit = ("below its lower", limits.lower[i]) if q[i] < limits.lower[i] else ("above its upper", limits.upper[i])
+    unit = unit_of(description, i)
+    raise PlanningError(
+        f"{where}: joint {description.joints[i].name} is at {q[i]:.6g} {unit}, {side} limit, {limit:.6g} {unit}"
+    )
+
+
+def require_speed(description: Description, limits: Limits, qd: Array, where: str) -> None:
+    """Refuse a velocity beyond its limit.
+
+    Raises
+    ------
+    PlanningError
+        Names the joint and the limit.
+    """
+    excess = np.abs(qd) - limits.velocity
+    if not excess.max() > 0:
+        return
+    i = int(np.argmax(excess))
+    unit = unit_of(description, i)
+    raise PlanningError(
+        f"{where}: joint {description.joints[i].name} moves with {abs(qd[i]):.6g} {unit}/s, "
+        f"above its limit, {limits.velocity[i]:.6g} {unit}/s"
+    )
+
+
+def require_holdable(description: Description, limits: Limits, q: Array, where: str) -> None:
+    """Refuse a configuration in which the arm's torques do not hold it.
+
+    Raises
+    ------
+    PlanningError
+        Names the joint, what it takes and what it has.
+    """
+    if np.isinf(limits.torque).all():
+        return
+    still = np.zeros((1, description.n))
+    g = States(description, np.zeros(1), q[None], still, still).gravity_torque[0]
+    excess = np.abs(g) - limits.torque
+    if not (excess > EDGE * limits.torque).any():
+        return
+    i = int(np.argmax(np.abs(g) / limits.torque))
+    unit = "N" if description.numbers.prismatic[i] else "N m"
+    raise PlanningError(
+        f"{where}: joint {description.joints[i].name} cannot hold the arm there: it takes {abs(g[i]):.5g} {unit}, "
+        f"its limit is {limits.torque[i]:.5g} {unit}"
+    )
+
+
+def require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:
+    """Refuse a time-optimal motion of a joint that could jump.
+
+    Parameters
+    ----------
+    moves
+        Which joints have to move, shape (n,).
+
+    Raises
+    ------
+    PlanningError
+        Names a joint without any limit of torque, acceleration or jerk.
+    """
+    if not objective.has_time or not objective.only_time:
+        return
+    free = moves & np.isinf(limits.torque) & np.isinf(limits.acceleration) & np.isinf(limits.jerk)
+    if free.any():
+        name = description.joints[int(np.flatnonzero(free)[0])].name
+        raise PlanningError(
+            f"joint {name} has neither a torque, nor an acceleration, nor a jerk limit: in least time it would jump; "
+            "give one (effort in the robot file, or limits=)"
+        )

@@ -1,0 +1,71 @@
+"""Where a solution starts from: legs along straight joint paths, about as fast as the limits allow."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.planning.assembly import knots_along
+from dhkit.planning.mesh import Mesh
+from dhkit.planning.problem import Knots
+from dhkit.planning.states import States
+from dhkit.planning.task import Task
+from dhkit.trajectories import Limits, Trajectory
+
+__all__ = ["detour", "leg_durations", "straight_knots"]
+
+SAMPLES = 17
+"""States by which a leg's duration is guessed."""
+ROOM = 0.05
+"""Share of a torque that is at least counted on, where gravity takes nearly all."""
+SHORTEST = 1e-3
+"""s."""
+ASIDE = 0.7
+"""How far a detour leads at most, of half a joint's range."""
+LONGER = 2.0
+"""How much longer it takes."""
+
+
+def leg_durations(description: Description, limits: Limits, points: Array) -> Array:
+    """Return about how long legs between configurations take from rest to rest, shape (legs,), s.
+
+    Each is the least duration of a cubic, of torques those that gravity leaves at each state.
+    """
+    return np.array([_leg(description, limits, a, b) for a, b in pairwise(points)])
+
+
+def _leg(description: Description, limits: Limits, start: Array, goal: Array) -> float:
+    step = goal - start
+    x = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    q, qd, qdd = start + step * x * x * (3 - 2 * x), step * 6 * x * (1 - x), step * (6 - 12 * x)
+    found = [np.max(np.abs(qd) / limits.velocity), np.sqrt(np.max(np.abs(qdd) / limits.acceleration))]
+    found.append(np.cbrt(np.max(12 * np.abs(step) / limits.jerk)))
+    if np.isfinite(limits.torque).any():
+        states = States(description, x[:, 0], q, qd, qdd)
+        room = np.maximum(limits.torque - np.abs(states.gravity_torque), ROOM * limits.torque)
+        found.append(np.sqrt(np.max(np.abs(states.tau - states.gravity_torque) / room)))
+    return float(max(*found, SHORTEST))
+
+
+def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
+    """Return cubics between a task's configurations on a mesh, at rest in between."""
+    velocities = np.zeros_like(task.points)
+    velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
+    times = np.concatenate([[0.0], np.cumsum(durations)])
+    return knots_along(Trajectory.from_samples(task.arm, times, task.points, velocities), mesh, times[1:])
+
+
+def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
+    """Return the same by way of random configurations, one halfway along each leg."""
+    rng, limits, points = np.random.default_rng(seed), task.limits, task.points
+    reach = np.where(task.arm.numbers.prismatic, max(task.arm.reach, 1e-3), np.pi)
+    half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, reach)
+    halfway = (points[1:] + points[:-1]) / 2 + ASIDE * half * rng.uniform(-1, 1, (len(durations), task.arm.n))
+    rows = np.empty((2 * len(durations) + 1, task.arm.n))
+    rows[0::2], rows[1::2] = points, np.clip(halfway, limits.lower, limits.upper)
+    velocities = np.zeros_like(rows)
+    velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
+    times = np.concatenate([[0.0], np.cumsum(np.repeat(durations * (1.0 if task.duration else LONGER) / 2, 2))])
+    return knots_along(Trajectory.from_samples(task.arm, times, rows, velocities), mesh, times[2::2])

@@ -1,0 +1,204 @@
+"""What a motion is to have little of: objectives as small values that add and take weights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import TYPE_CHECKING, TypeAlias
+
+from dhkit.description import Array
+from dhkit.planning.point import Point, gear_ratios
+from dhkit.planning.states import States
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["Effort", "Energy", "Jerk", "Objective", "ObjectiveLike", "Term", "Time"]
+
+SOFT = 1e-3
+"""Share of a joint's mean power over which regenerated power fades out, so that it can be differentiated."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One thing to minimize, with a weight; terms add to an :class:`Objective`."""
+
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.weight, Real) or not math.isfinite(self.weight) or self.weight <= 0:
+            raise ValueError(f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number")
+
+    def integrand(self, point: Point) -> casadi.SX | None:
+        """Return what is integrated over time, without the weight; None where that is not a function of the state."""
+        return None
+
+    def measured(self, states: States) -> Array:
+        """Return the same of a motion's states, shape (N,), by numbers."""
+        raise NotImplementedError
+
+    def __add__(self, other: Term | Objective) -> Objective:
+        return Objective.of(self) + other
+
+    def __mul__(self, factor: float) -> Term:
+        return replace(self, weight=self.weight * factor)
+
+    __rmul__ = __mul__
+
+
+@dataclass(frozen=True)
+class Time(Term):
+    """The duration, s."""
+
+    def measured(self, states: States) -> Array:
+        return np.ones(len(states.times))
+
+
+@dataclass(frozen=True)
+class Effort(Term):
+    """The integral of the torques' squares, N^2 m^2 s (of a prismatic joint N^2 s)."""
+
+    def integrand(self, point: Point) -> casadi.SX:
+        """Return tau . tau."""
+        import casadi
+
+        return casadi.sumsqr(point.tau)
+
+    def measured(self, states: States) -> Array:
+        return np.sum(states.tau**2, axis=1)
+
+
+@dataclass(frozen=True)
+class Jerk(Term):
+    """The integral of the jerks' squares, rad^2/s^5 or m^2/s^5; such motions begin and end without acceleration."""
+
+    def measured(self, states: States) -> Array:
+        return np.sum(states.jerk**2, axis=1)
+
+
+@dataclass(frozen=True)
+class Energy(Term):
+    """Electrical energy, J: what heats the windings and, where the drives do not feed it back, all positive power.
+
+    A motor whose torque is tau_m heats its windings by (tau_m / k)^2 watts, with its motor constant k; the joint's
+    torque is gear tau_m.
+    """
+
+    motor_constants: tuple[float, ...] = ()
+    """k of each joint's motor, N m per square root of W; one number counts for all; empty: no heat."""
+    regenerates: bool = False
+    """Whether braking gives its power back."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        constants = self.motor_constants
+        given = tuple(float(k) for k in ((constants,) if isinstance(constants, Real) else constants))
+        if any(not math.isfinite(k) or k <= 0 for k in given):
+            raise ValueError(f"Energy: motor constants are {given}; expected positive numbers, N m per root of W")
+        object.__setattr__(self, "motor_constants", given)
+
+    def integrand(self, point: Point) -> casadi.SX:
+        """Return the electrical power, W."""
+        import casadi
+
+        n, constants = point.n, self.motor_constants
+        if len(constants) not in (0, 1, n):
+            raise ValueError(f"Energy: {len(constants)} motor constants; expected 1 or {n}")
+        total = casadi.SX(0)
+        for i in range(n):
+            power = point.tau[i] * point.qd[i]
+            if not self.regenerates:
+                soft = SOFT * point.power_scale[i]
+                power = (power + casadi.sqrt(power * power + soft * soft) - soft) / 2
+            total += power
+            if constants:
+                k = constants[i % len(constants)] * point.gear[i]
+                total += (point.tau[i] / k) ** 2
+        return total
+
+    def measured(self, states: States) -> Array:
+        power = states.tau * states.qd
+        if not self.regenerates:
+            power = np.maximum(power, 0.0)
+        if self.motor_constants:
+            power = power + (states.tau / (np.array(self.motor_constants) * gear_ratios(states.description))) ** 2
+        total: Array = np.sum(power, axis=1)
+        return total
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A sum of terms.
+
+    Examples
+    --------
+    >>> Objective.of(Time() + 0.01 * Effort())
+    Objective(terms=(Time(weight=1.0), Effort(weight=0.01)))
+    """
+
+    terms: tuple[Term, ...]
+
+    @classmethod
+    def of(cls, objective: ObjectiveLike) -> Objective:
+        """Return what an argument ``objective=`` means: a name, a term, or a sum of terms.
+
+        Raises
+        ------
+        ValueError
+            An unknown name.
+        TypeError
+            Something else.
+        """
+        if isinstance(objective, Objective):
+            return objective
+        if isinstance(objective, Term):
+            return cls((objective,))
+        if isinstance(objective, str):
+            if objective not in NAMED:
+                raise ValueError(f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like")
+            return cls((NAMED[objective],))
+        raise TypeError(f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like")
+
+    @property
+    def has_time(self) -> bool:
+        """Whether the duration counts: else it must be given."""
+        return any(isinstance(term, Time) for term in self.terms)
+
+    @property
+    def has_jerk(self) -> bool:
+        """Whether the jerk counts."""
+        return any(isinstance(term, Jerk) for term in self.terms)
+
+    @property
+    def only_time(self) -> bool:
+        """Whether nothing but the duration counts."""
+        return all(isinstance(term, Time) for term in self.terms)
+
+    @property
+    def needs_torque(self) -> bool:
+        """Whether the arm needs bodies."""
+        return any(isinstance(term, Effort | Energy) for term in self.terms)
+
+    def __add__(self, other: Term | Objective) -> Objective:
+        if not isinstance(other, Term | Objective):
+            return NotImplemented
+        return Objective(self.terms + Objective.of(other).terms)
+
+    def __mul__(self, factor: float) -> Objective:
+        return Objective(tuple(term * factor for term in self.terms))
+
+    __rmul__ = __mul__
+
+    def __str__(self) -> str:
+        names = [type(term).__name__.lower() for term in self.terms]
+        if all(term.weight == 1 for term in self.terms):
+            return " + ".join(names)
+        return " + ".join(f"{term.weight:g} {name}" for term, name in zip(self.terms, names, strict=True))
+
+
+ObjectiveLike: TypeAlias = "str | Term | Objective"
+
+NAMED: dict[str, Term] = {"time": Time(), "effort": Effort(), "energy": Energy(), "jerk": Jerk()}

@@ -1,0 +1,170 @@
+"""Capsules that contain what an arm's links look like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
+from dhkit.errors import ModelError
+from dhkit.model.shapes import Part, link_parts
+from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
+
+__all__ = ["LinkCapsule", "link_capsules", "world_axes"]
+
+MOST = 2
+"""Capsules of a link, at most: each costs an optimizer some hundred operations a point."""
+HARDLY_LARGER = 1.25
+"""Two capsules become one whose volume is at most this multiple of both."""
+SIDES = 24
+"""Corners of the polygon around a cylinder's rim: 0.9 % wider than the rim."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkCapsule:
+    """A cylinder with half balls on its ends that moves with a link; a ball where start and end coincide."""
+
+    link: int
+    """The DH frame that it is fixed to: 0 (the base) to n."""
+    start: Array
+    """Shape (3,), in that frame, m: the centre of the half ball at one end."""
+    end: Array
+    """Shape (3,), likewise at the other."""
+    radius: float
+    """m."""
+
+    @property
+    def length(self) -> float:
+        """Of its axis, m."""
+        return float(np.linalg.norm(self.end - self.start))
+
+
+def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
+    """Return capsules that contain all that :func:`dhkit.model.shapes.link_parts` draws, at most two a link.
+
+    The solids of a link are gathered into two groups, those first whose common capsule is least larger than theirs;
+    into one where that is hardly larger.
+
+    Raises
+    ------
+    ModelError
+        A mesh that cannot be read.
+
+    Examples
+    --------
+    >>> from dhkit.description.table import from_dh
+    >>> [capsule.link for capsule in link_capsules(from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)]))]
+    [0, 1, 1, 2, 2]
+    """
+    # Equal descriptions may have their meshes in different folders.
+    return _link_capsules(description, description.mesh_folder)
+
+
+def world_axes(description: Description, q: ArrayLike) -> Array:
+    """Return the ends of the axes of an arm's m capsules in the world.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (..., m, 2, 3): start and end, m. NaN where q is not finite.
+    """
+    capsules = link_capsules(description)
+    frames = world_to_frames(description, q)[..., [capsule.link for capsule in capsules], :, :]
+    ends = np.array([(capsule.start, capsule.end) for capsule in capsules])
+    axes: Array = np.matmul(ends, np.swapaxes(frames[..., :3, :3], -1, -2)) + frames[..., None, :3, 3]
+    return axes
+
+
+@lru_cache(maxsize=64)
+def _link_capsules(description: Description, mesh_folder: Path | None) -> tuple[LinkCapsule, ...]:
+    parts: dict[int, list[Balls]] = {}
+    for part in link_parts(description):
+        parts.setdefault(part.link, []).append(_balls(part))
+    capsules = []
+    for link, groups in sorted(parts.items()):
+        for group in _gathered(groups):
+            fit = refine(group)
+            for end in (fit.start, fit.end):
+                end.setflags(write=False)
+            capsules.append(LinkCapsule(link, fit.start, fit.end, fit.radius))
+    return tuple(capsules)
+
+
+def _gathered(groups: list[Balls]) -> list[Balls]:
+    """Return few groups of a link's solids: pairs whose capsule is least larger than their own become one."""
+    volumes: dict[frozenset[int], float] = {}
+
+    def volume(members: frozenset[int]) -> float:
+        if members not in volumes:
+            volumes[members] = enclose(_joined(groups, members)).volume
+        return volumes[members]
+
+    sets = [frozenset([i]) for i in range(len(groups))]
+    while len(sets) > 1:
+        pairs = list(combinations(sets, 2))
+        first, second = min(pairs, key=lambda pair: volume(pair[0] | pair[1]) - volume(pair[0]) - volume(pair[1]))
+        if len(sets) <= MOST and volume(first | second) > HARDLY_LARGER * (volume(first) + volume(second)):
+            break
+        sets = [members for members in sets if members not in (first, second)] + [first | second]
+    return [_joined(groups, members) for members in sets]
+
+
+def _joined(groups: list[Balls], members: frozenset[int]) -> Balls:
+    return Balls(
+        np.concatenate([groups[i].centres for i in sorted(members)]),
+        np.concatenate([groups[i].radii for i in sorted(members)]),
+    )
+
+
+def _balls(part: Part) -> Balls:
+    """Return balls in the link's frame whose hull contains a part."""
+    match part.geometry:
+        case Sphere(radius):
+            local, radii = np.zeros((1, 3)), float(radius)
+        case Capsule(radius, length):
+            local, radii = np.array([[0, 0, -0.5], [0, 0, 0.5]]) * float(length), float(radius)
+        case Cylinder(radius, length):
+            local, radii = _rims(float(radius), float(length)), 0.0
+        case Box(size):
+            corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
+            local, radii = corners * [float(edge) for edge in size], 0.0
+        case _:
+            local, radii = _hull(part) * float(part.geometry.scale), 0.0
+    R, t = part.T_link_part[:3, :3], part.T_link_part[:3, 3]
+    return Balls(local @ R.T + t, np.full(len(local), radii))
+
+
+def _rims(radius: float, length: float) -> Array:
+    """Return the corners of polygons around a cylinder's two rims."""
+    angles = 2 * np.pi * np.arange(SIDES) / SIDES
+    x, y = np.array([np.cos(angles), np.sin(angles)]) * radius / np.cos(np.pi / SIDES)
+    return np.concatenate([np.stack([x, y, np.full(SIDES, z)], axis=1) for z in (-length / 2, length / 2)])
+
+
+def _hull(part: Part) -> Array:
+    """Return the corners of a mesh's convex hull, in the file's units."""
+    import trimesh
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        vertices = np.asarray(trimesh.load_scene(part.file, process=False).to_mesh().vertices, dtype=float)
+    except Exception as error:  # each format's reader has its own
+        raise ModelError(f"{part.file}: no mesh can be read ({str(error)[:80]})") from None
+    vertices = vertices[np.all(np.isfinite(vertices), axis=1)] if vertices.ndim == 2 else np.zeros((0, 3))
+    if not len(vertices):
+        raise ModelError(f"{part.file}: the mesh has no vertices")
+    try:
+        hull: Array = vertices[ConvexHull(vertices).vertices]
+    except QhullError:  # flat
+        return vertices
+    return hull

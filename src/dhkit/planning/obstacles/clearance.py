@@ -1,0 +1,193 @@
+"""How far an arm is from what it must not touch, exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
+from dhkit.planning.obstacles.pairs import checked_pairs
+from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
+from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
+from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
+
+__all__ = ["Distances", "deficits", "distance"]
+
+ROUNDING = 1e-7
+"""Bounds that are this near each other, m, count as equal: coal's answers are good to about 1e-9."""
+
+Nearest = tuple[Array, NDArray[np.int_]]
+"""Smallest distances, shape (N,), m, and which of the candidates has each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """How far the links of an arm, as capsules, are from obstacles and from each other."""
+
+    distance: Array
+    """Shape (...): the smallest, m; negative where something is penetrated, inf where there is nothing to check."""
+    pair: tuple[str, str] | None
+    """What is closest in the worst state: a link and an obstacle, or two links; None if there is no such state."""
+    per_obstacle: Array
+    """Shape (..., K), m: the smallest distance from each obstacle, in the order given."""
+    itself: Array
+    """Shape (...), m: the smallest distance between two links; inf if it was not asked for."""
+
+
+def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
+    """Return exact distances of an arm's capsules from obstacles, and from each other.
+
+    What motion cannot change is left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base above
+    all, and the foot of an arm that stands on the floor.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+    obstacles
+        K obstacles, one of them may be a :class:`Floor`.
+    self_collision
+        Whether distances between links count.
+
+    Returns
+    -------
+    Distances
+        NaN where q is not finite.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+    ValueError, TypeError
+        Another shape of q, or of a scene.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> puma = library_robot("puma560")
+    >>> found = distance(puma, [0, 0, 0, 0, 0, 0], [Obstacle.sphere(0.1, (0.4, 0.2, 0.9), name="ball")])
+    >>> found.pair
+    ('link 3', 'ball')
+    >>> round(float(found.distance), 3)
+    0.169
+    """
+    obstacles = check_obstacles(obstacles)
+    q = joint_array(description, q)
+    rows = q.reshape(-1, description.n)
+    finite = np.all(np.isfinite(rows), axis=1)
+    capsules, axes = link_capsules(description), world_axes(description, rows[finite])
+    found = [_from_one(description, capsules, axes, obstacle) for obstacle in obstacles]
+    names = [_pair_names(description, capsules, obstacle) for obstacle in obstacles]
+    itself = np.full(len(axes), np.inf)
+    if self_collision:
+        pairs = checked_pairs(description).itself
+        found.append(_from_itself(capsules, axes, pairs))
+        names.append([(_name(capsules[i]), _name(capsules[j])) for i, j in pairs])
+        itself = found[-1][0]
+    every = np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
+
+    def whole(values: Array) -> Array:
+        result = np.full((len(rows), *values.shape[1:]), np.nan)
+        result[finite] = values
+        return result.reshape((*q.shape[:-1], *values.shape[1:]))
+
+    return Distances(
+        distance=whole(every.min(axis=-1)),
+        pair=_worst(every, found, names),
+        per_obstacle=whole(every[:, : len(obstacles)] if found else every[:, :0]),
+        itself=whole(itself),
+    )
+
+
+def deficits(
+    description: Description, q: ArrayLike, obstacles: Scene, clearance: float, self_collision: bool = False
+) -> Array:
+    """Return by how much a path's gaps are short of a clearance.
+
+    Parameters
+    ----------
+    q
+        The path's states, shape (..., n), rad and m: dense.
+    obstacles
+        K obstacles.
+    clearance
+        What is asked for, m.
+    self_collision
+        Whether gaps between links count.
+
+    Returns
+    -------
+    Array
+        Shape (K,), or (K + 1,) with that between links last, m; 0 where nothing is short, NaN for a path with NaN.
+    """
+    found = distance(description, q, obstacles, self_collision)
+    gaps = found.per_obstacle.reshape(-1, len(obstacles))
+    if self_collision:
+        gaps = np.concatenate([gaps, found.itself.reshape(-1, 1)], axis=1)
+    short: Array = np.max(clearance - gaps, axis=0, initial=0.0)
+    return short
+
+
+def _from_one(
+    description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
+) -> Nearest:
+    """Return the distances from one obstacle; candidates are those of :func:`_pair_names`."""
+    pairs = checked_pairs(description)
+    if isinstance(obstacle, Floor):
+        heights = [axes[:, i, end, 2] - capsules[i].radius - obstacle.height for i, end in pairs.heights]
+        return _smallest(np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf))
+    radii = np.array([capsules[i].radius for i in pairs.moving])
+    moving = axes[:, list(pairs.moving)]
+    low, high = axis_bounds(obstacle, moving)
+    return _exact((low - radii, high - radii), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle))
+
+
+def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:
+    """Return the distances between links; candidates are the pairs."""
+    first, second = [i for i, _ in pairs], [j for _, j in pairs]
+    radii = [(capsules[i].radius, capsules[j].radius) for i, j in pairs]
+    gaps = segment_distances(axes[:, first], axes[:, second]) - np.array(radii).reshape(-1, 2).sum(axis=1)
+    return _exact(
+        (gaps, gaps), lambda k, rows: capsule_distances(radii[k], axes[rows, first[k]], axes[rows, second[k]])
+    )
+
+
+def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) -> Nearest:
+    """Return the smallest of candidates' distances, measured where their bounds, shape (N, m), leave them a chance."""
+    low, high = bounds
+    distances = np.full(low.shape, np.inf)
+    least = np.min(high, axis=1, initial=np.inf)
+    for k in range(low.shape[1]):
+        rows = np.flatnonzero(low[:, k] <= least + ROUNDING)
+        if len(rows):
+            distances[rows, k] = measure(k, rows)
+    return _smallest(distances)
+
+
+def _smallest(distances: Array) -> Nearest:
+    if not distances.shape[1]:
+        return np.full(len(distances), np.inf), np.zeros(len(distances), dtype=int)
+    return distances.min(axis=1), distances.argmin(axis=1)
+
+
+def _pair_names(
+    description: Description, capsules: tuple[LinkCapsule, ...], obstacle: Obstacle | Floor
+) -> list[tuple[str, str]]:
+    pairs = checked_pairs(description)
+    ends = [i for i, _ in pairs.heights] if isinstance(obstacle, Floor) else pairs.moving
+    return [(_name(capsules[i]), obstacle.name) for i in ends]
+
+
+def _worst(every: Array, found: list[Nearest], names: list[list[tuple[str, str]]]) -> tuple[str, str] | None:
+    if not every.size or not np.isfinite(every.min()):
+        return None
+    state, k = (int(x) for x in np.unravel_index(np.argmin(every), every.shape))
+    return names[k][int(found[k][1][state])]
+
+
+def _name(capsule: LinkCapsule) -> str:
+    return f"link {capsule.link}" if capsule.link else "the base"

@@ -1,0 +1,112 @@
+"""A small capsule around balls: what bounds a link's solids."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.planning.obstacles.scene import rotations_onto
+
+__all__ = ["Balls", "Enclosure", "enclose", "refine"]
+
+RADII = np.concatenate([[1.0], 1 + np.geomspace(2e-3, 0.5, 13)])
+"""Tried radii, of the smallest about an axis: a wider capsule may be so much shorter that it is smaller."""
+WORTH = 0.98
+"""A tilted axis must save this share of the volume: symmetric links keep their axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls whose convex hull is to be enclosed; points are balls of radius 0."""
+
+    centres: Array
+    """Shape (N, 3), m."""
+    radii: Array
+    """Shape (N,), m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """A capsule."""
+
+    start: Array
+    """Shape (3,), m."""
+    end: Array
+    radius: float
+
+    @property
+    def volume(self) -> float:
+        """In m^3."""
+        length = float(np.linalg.norm(self.end - self.start))
+        return float(np.pi * self.radius**2 * (length + 4 / 3 * self.radius))
+
+
+def enclose(balls: Balls) -> Enclosure:
+    """Return a small capsule around balls, along a principal or a coordinate axis through the middle of their extent.
+
+    A capsule is convex, so it contains the hull of balls that it contains.
+    """
+    return min((_about(balls, R, _middle(balls, R)) for R in _candidates(balls)), key=lambda c: c.volume)
+
+
+def refine(balls: Balls) -> Enclosure:
+    """Return a smaller capsule around balls than :func:`enclose` does, where a tilt of its axis is worth it."""
+    from scipy.optimize import minimize
+
+    ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R, _middle(balls, R)).volume)
+    R, middle = ranked[0], _middle(balls, ranked[0])
+    best = _about(balls, R, middle)
+    scale = best.radius
+
+    def tilted(x: Array) -> Enclosure:
+        direction = R @ np.array([x[0], x[1], 1.0])
+        turned = rotations_onto(direction / np.linalg.norm(direction))
+        return _about(balls, turned, middle + scale * (R[:, :2] @ x[2:]))
+
+    steps = np.concatenate([np.zeros((1, 4)), 0.1 * np.eye(4)])
+    found = minimize(
+        lambda x: tilted(x).volume,
+        np.zeros(4),
+        method="Nelder-Mead",
+        options={"initial_simplex": steps, "maxfev": 120, "xatol": 1e-4, "fatol": 0.0},
+    )
+    other = tilted(found.x)
+    return other if other.volume < WORTH * best.volume else best
+
+
+def _candidates(balls: Balls) -> list[Array]:
+    """Return rotations whose third columns are candidates for the axis."""
+    centred = balls.centres - balls.centres.mean(axis=0)
+    principal = np.linalg.svd(centred, full_matrices=False)[2] if len(centred) > 2 else np.eye(3)
+    axes = [*np.eye(3), *principal]
+    # The longest way through a pair of thin, oblique solids is none of the principal axes.
+    far = balls.centres[np.argmax(np.linalg.norm(centred, axis=1))]
+    along = balls.centres[np.argmax(np.linalg.norm(balls.centres - far, axis=1))] - far
+    if np.linalg.norm(along) > 0:
+        axes.append(along / np.linalg.norm(along))
+    return [rotations_onto(axis) for axis in axes]
+
+
+def _middle(balls: Balls, R: Array) -> Array:
+    """Return the middle of the balls' extent along the columns of R."""
+    local = balls.centres @ R
+    low, high = (local - balls.radii[:, None]).min(axis=0), (local + balls.radii[:, None]).max(axis=0)
+    middle: Array = R @ ((low + high) / 2)
+    return middle
+
+
+def _about(balls: Balls, R: Array, middle: Array) -> Enclosure:
+    """Return the smallest capsule about the line through a point along the third column of R."""
+    axis = R[:, 2]
+    offset = balls.centres - middle
+    along = offset @ axis
+    aside = np.linalg.norm(offset - along[:, None] * axis, axis=1)
+    radii = RADII[:, None] * np.max(aside + balls.radii)
+    # A ball at the distance e from the axis is inside if its centre is within r - rho of the segment.
+    reach = np.sqrt(np.maximum((radii - balls.radii) ** 2 - aside**2, 0.0))
+    low, high = np.min(along + reach, axis=1), np.max(along - reach, axis=1)
+    low, high = np.where(low < high, low, (low + high) / 2), np.where(low < high, high, (low + high) / 2)
+    best = np.argmin(radii[:, 0] ** 2 * (high - low + 4 / 3 * radii[:, 0]))
+    return Enclosure(middle + low[best] * axis, middle + high[best] * axis, float(radii[best, 0]))

@@ -1,0 +1,242 @@
+"""What an arm must not touch: boxes, spheres and capsules in the world, and the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Box, Capsule, Sphere, check_pose
+from dhkit.description.frames import number_array
+from dhkit.expressions import exact
+
+__all__ = ["Floor", "Obstacle", "Scene", "Solid", "check_obstacles"]
+
+Solid: TypeAlias = Box | Sphere | Capsule
+"""What an obstacle may be."""
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A solid that stands still in the world.
+
+    Made by :meth:`box`, :meth:`sphere` or :meth:`capsule`.
+
+    Examples
+    --------
+    >>> Obstacle.sphere(0.1, (0.4, 0.2, 0.3)).centre
+    array([0.4, 0.2, 0.3])
+    >>> Obstacle.box((0.4, 0.4, 0.0), at=(0, 0, 0))
+    Traceback (most recent call last):
+        ...
+    ValueError: box: size is (0.4, 0.4, 0.0); expected three positive numbers, m
+    """
+
+    geometry: Solid
+    """Sizes in m; a capsule lies along z, centred."""
+    placement: tuple[tuple[float, ...], ...]
+    """The solid in the world: the rows of the 4x4 matrix."""
+    name: str
+
+    @classmethod
+    def box(cls, size: ArrayLike, at: ArrayLike, name: str = "box") -> Obstacle:
+        """Return a box.
+
+        Parameters
+        ----------
+        size
+            Its edges, shape (3,), m.
+        at
+            Its pose in the world, shape (4, 4), or its centre's position, shape (3,), m.
+        name
+            What reports call it.
+
+        Raises
+        ------
+        ValueError
+            Another shape, a size that is not positive and finite, or no pose.
+        TypeError
+            Not numbers.
+        """
+        x, y, z = _sizes("box: size", size, (3,), "three positive numbers, m")
+        array = number_array(at, "box: at", "(4, 4) or (3,)")
+        if array.shape == (4, 4) and np.all(np.isfinite(array)):
+            T_world_obstacle = check_pose(array, "box: at")
+        else:
+            T_world_obstacle = np.eye(4)
+            T_world_obstacle[:3, 3] = _point("box: at", at, "a pose, shape (4, 4), or a position, shape (3,), finite")
+        return cls._placed(Box((exact(x), exact(y), exact(z))), T_world_obstacle, name)
+
+    @classmethod
+    def sphere(cls, radius: float, centre: ArrayLike, name: str = "sphere") -> Obstacle:
+        """Return a ball.
+
+        Parameters
+        ----------
+        radius
+            m.
+        centre
+            In the world, shape (3,), m.
+        name
+            What reports call it.
+
+        Raises
+        ------
+        ValueError
+            A radius that is not positive and finite, or another shape.
+        TypeError
+            Not numbers.
+        """
+        (r,) = _sizes("sphere: radius", radius, (), "a positive number, m")
+        T_world_obstacle = np.eye(4)
+        T_world_obstacle[:3, 3] = _point("sphere: centre", centre)
+        return cls._placed(Sphere(exact(r)), T_world_obstacle, name)
+
+    @classmethod
+    def capsule(cls, radius: float, start: ArrayLike, end: ArrayLike, name: str = "capsule") -> Obstacle:
+        """Return a cylinder with half balls on its ends.
+
+        Parameters
+        ----------
+        radius
+            m.
+        start, end
+            The ends of its axis, the half balls' centres, in the world, shape (3,), m.
+        name
+            What reports call it.
+
+        Raises
+        ------
+        ValueError
+            A radius that is not positive and finite, another shape, or ends that coincide.
+        TypeError
+            Not numbers.
+        """
+        (r,) = _sizes("capsule: radius", radius, (), "a positive number, m")
+        first, last = _point("capsule: start", start), _point("capsule: end", end)
+        length = float(np.linalg.norm(last - first))
+        if not length > 0:
+            raise ValueError(f"capsule: start and end are both {_shown(first)}; expected two points (or a sphere)")
+        T_world_obstacle = np.eye(4)
+        T_world_obstacle[:3, :3] = rotations_onto((last - first) / length)
+        T_world_obstacle[:3, 3] = (first + last) / 2
+        return cls._placed(Capsule(exact(r), exact(length)), T_world_obstacle, name)
+
+    @classmethod
+    def _placed(cls, geometry: Solid, T_world_obstacle: Array, name: str) -> Obstacle:
+        if not name:
+            raise ValueError("name is empty; expected what reports should call the obstacle")
+        return cls(geometry, tuple(tuple(row) for row in T_world_obstacle.tolist()), name)
+
+    @cached_property
+    def T_world_obstacle(self) -> Array:
+        """The solid in the world, shape (4, 4), m."""
+        return _frozen(np.array(self.placement))
+
+    @cached_property
+    def centre(self) -> Array:
+        """Its middle in the world, shape (3,), m."""
+        return _frozen(self.T_world_obstacle[:3, 3].copy())
+
+    @cached_property
+    def half_sizes(self) -> Array:
+        """Half the edges of a box, of what a sphere or a capsule is around: shape (3,), m; zeros for a sphere."""
+        match self.geometry:
+            case Box(size):
+                return _frozen(np.array([float(edge) for edge in size]) / 2)
+            case Capsule(_, length):
+                return _frozen(np.array([0.0, 0.0, float(length) / 2]))
+        return _frozen(np.zeros(3))
+
+    @property
+    def radius(self) -> float:
+        """How far the surface is from the box, segment or point inside, m: 0 for a box."""
+        return 0.0 if isinstance(self.geometry, Box) else float(self.geometry.radius)
+
+    @cached_property
+    def axis(self) -> Array:
+        """The ends of a capsule's axis in the world, shape (2, 3), m; twice the centre for a sphere."""
+        along = self.T_world_obstacle[:3, 2] * self.half_sizes[2]
+        return _frozen(np.stack([self.centre - along, self.centre + along]))
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A level floor: everything below ``height`` is forbidden to the links that can get there.
+
+    Raises
+    ------
+    ValueError
+        A height that is not finite.
+    """
+
+    height: float = 0.0
+    """World z, m."""
+    name: str = "floor"
+
+    def __post_init__(self) -> None:
+        height = number_array(self.height, "floor: height", "()")
+        if height.shape != () or not np.isfinite(height):
+            raise ValueError(f"floor: height is {self.height!r}; expected a finite number, m")
+
+
+Scene: TypeAlias = Sequence[Obstacle | Floor]
+"""What is in an arm's way, one floor at most."""
+
+
+def check_obstacles(obstacles: Scene) -> tuple[Obstacle | Floor, ...]:
+    """Return a scene as a tuple.
+
+    Raises
+    ------
+    TypeError
+        Something else than obstacles and floors.
+    ValueError
+        More than one floor.
+    """
+    if isinstance(obstacles, Obstacle | Floor) or not isinstance(obstacles, Sequence):
+        raise TypeError(f"obstacles is {type(obstacles).__name__}; expected a list of Obstacle and Floor")
+    for item in obstacles:
+        if not isinstance(item, Obstacle | Floor):
+            raise TypeError(f"obstacles: found {type(item).__name__}; expected Obstacle or Floor")
+    floors = sum(isinstance(item, Floor) for item in obstacles)
+    if floors > 1:
+        raise ValueError(f"obstacles: found {floors} floors; expected one at most")
+    return tuple(obstacles)
+
+
+def rotations_onto(directions: Array) -> Array:
+    """Return rotations whose third columns are unit vectors: shape (..., 3) to (..., 3, 3)."""
+    # Any second direction will do; the one furthest from the first is never parallel to it.
+    helper = np.eye(3)[np.argmin(np.abs(directions), axis=-1)]
+    x = np.cross(helper, directions)
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.cross(directions, x), directions], axis=-1)
+
+
+def _sizes(name: str, value: ArrayLike, shape: tuple[int, ...], expected: str) -> list[float]:
+    array = number_array(value, name, str(shape))
+    if array.shape != shape or not np.all(np.isfinite(array) & (array > 0)):
+        raise ValueError(f"{name} is {_shown(array)}; expected {expected}")
+    return [float(x) for x in array.ravel()]
+
+
+def _point(name: str, value: ArrayLike, expected: str = "a finite position, shape (3,), m") -> Array:
+    array = number_array(value, name, "(3,)")
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        found = _shown(array) if array.shape == (3,) else f"of shape {array.shape}"
+        raise ValueError(f"{name} is {found}; expected {expected}")
+    return array
+
+
+def _shown(array: Array) -> str:
+    return str(tuple(array.tolist()) if array.ndim == 1 else array.tolist())[:80]
+
+
+def _frozen(array: Array) -> Array:
+    array.setflags(write=False)
+    return array

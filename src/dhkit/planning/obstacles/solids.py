@@ -1,0 +1,110 @@
+"""Exact signed distances of capsules from solids and from each other, by coal (formerly hpp-fcl)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Array, Box, Capsule
+from dhkit.errors import ModelError
+from dhkit.planning.obstacles.scene import Obstacle, rotations_onto
+
+if TYPE_CHECKING:
+    CoalModule: TypeAlias = Any
+
+__all__ = ["capsule_distances", "obstacle_distances"]
+
+POINT = 1e-9
+"""An axis shorter than this, m, has no direction: its capsule is a ball."""
+TOLERANCE = 1e-9
+"""Of coal's iterations, m; its default is 1e-6."""
+
+
+def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
+    """Return signed distances of a capsule in many places from an obstacle.
+
+    Parameters
+    ----------
+    radius
+        The capsule's, m.
+    axes
+        The ends of its axis in the world, shape (N, 2, 3), m.
+    obstacle
+        A box, sphere or capsule.
+
+    Returns
+    -------
+    Array
+        Shape (N,), m; negative: how far one must move to be apart.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed.
+    """
+    coal = _coal()
+    match obstacle.geometry:
+        case Box():
+            solid = coal.Box(*(2 * obstacle.half_sizes).tolist())
+        case Capsule(_, length):
+            solid = coal.Capsule(obstacle.radius, float(length))
+        case _:
+            solid = coal.Sphere(obstacle.radius)
+    T = obstacle.T_world_obstacle
+    place = coal.Transform3s(np.array(T[:3, :3]), np.array(T[:3, 3]))
+    capsule, places = _capsule(coal, radius, axes)
+    request, result = _request(coal), coal.DistanceResult()
+    return np.array([_distance(coal, capsule, own, solid, place, request, result) for own in places])
+
+
+def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -> Array:
+    """Return signed distances of two capsules in many places, shape (N,), m; axes (N, 2, 3) each.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed.
+    """
+    coal = _coal()
+    one, places = _capsule(coal, radii[0], first)
+    other, other_places = _capsule(coal, radii[1], second)
+    request, result = _request(coal), coal.DistanceResult()
+    pairs = zip(places, other_places, strict=True)
+    return np.array([_distance(coal, one, own, other, place, request, result) for own, place in pairs])
+
+
+def _distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+    result.clear()  # coal keeps the smallest of a result's queries
+    return float(coal.distance(first, T1, second, T2, request, result))
+
+
+def _capsule(coal: CoalModule, radius: float, axes: Array) -> tuple[Any, list[Any]]:
+    """Return coal's capsule and its poses, shape (N, 2, 3) the ends of its axis."""
+    along = axes[:, 1] - axes[:, 0]
+    lengths = np.linalg.norm(along, axis=1)
+    middles = np.ascontiguousarray(axes.mean(axis=1))
+    if not len(axes) or lengths[0] < POINT:
+        return coal.Sphere(radius), [coal.Transform3s(np.eye(3), middle) for middle in middles]
+    rotations = rotations_onto(along / lengths[:, None])
+    places = [coal.Transform3s(R, middle) for R, middle in zip(rotations, middles, strict=True)]
+    return coal.Capsule(radius, float(lengths[0])), places
+
+
+def _request(coal: CoalModule) -> Any:
+    request = coal.DistanceRequest()
+    request.enable_signed_distance = True
+    request.gjk_tolerance = TOLERANCE
+    request.epa_tolerance = TOLERANCE
+    return request
+
+
+def _coal() -> CoalModule:
+    try:
+        import coal
+    except ImportError as error:
+        raise ModelError(
+            f"coal cannot be imported ({error}); pip install pin (Linux, macOS) or conda install coal; "
+            "planning around obstacles checks its paths with it"
+        ) from None
+    return coal

@@ -1,0 +1,394 @@
+"""The planner: programs made once, solved for many motions, each certified before it is handed out."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from numbers import Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.errors import PlanningError
+from dhkit.planning.certificate import Checker
+from dhkit.planning.clear import Clear, Surroundings
+from dhkit.planning.comparison import classical, coarser
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.feasibility import require_bounded, require_holdable, require_inside_limits, require_speed
+from dhkit.planning.goals import Place, Route, place, routes
+from dhkit.planning.guess import leg_durations
+from dhkit.planning.mesh import Mesh
+from dhkit.planning.objectives import Objective, ObjectiveLike
+from dhkit.planning.obstacles import Scene
+from dhkit.planning.payload import Payload
+from dhkit.planning.problem import Problem
+from dhkit.planning.report import BranchReport, PlanReport
+from dhkit.planning.search import Found, Program, Search
+from dhkit.planning.solver import ProgressCall
+from dhkit.planning.states import prepare
+from dhkit.planning.task import Task, curve_for
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Limits, Trajectory
+
+__all__ = ["Planner"]
+
+EXPANDED = 400
+"""Up to so many joints times intervals a program is expanded into scalars: solved in half the time, made in ten times."""
+CONVERGENCE = {True: 1e-6, False: 1e-8}
+"""Ipopt's tolerance in least time, as a share of it, and for smooth objectives."""
+USUAL = 48
+"""Intervals of arms of six joints; of fewer joints more, as they cost less."""
+NUMBERS = 288
+"""Joints times intervals: what arms of few joints get."""
+LEISURELY = 2.0
+"""Where a duration is needed and none is given: times that of the fastest cubics."""
+SMOOTHED = Friction(width=1e-2)
+"""What a step of friction is taken as: rad/s or m/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Wish:
+    """What a motion is to be like, whatever its way."""
+
+    limits: Limits
+    duration: float | None
+    start_velocity: Array
+    goal_velocity: Array
+    payload: Payload | None
+    surroundings: Surroundings
+
+
+class Planner:
+    """Plans motions of one arm with one objective and one set of constraints.
+
+    Programs are made when first needed and then solved for any start, goal, limits, payload and obstacles. Calls from
+    several threads take turns. Every motion that is returned was checked on a dense grid with Pinocchio.
+
+    Parameters
+    ----------
+    description
+        The robot; torque limits and objectives of torque need a body on every link.
+    objective
+        ``"time"``, ``"effort"``, ``"energy"``, ``"jerk"``, a term such as ``Time()``, or a sum such as
+        ``Time() + 0.01 * Effort()``.
+    limits
+        The robot's own unless given; see :class:`dhkit.trajectories.Limits`.
+    constraints
+        What else must be kept: ``ToolSpeed(0.5)`` and the like.
+    intervals
+        Of the mesh: 48 for arms of six joints and more, more for smaller ones, unless given. Finer meshes find slightly
+        better motions in more time.
+    friction
+        Of the drives, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument that is none of these.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> planner = Planner(library_robot("planar2r"), intervals=24)
+    >>> motion = planner.solve([0.0, 0.0], [1.0, 0.5])
+    >>> motion.report.certificate.ok, bool(abs(motion.q(motion.duration) - [1.0, 0.5]).max() < 1e-12)
+    (True, True)
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        objective: ObjectiveLike = "time",
+        limits: Limits | None = None,
+        constraints: Sequence[Constraint] = (),
+        intervals: int | None = None,
+        friction: bool | Friction = False,
+    ) -> None:
+        if intervals is None:
+            intervals = max(USUAL, NUMBERS // description.n)
+        if isinstance(intervals, bool) or not isinstance(intervals, int) or not 6 <= intervals <= 2000:
+            raise ValueError(f"intervals is {intervals!r}; expected a whole number from 6 to 2000")
+        for constraint in constraints:
+            if not isinstance(constraint, Constraint):
+                raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
+        self.description = description
+        self.objective = Objective.of(objective)
+        self.limits = checked_limits(description, limits)
+        self.constraints = tuple(constraints)
+        self.intervals = intervals
+        chosen = Friction.chosen(friction)
+        self.friction = SMOOTHED if chosen is not None and chosen.width == 0 else chosen
+        self._programs: dict[tuple[object, ...], Program] = {}
+        self._making = threading.Lock()
+
+    def solve(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        *,
+        via: Sequence[ArrayLike | str] = (),
+        duration: float | None = None,
+        start_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
+        limits: Limits | None = None,
+        payload: Payload | None = None,
+        obstacles: Scene = (),
+        clearance: float = 0.01,
+        self_collision: bool = False,
+        warm: Trajectory | None = None,
+        time_limit: float = 10.0,
+        progress: ProgressCall | None = None,
+        compare: bool = False,
+    ) -> Trajectory:
+        """Return the best motion, certified; its ``report`` says how good it is.
+
+        Parameters
+        ----------
+        start
+            Joint values (n,), rad and m, or the name of a configuration.
+        goal
+            The same, or a pose (4, 4) of the tool in the world: then all branches of inverse kinematics are tried.
+        via
+            Where to pass on the way, likewise, in order; when is free.
+        duration
+            s. Objectives without time need one: without it, they get twice what cubics along the straight path take.
+        start_velocity, goal_velocity
+            Shape (n,), rad/s and m/s; at rest unless given.
+        limits
+            In place of the planner's.
+        payload
+            What the tool carries.
+        obstacles
+            What to keep away from: ``Obstacle.box(...)`` and the like, ``Floor()``.
+        clearance
+            By how much, m.
+        self_collision
+            Whether links keep away from each other too.
+        warm
+            A similar motion to start from.
+        time_limit
+            s; after it the search ends with an error, or the best motion found so far among branches.
+        progress
+            Called once an iteration; an exception in it ends the search.
+        compare
+            Whether the report also says what classical motions and a coarser mesh would have cost.
+
+        Raises
+        ------
+        PlanningError
+            There is no such motion, or none was found: says what stands against it.
+        ValueError, TypeError
+            Arguments of another shape or type.
+        """
+        began = time.perf_counter()
+        if not isinstance(time_limit, Real) or not time_limit > 0:
+            raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s")
+        description = self.description
+        if warm is not None:
+            warm.require(description)
+        names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
+        places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
+        if places[0].q is None:
+            raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
+        wish = _Wish(
+            checked_limits(description, self.limits if limits is None else limits),
+            _positive("duration", duration),
+            *(_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
+            payload,
+            Surroundings.of(obstacles, clearance, self_collision),
+        )
+        for spot in places:
+            if spot.q is not None:
+                require_inside_limits(description, wish.limits, spot.q, spot.name)
+        ways = routes(description, wish.limits, places)
+        self._require(wish, places, ways)
+        deadline = began + time_limit
+        found, branches, seconds, counts = self._best(wish, ways, warm, deadline, progress)
+        task, best = found
+        report = PlanReport(
+            objective=str(self.objective),
+            cost=best.cost,
+            duration=best.trajectory.duration,
+            certificate=best.certificate,
+            joints=tuple(joint.name for joint in description.joints),
+            intervals=len(best.trajectory.breaks) - 1,
+            iterations=counts[0],
+            solves=counts[1],
+            build_seconds=seconds,
+            solve_seconds=time.perf_counter() - began - seconds,
+            slow_down=best.slow_down,
+            tightened=best.tightened,
+            branches=branches,
+        )
+        if compare:
+            coarse = coarser(self, task, best.trajectory, deadline)
+            report = replace(report, classical=classical(task), coarse=coarse)
+        return replace(best.trajectory, report=report)
+
+    # Programs
+
+    def program(self, task: Task, intervals: int | None = None) -> tuple[Program, float]:
+        """Return the program for a task, and the seconds that it took to make just now."""
+        intervals = self.intervals if intervals is None else intervals
+        legs, limits, slots = len(task.points) - 1, task.limits, task.surroundings.slots
+        jerk_limited = bool(np.isfinite(limits.jerk).any())
+        with_torque = bool(np.isfinite(limits.torque).any())
+        key = (legs, task.is_loaded, slots, jerk_limited, with_torque, intervals)
+        with self._making:
+            if key in self._programs:
+                return self._programs[key], 0.0
+            began = time.perf_counter()
+            prepare(self.description)
+            curve = curve_for(self.description.n, self.objective.has_time, jerk_limited or self.objective.has_jerk)
+            problem = Problem(
+                self.description,
+                self.objective,
+                (*self.constraints, Clear(slots)) if task.surroundings else self.constraints,
+                limits,
+                Mesh.of(intervals, legs, curve),
+                friction=self.friction,
+                payload=task.is_loaded,
+                jerk_limited=jerk_limited,
+            )
+            expand = self.description.n * problem.mesh.intervals <= EXPANDED
+            made = Program.of(problem, CONVERGENCE[self.objective.has_time], expand=expand)
+            self._programs[key] = made
+            return made, time.perf_counter() - began
+
+    # One motion
+
+    def _require(self, wish: _Wish, places: Sequence[Place], ways: Sequence[Route]) -> None:
+        """Refuse what no solver could find, of places that leave no choice."""
+        description, limits = self.description, wish.limits
+        loaded = wish.payload.carried(description) if wish.payload else description
+        require_speed(description, limits, wish.start_velocity, "start")
+        require_speed(description, limits, wish.goal_velocity, "goal")
+        at_rest = {"start": not wish.start_velocity.any(), "goal": not wish.goal_velocity.any()}
+        for spot in places:
+            if spot.q is None:
+                continue
+            if at_rest.get(spot.name, False):
+                require_holdable(loaded, limits, spot.q, spot.name)
+            if wish.surroundings:
+                wish.surroundings.require(description, spot.q, spot.name)
+        moves = np.max([np.ptp(way.points, axis=0) for way in ways], axis=0) > 0
+        if not moves.any() and all(at_rest.values()):
+            raise PlanningError("start and goal are the same configuration")
+        require_bounded(description, limits, self.objective, moves)
+
+    def _task(self, wish: _Wish, points: Array) -> Task:
+        description, limits = self.description, wish.limits
+        loaded = wish.payload.carried(description) if wish.payload else description
+        T_start = _tool(description, points[0])
+        parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
+        duration = wish.duration
+        if duration is None and not self.objective.has_time:
+            duration = LEISURELY * float(leg_durations(loaded, limits, points).sum())
+        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, wish.surroundings)
+        return Task(
+            description,
+            loaded,
+            points,
+            wish.start_velocity,
+            wish.goal_velocity,
+            duration,
+            limits,
+            checker,
+            load=wish.payload.numbers if wish.payload else None,
+            parameters=parameters,
+            friction=self.friction,
+            surroundings=wish.surroundings,
+        )
+
+    def _best(
+        self, wish: _Wish, ways: Sequence[Route], warm: Trajectory | None, deadline: float, progress: ProgressCall | None
+    ) -> tuple[tuple[Task, Found], tuple[BranchReport, ...], float, tuple[int, int]]:
+        """Return the best motion along any way, what the others cost, seconds of making, iterations and solves."""
+        best: tuple[Task, Found] | None = None
+        failure: PlanningError | None = None
+        reports: list[BranchReport] = []
+        seconds, iterations, solves, chosen = 0.0, 0, 0, -1
+        for number, way in enumerate(ways):
+            hopeless = best is not None and self.objective.only_time and way.bound >= best[1].trajectory.duration
+            late = best is not None and time.perf_counter() > deadline
+            if hopeless or late:
+                reports.append(BranchReport(way.label, way.bound, solved=False))
+                continue
+            try:
+                if len(ways) > 1:
+                    self._require_ends(wish, way.points)
+                task = self._task(wish, way.points)
+                program, made = self.program(task)
+                seconds += made
+                search = Search(task, program, deadline + seconds, progress)
+                try:
+                    found = search(warm)
+                finally:
+                    iterations, solves = iterations + search.iterations, solves + search.solves
+            except PlanningError as error:
+                failure = failure or error
+                reports.append(BranchReport(way.label, float("inf"), solved=True, reason=str(error)))
+                continue
+            reports.append(BranchReport(way.label, found.trajectory.duration, solved=True))
+            if best is None or found.cost < best[1].cost:
+                best, chosen = (task, found), number
+        if best is None:
+            assert failure is not None
+            if len(ways) == 1:
+                raise failure
+            raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}") from None
+        told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
+        return best, told, seconds, (iterations, solves)
+
+    def _require_ends(self, wish: _Wish, points: Array) -> None:
+        loaded = wish.payload.carried(self.description) if wish.payload else self.description
+        if not wish.goal_velocity.any():
+            require_holdable(loaded, wish.limits, points[-1], "goal")
+        if wish.surroundings:
+            for k, point in enumerate(points[1:], start=1):
+                wish.surroundings.require(self.description, point, "goal" if k == len(points) - 1 else f"via {k}")
+
+
+def checked_limits(description: Description, limits: Limits | None) -> Limits:
+    """Return limits, a robot's own where none are given.
+
+    Raises
+    ------
+    ValueError
+        Limits of another number of joints.
+    TypeError
+        Something else.
+    """
+    if limits is None:
+        return Limits.of(description)
+    if not isinstance(limits, Limits):
+        raise TypeError(f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like")
+    if len(limits.lower) != description.n:
+        raise ValueError(f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}")
+    return limits
+
+
+def _tool(description: Description, q: Array) -> Array:
+    from dhkit.description.frames import world_to_tool
+
+    return world_to_tool(description, q)
+
+
+def _positive(name: str, value: float | None) -> float | None:
+    if value is None:
+        return None
+    if not isinstance(value, Real) or not np.isfinite(float(value)) or not value > 0:
+        raise ValueError(f"{name} is {value!r}; expected a positive number, s")
+    return float(value)
+
+
+def _velocity(description: Description, value: ArrayLike | None, name: str) -> Array:
+    if value is None:
+        return np.zeros(description.n)
+    qd = joint_array(description, value, f"{name}_velocity")
+    if qd.shape != (description.n,) or not np.isfinite(qd).all():
+        raise ValueError(f"{name}_velocity: expected finite numbers, shape ({description.n},)")
+    return qd

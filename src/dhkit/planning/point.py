@@ -1,0 +1,85 @@
+"""One state of a motion as symbols: what constraints and objectives are written in."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.description.parameters import resolved
+from dhkit.expressions import substitute
+from dhkit.symbolic import CasadiFunctions, Friction, SymbolicTable, jacobian, joint_symbols
+from dhkit.trajectories import Limits
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["LOAD", "Point", "gear_ratios"]
+
+LOAD = 10
+"""Numbers of a payload: mass, centre of mass (3), inertia (6)."""
+
+
+class Point:
+    """q, qd and qdd of an arm as SX symbols, and what follows from them; each derived when first asked for."""
+
+    def __init__(self, description: Description, limits: Limits, friction: Friction | None, payload: bool) -> None:
+        self.description = description
+        self.limits = limits
+        self.n = description.n
+        self.q = joint_symbols("q", self.n)
+        self.qd = joint_symbols("qd", self.n)
+        self.qdd = joint_symbols("qdd", self.n)
+        self.load = joint_symbols("load", LOAD if payload else 0)
+        self._functions = CasadiFunctions(description, friction=friction, payload=payload)
+
+    @cached_property
+    def tau(self) -> casadi.SX:
+        """Joint torques, n x 1, N m and N."""
+        load = self.load
+        loads = (load[0], load[1:4], load[4:10]) if load.numel() else ()
+        return self._functions.inverse_dynamics(self.q, self.qd, self.qdd, *loads)
+
+    @cached_property
+    def T_world_tool(self) -> casadi.SX:
+        """The tool in the world, 4 x 4."""
+        return SymbolicTable.of(self.description).world_to_tool(self.q)
+
+    @cached_property
+    def tool_velocity(self) -> casadi.SX:
+        """The velocity of the tool's origin, 3 x 1, m/s, world axes."""
+        return jacobian(SymbolicTable.of(self.description), self.q)[:3, :] @ self.qd
+
+    @cached_property
+    def tool_acceleration(self) -> casadi.SX:
+        """Its acceleration, 3 x 1, m/s^2."""
+        import casadi
+
+        v = self.tool_velocity
+        return casadi.jtimes(v, self.q, self.qd) + casadi.jtimes(v, self.qd, self.qdd)
+
+    @property
+    def torque_scale(self) -> Array:
+        """What torques are measured by, shape (n,): the limits, 1 where there is none."""
+        torque = self.limits.torque
+        return np.where(np.isfinite(torque), torque, 1.0)
+
+    @property
+    def power_scale(self) -> Array:
+        """A joint's power at its limits, shape (n,), W; 1 where there are none."""
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
+        return self.torque_scale * velocity
+
+    @property
+    def gear(self) -> Array:
+        """Gear ratios, shape (n,); 1 without a drive."""
+        return gear_ratios(self.description)
+
+
+def gear_ratios(description: Description) -> Array:
+    """Return the drives' gear ratios, shape (n,); 1 without a drive."""
+    values = resolved(description.parameters)
+    drives = [joint.drive for joint in description.joints]
+    return np.array([float(substitute(drive.gear, values)) if drive else 1.0 for drive in drives])

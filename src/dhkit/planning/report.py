@@ -1,0 +1,129 @@
+"""What a planner has to say about a motion that it found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from dhkit.planning.certificate import Certificate
+
+__all__ = ["BranchReport", "PlanReport"]
+
+TOLD = 3
+"""So many limits are told in words."""
+
+
+@dataclass(frozen=True)
+class BranchReport:
+    """What another way to a goal pose would have cost."""
+
+    branch: str
+    duration: float
+    """s; a lower bound where ``solved`` is False, infinite where there is no motion."""
+    solved: bool
+    chosen: bool = False
+    reason: str = ""
+    """Why there is no motion."""
+
+
+@dataclass(frozen=True)
+class PlanReport:
+    """How a motion was found, and what it is worth; plain data."""
+
+    objective: str
+    cost: float
+    """The objective's value."""
+    duration: float
+    """s."""
+    certificate: Certificate
+    joints: tuple[str, ...]
+    intervals: int
+    iterations: int
+    solves: int
+    """Programs solved for this motion, those of other branches included."""
+    build_seconds: float
+    """For making programs; 0 where they were ready."""
+    solve_seconds: float
+    slow_down: float = 1.0
+    """By what factor the solution was slowed down to keep its limits between the points of the program."""
+    tightened: tuple[str, ...] = ()
+    """Limits that were tightened and solved for again, for the same reason."""
+    coarse: tuple[int, float] | None = None
+    """Intervals and cost on a coarser mesh."""
+    classical: tuple[tuple[str, float], ...] = ()
+    """Durations of classical motions along the straight joint path under the same limits, s."""
+    branches: tuple[BranchReport, ...] = ()
+
+    @property
+    def sensitivity(self) -> float | None:
+        """By what share the cost on half as many intervals is above this one."""
+        return None if self.coarse is None else self.coarse[1] / self.cost - 1
+
+    def active_limits(self) -> list[tuple[str, float]]:
+        """Return the limits that are reached and in what share of the time, the most active first."""
+        named = [(f"{what} of {self._name(what, row)}", share) for what, row, share in self.certificate.active]
+        return sorted(named, key=lambda item: -item[1])
+
+    def _name(self, what: str, row: int) -> str:
+        joint_like = what in ("velocity", "acceleration", "torque", "motor power", "torque-speed line")
+        return self.joints[row] if joint_like and row < len(self.joints) else "the tool"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as plain numbers and texts, for JSON."""
+        certificate = self.certificate
+        return {
+            "objective": self.objective,
+            "cost": self.cost,
+            "duration": self.duration,
+            "certified": certificate.ok,
+            "violation": certificate.violation,
+            "reference": certificate.reference,
+            "states": certificate.states,
+            "limits": [
+                {"what": check.what, "joint": check.row, "excess": check.excess, "time": check.time}
+                for check in certificate.checks
+            ],
+            "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
+            "any_active": certificate.any_active,
+            "slow_down": self.slow_down,
+            "tightened": list(self.tightened),
+            "intervals": self.intervals,
+            "coarse": None if self.coarse is None else {"intervals": self.coarse[0], "cost": self.coarse[1]},
+            "classical": dict(self.classical),
+            "branches": [
+                {"branch": b.branch, "duration": b.duration, "solved": b.solved, "chosen": b.chosen, "reason": b.reason}
+                for b in self.branches
+            ],
+            "iterations": self.iterations,
+            "solves": self.solves,
+            "build_seconds": self.build_seconds,
+            "solve_seconds": self.solve_seconds,
+        }
+
+    def __str__(self) -> str:
+        certificate, lines = self.certificate, []
+        lines.append(f"{self.duration:.4f} s, least {self.objective}: {self.cost:.6g}")
+        worst = certificate.worst
+        lines.append(
+            f"certified by {certificate.reference} in {certificate.states} states: largest excess "
+            f"{max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
+            f"({-100 * worst.excess:.2g} % left) at {worst.time:.3f} s"
+        )
+        if self.slow_down > 1:
+            lines.append(f"slowed down by {100 * (self.slow_down - 1):.3f} % to keep its limits between knots")
+        if self.tightened:
+            lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
+        active = [f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:TOLD]]
+        lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {', '.join(active) or 'none'}")
+        if self.coarse is not None:
+            lines.append(f"mesh: {self.coarse[0]} intervals cost {100 * (self.sensitivity or 0):.2f} % more than {self.intervals}")
+        for name, duration in self.classical:
+            lines.append(f"{name} along the straight joint path: {duration:.4f} s, {100 * (duration / self.duration - 1):.1f} % more")
+        for branch in self.branches:
+            cost = "no motion: " + branch.reason if branch.reason else f"{'' if branch.solved else 'at least '}{branch.duration:.4f} s"
+            lines.append(f"{'->' if branch.chosen else '  '} {branch.branch}: {cost}")
+        lines.append(
+            f"{self.solves} program{'s' * (self.solves != 1)}, {self.iterations} iterations, "
+            f"{self.solve_seconds:.3f} s (and {self.build_seconds:.2f} s to build)"
+        )
+        return "\n".join(lines)

@@ -1,0 +1,171 @@
+"""Ipopt on a program: by measured options, watched while it runs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Array
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["Progress", "ProgressCall", "Solution", "Solver", "Stopped"]
+
+OPTIONS: dict[str, Any] = {
+    "print_level": 0,
+    "sb": "yes",
+    "mu_strategy": "monotone",
+    "mu_init": 1e-3,
+    "nlp_scaling_method": "none",
+    "tol": 1e-4,
+    "constr_viol_tol": 1e-7,
+    "acceptable_iter": 0,
+    "max_iter": 500,
+}
+"""Twice as fast as Ipopt's own on minimum time, and as reliable."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a solution stands."""
+
+    iteration: int
+    duration: float
+    """s, as of now."""
+    infeasibility: float
+    """The largest amount by which a row misses its bounds."""
+    seconds: float
+    """Since the solution began."""
+
+
+ProgressCall: TypeAlias = Callable[[Progress], object]
+"""Called once an iteration; an exception in it ends the solution."""
+
+
+class Stopped(Exception):  # noqa: N818 (no error of the caller's)
+    """A solution ran out of time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What Ipopt came to."""
+
+    x: Array
+    g: Array
+    converged: bool
+    status: str
+    """In Ipopt's words."""
+    iterations: int
+    infeasibility: float
+    cost: float
+
+
+class Solver:
+    """A program made ready for Ipopt; calls from several threads take turns."""
+
+    def __init__(self, program: dict[str, Any], legs: int, *, tolerance: float, expand: bool) -> None:
+        import casadi
+
+        self._watch = _watch(program["x"].numel(), program["g"].numel(), program["p"].numel(), legs)
+        options = {
+            "print_time": False,
+            "expand": expand,
+            "iteration_callback": self._watch,
+            "calc_lam_p": False,
+            "show_eval_warnings": False,
+            "ipopt": {**OPTIONS, "tol": tolerance},
+        }
+        self._function = casadi.nlpsol("plan", "ipopt", program, options)
+        self._turn = threading.Lock()
+
+    def __call__(
+        self,
+        x0: Array,
+        parameters: Array,
+        x_bounds: tuple[Array, Array],
+        g_bounds: tuple[Array, Array],
+        deadline: float,
+        progress: ProgressCall | None = None,
+    ) -> Solution:
+        """Solve from x0.
+
+        Parameters
+        ----------
+        deadline
+            When to stop, as of ``time.perf_counter``.
+
+        Raises
+        ------
+        Stopped
+            The deadline has passed.
+        """
+        with self._turn:
+            self._watch.begin(g_bounds, deadline, progress)
+            found = self._function(
+                x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
+            )
+            raised = self._watch.end()
+            stats = self._function.stats()
+        if raised is not None:
+            raise raised
+        x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
+        misses = max(_outside(x, *x_bounds), _outside(g, *g_bounds))
+        success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
+        return Solution(x, g, success, status, iterations, misses, float(found["f"]))
+
+
+def _outside(values: Array, low: Array, high: Array) -> float:
+    worst = np.max(np.maximum(low - values, values - high), initial=0.0)
+    return float(worst) if np.isfinite(worst) else float("inf")
+
+
+def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
+    """Return what Ipopt calls once an iteration."""
+    import casadi
+
+    class Watch(casadi.Callback):  # type: ignore[misc]
+        def __init__(self) -> None:
+            casadi.Callback.__init__(self)
+            self.construct("watch", {})
+
+        def begin(self, bounds: tuple[Array, Array], deadline: float, progress: ProgressCall | None) -> None:
+            self.bounds, self.deadline, self.progress = bounds, deadline, progress
+            self.started, self.iteration, self.raised = time.perf_counter(), 0, None
+
+        def end(self) -> BaseException | None:
+            raised, self.raised, self.progress = self.raised, None, None
+            return raised
+
+        def get_n_in(self) -> int:
+            return int(casadi.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_sparsity_in(self, i: int) -> casadi.Sparsity:
+            size = {"x": nx, "lam_x": nx, "f": 1, "g": ng, "lam_g": ng, "lam_p": np_}[casadi.nlpsol_out(i)]
+            return casadi.Sparsity.dense(size, 1)
+
+        def eval(self, arguments: list[casadi.DM]) -> list[int]:
+            self.iteration += 1
+            now = time.perf_counter()
+            try:
+                if now > self.deadline:
+                    raise Stopped
+                if self.progress is not None:
+                    values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))
+                    duration = float(casadi.sum1(values["x"][:legs]))
+                    misses = _outside(np.array(values["g"]).ravel(), *self.bounds)
+                    self.progress(Progress(self.iteration - 1, duration, misses, now - self.started))
+            except BaseException as error:  # Ipopt would swallow it, an interruption by the keyboard too
+                self.raised = error
+                return [1]
+            return [0]
+
+    return Watch()

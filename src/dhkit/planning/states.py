@@ -1,0 +1,169 @@
+"""A motion's states by Pinocchio: the numbers by which a plan is certified share no code with those that made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from dhkit import dynamics, kinematics
+from dhkit.description import Array, Description
+from dhkit.errors import ModelError
+from dhkit.model import PinocchioModel, pinocchio_model
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Trajectory
+from dhkit.trajectories.pieces import Side
+
+__all__ = ["States", "prepare"]
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """q, qd and qdd of N states, shape (N, n) each, and what follows from them; derived when first asked for."""
+
+    description: Description
+    """With its payload."""
+    times: Array
+    """Shape (N,), s."""
+    q: Array
+    qd: Array
+    qdd: Array
+    friction: Friction | None = None
+    jerk: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Shape (N, n), where it is asked for."""
+
+    @classmethod
+    def of(
+        cls,
+        description: Description,
+        trajectory: Trajectory,
+        times: Array,
+        friction: Friction | None = None,
+        side: Side = "right",
+    ) -> States:
+        """Return a motion's states at times of any shape; ``description`` may carry a load."""
+        values = (trajectory.q, trajectory.qd, trajectory.qdd, trajectory.jerk)
+        q, qd, qdd, jerk = (value(times, side).reshape(-1, trajectory.n) for value in values)
+        return cls(description, times.ravel(), q, qd, qdd, friction, jerk)
+
+    def beside(self, last: States, count: int) -> States:
+        """Return rows of ``count`` states each: those of this one, K x (count - 1), and a last one of the other."""
+
+        def joined(a: Array, b: Array) -> Array:
+            width = a.shape[1:]
+            rows = [a.reshape(-1, count - 1, *width), b.reshape(-1, 1, *width)]
+            return np.concatenate(rows, axis=1).reshape(-1, *width)
+
+        names = ("times", "q", "qd", "qdd", "jerk")
+        return replace(self, **{name: joined(getattr(self, name), getattr(last, name)) for name in names})
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.description.n
+
+    @cached_property
+    def reference(self) -> str:
+        """Who works the numbers out: Pinocchio, or dhkit where that is not installed."""
+        return "dhkit" if _model(self.description) is None else "Pinocchio"
+
+    @cached_property
+    def tau(self) -> Array:
+        """Joint torques, friction included, shape (N, n)."""
+        return self._rigid + self._friction_torque(self.qd)
+
+    @cached_property
+    def gravity_torque(self) -> Array:
+        """What holds the arm, shape (N, n)."""
+        model = _model(self.description)
+        if model is None:
+            return dynamics.gravity_torque(self.description, self.q)
+        import pinocchio as pin
+
+        data = model.createData()
+        return self._gathered([pin.computeGeneralizedGravity(model, data, q).copy() for q in self.q])
+
+    @cached_property
+    def T_world_tool(self) -> Array:
+        """The tool, shape (N, 4, 4)."""
+        return self._tool[0]
+
+    @cached_property
+    def tool_velocity(self) -> Array:
+        """Of the tool's origin, world axes, shape (N, 3), m/s."""
+        return self._tool[1]
+
+    @cached_property
+    def tool_acceleration(self) -> Array:
+        """Of the tool's origin, world axes, shape (N, 3), m/s^2."""
+        return self._tool[2]
+
+    def slowed(self, c: float) -> States:
+        """Return the states of the motion c times as slow; torques by their law, tau(t / c) = g + (tau - g) / c^2."""
+        slower = replace(
+            self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3
+        )
+        known: dict[str, Any] = slower.__dict__
+        if "_rigid" in self.__dict__:
+            known["_rigid"] = self.gravity_torque + (self._rigid - self.gravity_torque) / c**2
+            known["gravity_torque"] = self.gravity_torque
+        if "_tool" in self.__dict__:
+            T, v, a = self._tool
+            known["_tool"] = (T, v / c, a / c**2)
+        return slower
+
+    @cached_property
+    def _rigid(self) -> Array:
+        model = _model(self.description)
+        if model is None:
+            return dynamics.inverse_dynamics(self.description, self.q, self.qd, self.qdd)
+        import pinocchio as pin
+
+        data = model.createData()
+        states = zip(self.q, self.qd, self.qdd, strict=True)
+        return self._gathered([pin.rnea(model, data, *state).copy() for state in states])
+
+    def _friction_torque(self, qd: Array) -> Array | float:
+        return 0.0 if self.friction is None else dynamics.friction_torque(self.description, qd, self.friction)
+
+    @cached_property
+    def _tool(self) -> tuple[Array, Array, Array]:
+        model = _model(self.description)
+        if model is None:
+            J = kinematics.jacobian(self.description, self.q)[:, :3]
+            Jd = kinematics.jacobian_dot(self.description, self.q, self.qd)[:, :3]
+            velocity, acceleration = np.einsum("kij,kj->ki", J, self.qd), np.einsum("kij,kj->ki", J, self.qdd)
+            T = kinematics.forward_kinematics(self.description, self.q)
+            return T, velocity, acceleration + np.einsum("kij,kj->ki", Jd, self.qd)
+        import pinocchio as pin
+
+        data, frame, axes = model.createData(), model.getFrameId("tool"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        T, velocity, acceleration = np.empty((len(self.q), 4, 4)), np.empty((len(self.q), 3)), np.empty((len(self.q), 3))
+        for k, state in enumerate(zip(self.q, self.qd, self.qdd, strict=True)):
+            pin.forwardKinematics(model, data, *state)
+            T[k] = pin.updateFramePlacement(model, data, frame).homogeneous
+            velocity[k] = pin.getFrameVelocity(model, data, frame, axes).linear
+            acceleration[k] = pin.getFrameClassicalAcceleration(model, data, frame, axes).linear
+        return T, velocity, acceleration
+
+    def _gathered(self, rows: list[Array]) -> Array:
+        # eigenpy hands a matrix of one column over as a vector.
+        return np.reshape(np.array(rows), self.q.shape)
+
+
+@lru_cache(maxsize=16)
+def _model(description: Description) -> PinocchioModel | None:
+    """Return the Pinocchio model of an arm, None where Pinocchio is not installed."""
+    try:
+        return pinocchio_model(description)
+    except ModelError as error:
+        if isinstance(error.__context__, ImportError):
+            return None
+        raise
+
+
+def prepare(description: Description) -> None:
+    """Make the model of an arm, so that the first certificate need not."""
+    _model(description)

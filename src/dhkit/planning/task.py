@@ -1,0 +1,196 @@
+"""One motion to be found, and the bounds that it puts on a program's numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.planning.certificate import Checker
+from dhkit.planning.clear import Surroundings
+from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.problem import TINY_TIME, Problem, Rows
+from dhkit.planning.solver import Solution
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Limits
+
+__all__ = ["Margins", "Task"]
+
+FEW = 3
+"""Joints: with so many, programs are small."""
+LEAST_ROOM = 0.05
+"""Of a limit: margins take no more than the rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A motion through configurations, and what it must keep."""
+
+    arm: Description
+    """Whose motion it is."""
+    description: Description
+    """The same with its payload."""
+    points: Array
+    """Shape (legs + 1, n): start, what lies on the way, goal."""
+    start_velocity: Array
+    goal_velocity: Array
+    duration: float | None
+    """s; None: open."""
+    limits: Limits
+    checker: Checker
+    load: Array | None = None
+    """The payload's numbers, shape (10,)."""
+    parameters: tuple[Array, ...] = ()
+    """Of each constraint."""
+    friction: Friction | None = None
+    surroundings: Surroundings = Surroundings()
+
+    @property
+    def is_loaded(self) -> bool:
+        """Whether there is a payload."""
+        return self.load is not None
+
+    @property
+    def rests(self) -> bool:
+        """Whether the motion begins and ends at rest: it may then be slowed down."""
+        return not (self.start_velocity.any() or self.goal_velocity.any())
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """How much tighter than they are limits are for a program, by kind: shares of the limit, (intervals, rows) each.
+
+    Only intervals in which a limit was exceeded are tightened: elsewhere the motion need not suffer for it.
+    """
+
+    mesh: Mesh
+    shares: dict[str, Array] = field(default_factory=dict)
+
+    def of(self, what: str, count: int) -> Array:
+        """Return the shares of a kind in each interval, shape (intervals, count)."""
+        return self.shares.get(what, np.zeros((self.mesh.intervals, count)))
+
+    def at_knots(self, what: str, count: int) -> Array:
+        """Return the shares at knots, shape (intervals + 1, count): the wider one of both sides."""
+        shares = self.of(what, count)
+        edge = np.zeros((1, count))
+        return np.maximum(np.vstack([shares, edge]), np.vstack([edge, shares]))
+
+    def at_points(self, what: str, count: int, points: int) -> Array:
+        """Return the shares at a program's points, shape (points, count).
+
+        Points are one or more of every interval, or the knots (all, or those inside) and then the midpoints.
+        """
+        shares, K = self.of(what, count), self.mesh.intervals
+        if points % K == 0:
+            return np.tile(shares, (points // K, 1))
+        knots = self.at_knots(what, count)
+        return np.vstack([knots if points == 2 * K + 1 else knots[1:-1], shares])
+
+    def raised(self, what: str, excess: Array) -> Margins:
+        """Return margins that are wider by an excess, shape (intervals, rows), shares of the limit."""
+        wider = np.minimum(self.of(what, excess.shape[1]) + np.maximum(excess, 0.0), 1 - LEAST_ROOM)
+        return Margins(self.mesh, {**self.shares, what: wider})
+
+
+def x_bounds(task: Task, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> tuple[Array, Array]:
+    """Return the bounds of a program's numbers."""
+    n, K, limits = len(task.start_velocity), mesh.intervals, task.limits
+    room = margins.at_knots("position", n) * _sizes(limits)
+    q = limits.lower + room, limits.upper - room
+    speed = limits.velocity * (1 - margins.at_knots("velocity", n))
+    qd = -speed, speed.copy()
+    columns = mesh.curve.columns(K)
+    most = np.tile(limits.acceleration, (columns, 1))
+    qdd = -most, most.copy()
+    for k, point in zip((0, *mesh.ends), task.points, strict=True):
+        for bound in q:
+            bound[k] = point
+    for k, velocity in ((0, task.start_velocity), (-1, task.goal_velocity)):
+        for bound in qd:
+            bound[k] = velocity
+        if jerk_counts:
+            for bound in qdd:
+                bound[k] = 0.0
+    legs = len(mesh.legs)
+    low, high = (
+        np.concatenate([np.full(legs, first), *(bounds[side].ravel() for bounds in (q, qd, qdd))])
+        for side, first in enumerate((TINY_TIME, np.inf))
+    )
+    if task.duration is not None and legs == 1:
+        low[0] = high[0] = task.duration
+    return low, high
+
+
+def g_bounds(task: Task, problem: Problem, rows: list[Rows], margins: Margins) -> tuple[Array, Array]:
+    """Return the bounds of a program's rows."""
+    limits, low, high = task.limits, [], []
+    for row in rows:
+        shares = margins.at_points(row.what, row.count, row.points) if row.what in margins.shares else 0.0
+        a: Array = np.tile(row.low, (row.points, 1))
+        b: Array = np.tile(row.high, (row.points, 1))
+        match row.what:
+            case "position":
+                room = shares * _sizes(limits)
+                zeros = np.zeros_like(a)
+                a, b = limits.lower + room + zeros, limits.upper - room + zeros
+            case "velocity":
+                b = limits.velocity * (1 - shares) + np.zeros_like(b)
+                a = -b
+            case "jerk":
+                b = limits.jerk + np.zeros_like(b)
+                a = -b
+            case "duration":
+                if task.duration is not None:
+                    a = b = np.full_like(a, task.duration)
+            case "torque":
+                b = limits.torque / problem.point.torque_scale * (1 - shares) + np.zeros_like(b)
+                a = -b
+            case _ if row.what in margins.shares:
+                b = b - shares
+                a = np.where(a == -1, -b, a)
+        low.append(a.ravel())
+        high.append(b.ravel())
+    return np.concatenate(low), np.concatenate(high)
+
+
+def worst_row(solution: Solution, rows: list[Rows], bounds: tuple[Array, Array]) -> tuple[Rows, int, float, float]:
+    """Return the kind of row that misses its bounds most, which of its rows, where (0 to 1), and by how much."""
+    misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
+    misses = np.where(np.isnan(misses), np.inf, misses)
+    at, begin = int(np.argmax(misses)), 0
+    for row in rows:
+        size = row.count * row.points
+        if at < begin + size:
+            point, which = divmod(at - begin, row.count)
+            return row, which, point / max(row.points - 1, 1), float(misses[at])
+        begin += size
+    raise AssertionError("a row of none")
+
+
+def _sizes(limits: Limits) -> Array:
+    """Return by what positions are measured: the larger limit, as the certificate does."""
+    finite = np.isfinite(limits.upper - limits.lower)
+    return np.where(finite, np.maximum(np.abs(limits.lower), np.abs(limits.upper)), 1.0)
+
+
+def usual_accelerations(limits: Limits, guess: Array) -> Array:
+    """Return by what accelerations are measured, shape (n,): their limits, or twice the largest of a first guess."""
+    largest = np.maximum(2 * np.abs(guess).max(axis=0), 1e-3)
+    usual: Array = np.where(np.isfinite(limits.acceleration), limits.acceleration, np.maximum(largest, 0.05 * largest.max()))
+    return usual
+
+
+def curve_for(n: int, has_time: bool, jerk_counts: bool) -> Curve:
+    """Return how accelerations run: the fewest numbers that come near to the best motion.
+
+    In least time torques jump. Constant accelerations take twice as many intervals to follow them as linear ones, but
+    are solved for faster where there are many joints.
+    """
+    if not has_time:
+        return Curve.QUADRATIC
+    if jerk_counts:
+        return Curve.LINEAR
+    return Curve.JUMPING if n <= FEW else Curve.CONSTANT

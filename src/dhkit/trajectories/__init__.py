@@ -1,0 +1,34 @@
+"""Motions over time: exact piecewise polynomials, their limits, files, and the classical ones of textbooks."""
+
+from dhkit.trajectories.cartesian import circle, straight_line
+from dhkit.trajectories.following import joint_path
+from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.paths import JointPath
+from dhkit.trajectories.point_to_point import cubic, quintic, trapezoidal
+from dhkit.trajectories.samples import Samples
+from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
+from dhkit.trajectories.spline import spline
+from dhkit.trajectories.tool_paths import ToolCircle, ToolLine, ToolPath, tool_circle, tool_line
+from dhkit.trajectories.trajectory import Trajectory
+
+__all__ = [
+    "JointPath",
+    "Limits",
+    "Samples",
+    "ToolCircle",
+    "ToolLine",
+    "ToolPath",
+    "Torques",
+    "Trajectory",
+    "circle",
+    "cubic",
+    "joint_path",
+    "least_slowdown",
+    "quintic",
+    "require_inside",
+    "spline",
+    "straight_line",
+    "tool_circle",
+    "tool_line",
+    "trapezoidal",
+]

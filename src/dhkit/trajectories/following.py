@@ -1,0 +1,286 @@
+"""From a path of the tool to one of the joints: followed step by step, and refined until the tool keeps to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description
+from dhkit.errors import PlanningError
+from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
+from dhkit.kinematics.newton import Newton
+from dhkit.trajectories.interpolation import quintic_hermite
+from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.paths import JointPath
+from dhkit.trajectories.pieces import Pieces
+from dhkit.trajectories.timing import configuration
+from dhkit.trajectories.tool_paths import ToolPath
+
+__all__ = ["joint_path"]
+
+ACCURATE = 5e-8
+"""m and rad: how far the tool may be off the path between knots, half of what is promised."""
+CHECKS = 9
+"""Places between two knots at which that is checked."""
+CLOSES = 1e-12
+"""What may be missing at a knot, rad and shares of the reach; rounding leaves 1e-15."""
+NEWTON_STEPS, DAMPING = 8, 1e-13
+FIRST_STEP, SHORTEST_STEP = 1 / 16, 1e-6
+"""Of the path, when it is first followed."""
+TAME = 0.25
+"""How much of a step may be its second order, or an error: beside a singularity another branch is near, but no nearer
+than that makes it."""
+FARTHEST = 0.02
+"""rad and shares of the reach: how far Newton's method may lead from where a knot was expected."""
+SINGULAR = 1e-6
+"""A singular value of the Jacobian, lengths over the reach, below which a direction counts as lost."""
+NEAR_SINGULAR = 0.05
+"""A singular value below which a singularity is what a followed path has come to."""
+BEYOND = np.array([0.0, 0.01, 0.03])
+"""Of the path: where it is looked for what lies beyond a place that cannot be passed."""
+WHOLE = 6
+"""Coordinates of a pose."""
+MOST_KNOTS = 4097
+OUTSIDE = 1e-9
+"""rad and m: how far rounding may lead out of the joint limits."""
+
+
+def joint_path(
+    description: Description, tool: ToolPath, q0: ArrayLike | None = None, limits: Limits | None = None
+) -> JointPath:
+    """Return the joints' path that leads the tool along a path: on it to 1e-7 m and 1e-7 rad everywhere.
+
+    From its beginning the path is followed by Newton's method, in steps short enough that no branch is changed. At
+    knots q, q' = J^-1 v and q'' = J^-1 (v' - J' q') are exact, and a quintic goes between; knots are added where the
+    tool leaves its path. A redundant arm moves by the least norm of joint rates, q' = J^+ v. Arms whose tool turns
+    only as its position asks for (planar2r, say) follow the positions alone.
+
+    Parameters
+    ----------
+    description
+        The robot: any joints, with or without closed form.
+    tool
+        Of :func:`tool_line` or :func:`tool_circle`, or what has their methods.
+    q0
+        Near which joint values the path begins, shape (n,), rad and m. If not given, the branches that reach the
+        first pose are tried in turn.
+    limits
+        Whose joint limits are kept; the robot's own if not given.
+
+    Raises
+    ------
+    PlanningError
+        The first pose is not reached, or the path leaves the workspace, meets a singularity or the end of its branch,
+        or leaves the joint limits: says where.
+    ValueError
+        q0 has another shape.
+    """
+    limits = limits or Limits.of(description)
+    starts = _starts(description, tool, q0)
+    problem: PlanningError | None = None
+    for start in starts:
+        try:
+            path = _Follower.of(description, tool).path(start)
+            _require_inside(path, limits)
+        except PlanningError as error:
+            problem = problem or error
+        else:
+            return path
+    raise problem or PlanningError(f"{description.name} does not reach the path's first pose, {_place(tool, 0.0)}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Follower:
+    """An arm and the path of its tool."""
+
+    tool: ToolPath
+    newton: Newton
+    rank: int
+    """How many independent coordinates of the pose the arm moves."""
+
+    @classmethod
+    def of(cls, description: Description, tool: ToolPath) -> _Follower:
+        position_only = _aims_position(description)
+        rank = freedoms(description, "translational" if position_only else "whole")
+        return cls(tool, Newton.of(description, position_only=position_only, limits=False), rank)
+
+    def path(self, start: Array) -> JointPath:
+        """Return the path from joint values at its beginning, shape (n,)."""
+        s, q = self._crept(start)
+        while True:
+            qs, qss = self.derivatives(s, q)
+            pieces = Pieces(s, quintic_hermite(s, q, qs, qss))
+            wrong = np.flatnonzero(self._misses(pieces) > ACCURATE)
+            if not len(wrong):
+                return JointPath(self.newton.description, s, pieces.coefficients)
+            if len(s) + len(wrong) > MOST_KNOTS:
+                raise PlanningError(f"the joints turn ever faster {self._where(float(s[wrong[0]]), q[wrong[0]])}")
+            middles = (s[wrong] + s[wrong + 1]) / 2
+            found, closed = self.closed(middles, pieces(middles))
+            if not closed.all():
+                raise self._lost(float(middles[~closed][0]), found[~closed][0])
+            s, q = np.insert(s, wrong + 1, middles), np.insert(q, wrong + 1, found, axis=0)
+
+    def derivatives(self, s: Array, q: Array) -> tuple[Array, Array]:
+        """Return q' and q'' on the path, shape (N, n) each, by the least norm of q' for a redundant arm.
+
+        With J^+ from the singular values that the arm has: q' = J^+ v = J^T w, so that
+        q'' = J^+ (v' - J' q') + (1 - J^+ J) J'^T w.
+        """
+        newton, J = self.newton, self._jacobian(q)
+        rows, units = self._rows, newton.units
+        v, v_rate = (rows[:, 0] * array[:, : newton.size] for array in (self.tool.twists(s), self.tool.twist_rates(s)))
+        U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
+        if (sigma[:, self.rank - 1] < SINGULAR).any():
+            k = int(np.argmax(sigma[:, self.rank - 1] < SINGULAR))
+            raise PlanningError(f"the path meets a singularity {self._where(float(s[k]), q[k])}")
+        U, sigma, Vt = U[:, :, : self.rank], sigma[:, : self.rank], Vt[:, : self.rank]
+        inverse = np.swapaxes(Vt, 1, 2) / sigma[:, None] @ np.swapaxes(U, 1, 2)
+        first = np.einsum("kij,kj->ki", inverse, v)
+        J_rate = rows * jacobian_dot(newton.description, q, units * first)[:, : newton.size] * units
+        w = np.einsum("kji,kj->ki", inverse, first)
+        free = np.einsum("kji,kj->ki", J_rate, w)
+        free -= np.einsum("kji,kjl,kl->ki", Vt, Vt, free)
+        second = np.einsum("kij,kj->ki", inverse, v_rate - np.einsum("kij,kj->ki", J_rate, first)) + free
+        return units * first, units * second
+
+    @property
+    def _rows(self) -> Array:
+        """What coordinates of a pose are multiplied by, shape (size, 1): metres are measured by the reach."""
+        return np.repeat([1 / self.newton.length, 1.0], 3)[: self.newton.size, None]
+
+    def _jacobian(self, q: Array) -> Array:
+        """Return Jacobians, shape (N, size, n), lengths over the reach."""
+        J: Array = self._rows * jacobian(self.newton.description, q)[:, : self.newton.size] * self.newton.units
+        return J
+
+    def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return joint values that meet the path, from near ones (N, n), and which do without having jumped."""
+        goals = self.tool.poses(s).reshape(-1, 16)
+        found, damping = np.ascontiguousarray(q), np.full(len(s), DAMPING)
+        error = self.newton.error(found, goals)
+        for _ in range(NEWTON_STEPS):
+            step = self.newton.step(found, error, damping)
+            step_error = self.newton.error(step, goals)
+            # The last step is the one that rounding makes no better.
+            better = np.linalg.norm(step_error, axis=1) < np.linalg.norm(error, axis=1)
+            if not better.any():
+                break
+            found, error = np.where(better[:, None], step, found), np.where(better[:, None], step_error, error)
+        moved = np.abs((found - q) / self.newton.units).max(axis=1)
+        return found, (np.abs(error).max(axis=1) < CLOSES) & (moved < FARTHEST)
+
+    def _crept(self, start: Array) -> tuple[Array, Array]:
+        """Return knots (K,) and joint values (K, n), followed from the beginning to the end."""
+        s, q, step = [0.0], [start], FIRST_STEP
+        while s[-1] < 1.0:
+            here, at = np.array(s[-1:]), q[-1][None]
+            qs, qss = self.derivatives(here, at)
+            there = min(s[-1] + step, 1.0)
+            h = there - s[-1]
+            first, second = (h * qs)[0], (h**2 / 2 * qss)[0]
+            if self._largest(second) <= TAME * self._largest(first):
+                expected = at + first + second
+                found, closed = self.closed(np.array([there]), expected)
+                if closed[0] and self._largest(found - expected) <= TAME * self._largest(first) + CLOSES:
+                    s, q, step = [*s, there], [*q, found[0]], min(2 * step, FIRST_STEP)
+                    continue
+            step = h / 2
+            if step < SHORTEST_STEP:
+                raise self._lost(there, q[-1])
+        return np.array(s), np.array(q)
+
+    def _largest(self, moves: Array) -> float:
+        """Return the largest joint's move, rad or shares of the reach."""
+        return float(np.abs(moves / self.newton.units).max())
+
+    def _misses(self, pieces: Pieces) -> Array:
+        """Return how far the tool is off the path in each interval, m or rad, shape (K,)."""
+        shares = np.arange(1, CHECKS + 1) / (CHECKS + 1)
+        s = pieces.breaks[:-1, None] + np.diff(pieces.breaks)[:, None] * shares
+        q = pieces.at(s - pieces.breaks[:-1, None]).reshape(-1, self.newton.description.n)
+        error = self.newton.error(q, self.tool.poses(s.ravel()).reshape(-1, 16))
+        error[:, :3] *= self.newton.length
+        norms = np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
+        return np.asarray(norms.reshape(s.shape).max(axis=1))
+
+    def _lost(self, s: float, q: Array) -> PlanningError:
+        """Say why the path does not go on from joint values near s."""
+        position_only = self.newton.size == 3
+        if self._reached(s, q, position_only=position_only):
+            near = np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1] < NEAR_SINGULAR
+            met = "the path meets a singularity" if near else "the branch of joint values ends"
+            why = f"{met}, and only a jump leads on,"
+        elif not position_only and self.rank < WHOLE and self._reached(s, q, position_only=True):
+            why = "the arm cannot turn its tool as the path asks"
+        else:
+            why = "the path leaves the workspace"
+        return PlanningError(f"{why} {self._where(s, q)}")
+
+    def _reached(self, s: float, q: Array, *, position_only: bool) -> bool:
+        """Return whether the path stays within reach from s on, as far as a few poses tell."""
+        T = self.tool.poses(np.minimum(s + BEYOND, 1.0))
+        found = solve_numerically(self.newton.description, T, q, position_only=position_only, limits=False)
+        return bool(found.valid.all())
+
+    def _where(self, s: float, q: Array) -> str:
+        return f"at s = {s:.4g}, {_place(self.tool, s)}; q is {np.array2string(q, precision=4)}"
+
+
+def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> Iterator[Array]:
+    """Yield joint values at the path's beginning: that near q0, or those of all branches, the middle ones first."""
+    T = tool.poses(np.array([0.0]))[0]
+    position_only = _aims_position(description)
+    if q0 is not None:
+        near = configuration(description, q0, "q0")
+        found = solve_numerically(description, T, near, position_only=position_only, restarts=0, limits=False)
+        yield from _wound(found.q[found.valid], near, description)
+        if found.valid.any():
+            return
+    fit = classify(description).fit
+    if fit is not None:
+        solutions = inverse_kinematics(description, T)
+        near = configuration(description, q0, "q0") if q0 is not None else _middle(description)
+        usable = solutions.q[solutions.within if q0 is None else solutions.valid]
+        yield from sorted(_wound(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
+        return
+    found = solve_numerically(description, T, q0, position_only=position_only)
+    yield from found.q[found.valid]
+
+
+def _wound(q: Array, near: Array, description: Description) -> list[Array]:
+    """Return joint values (N, n) with whole turns added that bring them nearest."""
+    turns = np.where(description.numbers.prismatic, 0.0, 2 * np.pi * np.rint((near - q) / (2 * np.pi)))
+    return list(q + turns)
+
+
+def _middle(description: Description) -> Array:
+    return Newton.of(description, position_only=True, limits=True).middle
+
+
+def _aims_position(description: Description) -> bool:
+    """Return whether the arm turns its tool only as the position asks for."""
+    return freedoms(description, "translational") == freedoms(description, "whole")
+
+
+def _require_inside(path: JointPath, limits: Limits) -> None:
+    s, q = path.pieces.turning()
+    s, q = s.reshape(-1, q.shape[-1]), q.reshape(-1, q.shape[-1])
+    excess = np.maximum(limits.lower - q, q - limits.upper)
+    if excess.max() <= OUTSIDE:
+        return
+    i = int(np.argmax(excess.max(axis=0)))
+    row = int(np.argmax(excess[:, i]))
+    limit = limits.lower[i] if q[row, i] < limits.lower[i] else limits.upper[i]
+    name = path.description.joints[i].name
+    raise PlanningError(
+        f"{name} leaves its limit, {limit:.6g}, along the path: it comes to {q[row, i]:.6g} at s = {s[row, i]:.4g}"
+    )
+
+
+def _place(tool: ToolPath, s: float) -> str:
+    x, y, z = tool.poses(np.array([s]))[0, :3, 3]
+    return f"the tool at ({x:.4g}, {y:.4g}, {z:.4g}) m"

@@ -1,0 +1,154 @@
+"""Joint paths: where an arm goes, without when; and their exact composition with a time law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description
+from dhkit.trajectories.pieces import Pieces, shifted
+from dhkit.trajectories.trajectory import Trajectory
+
+__all__ = ["JointPath", "quintic_law"]
+
+BISECTIONS = 60
+"""Halve an interval down to rounding."""
+CLOSE = 1e-12
+"""Of the duration: breaks nearer to each other than this are one."""
+OUTSIDE = 1e-9
+"""How far a time law may leave [0, 1], or go back: rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """A path q(s) = sum_j coefficients[k, j] (s - breaks[k])^j of the joints over s in [0, 1].
+
+    Parameters
+    ----------
+    description
+        The robot.
+    breaks
+        Shape (K+1,), from 0 to 1, increasing.
+    coefficients
+        Shape (K, p+1, n), ascending powers, rad and m.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, values that are not finite, or breaks that do not go from 0 to 1.
+    TypeError
+        Not numbers.
+    """
+
+    description: Description
+    breaks: Array
+    coefficients: Array
+    pieces: Pieces = field(init=False)
+    """The same polynomials, without the robot."""
+
+    def __post_init__(self) -> None:
+        pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
+        if pieces.end != 1.0:
+            raise ValueError(f"breaks end with {pieces.end:g}; expected 1")
+        for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
+            object.__setattr__(self, name, value)
+
+    def q(self, s: ArrayLike) -> Array:
+        """Return joint values, shape (..., n), rad and m, for s of shape (...)."""
+        return self.pieces(s)
+
+    def qs(self, s: ArrayLike) -> Array:
+        """Return the first derivatives by s, shape (..., n)."""
+        return self.pieces.derivative(s)
+
+    def qss(self, s: ArrayLike) -> Array:
+        """Return the second derivatives by s, shape (..., n)."""
+        return self.pieces.derivative.derivative(s)
+
+    def timed(self, breaks: ArrayLike, coefficients: ArrayLike) -> Trajectory:
+        """Return the motion q(s(t)), exactly: degrees multiply, and breaks of both are breaks.
+
+        Parameters
+        ----------
+        breaks
+            Of s(t), shape (K+1,), s, from 0, increasing.
+        coefficients
+            Shape (K, p+1), ascending powers from each break: s(t) goes from 0 to 1 and never back.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or an s that goes back or does not go from 0 to 1.
+        TypeError
+            Not numbers.
+        """
+        rows = np.asarray(coefficients)
+        if rows.ndim != 2:
+            raise ValueError(f"coefficients has shape {rows.shape}; expected (K, p+1)")
+        law = Pieces.of(breaks, rows[..., None], 1)
+        _check_law(law)
+        merged = self._merged_breaks(law)
+        starts, middles = merged[:-1], (merged[:-1] + merged[1:]) / 2
+        k = np.searchsorted(law.breaks, middles) - 1
+        inner = shifted(law.coefficients[k], starts - law.breaks[k])[..., 0]
+        m = np.clip(np.searchsorted(self.breaks, law(middles)[..., 0]) - 1, 0, len(self.breaks) - 2)
+        outer = shifted(self.coefficients[m], inner[:, 0] - self.breaks[m])
+        inner[:, 0] = 0.0  # the path is expanded about where s is at each start
+        return Trajectory(self.description, merged, _composed(outer, inner))
+
+    def _merged_breaks(self, law: Pieces) -> Array:
+        """Return the law's breaks, and the times at which s passes the path's."""
+        low, high = np.zeros(len(self.breaks) - 2), np.full(len(self.breaks) - 2, law.end)
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            below = law(middle)[..., 0] < self.breaks[1:-1]
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        crossings = (low + high) / 2
+        gaps = np.abs(crossings[:, None] - law.breaks).min(axis=1, initial=np.inf)
+        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > CLOSE * law.end]]))
+        distinct: Array = merged[np.concatenate([[True], np.diff(merged) > 0])]
+        return distinct
+
+
+def quintic_law() -> tuple[Array, Array]:
+    """Return breaks and coefficients of s(t) = 10 t^3 - 15 t^4 + 6 t^5: from rest to rest in one second."""
+    return np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0, 10.0, -15.0, 6.0]])
+
+
+def _check_law(law: Pieces) -> None:
+    start, end = float(law(0.0)[0]), float(law(law.end)[0])
+    if max(abs(start), abs(end - 1.0)) > OUTSIDE:
+        raise ValueError(f"s goes from {start:.9g} to {end:.9g}; expected from 0 to 1")
+    inside = law.breaks[1:-1]
+    jump = np.abs(law(inside) - law(inside, "left")).max(initial=0.0)
+    if jump > OUTSIDE:
+        raise ValueError(f"s jumps by {jump:.3g} at a break; expected a continuous s(t)")
+    t, rate = law.derivative.turning()
+    k = np.unravel_index(int(np.argmin(rate)), rate.shape)
+    if rate[k] * law.end < -OUTSIDE:
+        raise ValueError(f"s goes back at {t[k]:.4g} s; expected an s(t) that never does")
+
+
+def _composed(outer: Array, inner: Array) -> Array:
+    """Return the coefficients of outer(inner(u)), by Horner's rule, shape (K, p r + 1, n).
+
+    Parameters
+    ----------
+    outer
+        Shape (K, p+1, n).
+    inner
+        Shape (K, r+1).
+    """
+    power, step = outer.shape[1] - 1, inner.shape[1] - 1
+    result = np.zeros((len(outer), power * step + 1, outer.shape[2]))
+    result[:, 0] = outer[:, power]
+    for j in range(power - 1, -1, -1):
+        degree = (power - 1 - j) * step
+        product = np.zeros_like(result)
+        for i in range(step + 1):
+            product[:, i : i + degree + 1] += inner[:, i, None, None] * result[:, : degree + 1]
+        product[:, 0] += outer[:, j]
+        result = product
+    return result

@@ -1,0 +1,136 @@
+"""Piecewise polynomials in several columns: what trajectories, joint paths and time laws are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import comb
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array
+from dhkit.description.frames import number_array
+
+__all__ = ["Pieces", "Side", "shifted"]
+
+Side: TypeAlias = Literal["right", "left"]
+"""Which piece counts at a break."""
+REFINEMENTS = 6
+"""Newton steps to a turning point: from a twentieth of a piece away four reach rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A piecewise polynomial f(x) = sum_j coefficients[k, j] (x - breaks[k])^j for breaks[k] <= x <= breaks[k + 1]."""
+
+    breaks: Array
+    """Shape (K+1,), from 0, increasing, read-only."""
+    coefficients: Array
+    """Shape (K, p+1, m), read-only."""
+
+    @classmethod
+    def of(cls, breaks: ArrayLike, coefficients: ArrayLike, columns: int) -> Pieces:
+        """Check what a caller gave, and copy it.
+
+        Raises
+        ------
+        ValueError
+            Shapes other than (K+1,) and (K, p+1, columns), values that are not finite, or breaks that do not begin
+            with 0 and increase.
+        TypeError
+            Not numbers.
+        """
+        b = np.array(number_array(breaks, "breaks", "(K+1,)"))
+        c = np.array(number_array(coefficients, "coefficients", f"(K, p+1, {columns})"), order="C")
+        if b.ndim != 1 or len(b) < 2:
+            raise ValueError(f"breaks has shape {b.shape}; expected (K+1,) with K >= 1")
+        if c.ndim != 3 or c.shape[0] != len(b) - 1 or c.shape[1] < 1 or c.shape[2] != columns:
+            raise ValueError(f"coefficients has shape {c.shape}; expected ({len(b) - 1}, p+1, {columns})")
+        for name, array in (("breaks", b), ("coefficients", c)):
+            if not np.isfinite(array).all():
+                place = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
+                raise ValueError(f"{name} has {array[place]} at {place}; expected finite values")
+        if b[0] != 0.0:
+            raise ValueError(f"breaks begin with {b[0]:g}; expected 0")
+        if (np.diff(b) <= 0).any():
+            k = int(np.flatnonzero(np.diff(b) <= 0)[0])
+            raise ValueError(f"breaks do not increase: breaks[{k}] is {b[k]:g}, breaks[{k + 1}] is {b[k + 1]:g}")
+        b.flags.writeable = c.flags.writeable = False
+        return cls(b, c)
+
+    @property
+    def end(self) -> float:
+        """The last break."""
+        return float(self.breaks[-1])
+
+    @cached_property
+    def derivative(self) -> Pieces:
+        """The first derivative."""
+        powers = np.arange(1, self.coefficients.shape[1])[:, None]
+        falling = self.coefficients[:, 1:] * powers if len(powers) else np.zeros_like(self.coefficients)
+        return Pieces(self.breaks, falling)
+
+    def differentiated(self, order: int) -> Pieces:
+        """Return a derivative; order 0 is the function itself."""
+        return self.derivative.differentiated(order - 1) if order else self
+
+    def __call__(self, x: ArrayLike, side: Side = "right") -> Array:
+        """Return values, shape (..., m), for x of shape (...); the first and last polynomial go on outside."""
+        x = np.asarray(x, dtype=float)
+        if side not in ("right", "left"):
+            raise ValueError(f"side is {side!r}; expected 'right' or 'left'")
+        k = np.clip(np.searchsorted(self.breaks, x, side) - 1, 0, len(self.coefficients) - 1)
+        values = self.on(k, x - self.breaks[k])
+        values[np.isnan(x)] = np.nan
+        return values
+
+    def on(self, piece: NDArray[np.intp], u: Array) -> Array:
+        """Return values, shape (..., m), at u behind the beginning of given pieces, shapes (...)."""
+        value: Array = self.coefficients[piece, -1] + 0.0 * u[..., None]
+        for power in range(self.coefficients.shape[1] - 2, -1, -1):
+            value = value * u[..., None] + self.coefficients[piece, power]
+        return value
+
+    def inside(self, points: int) -> tuple[Array, Array]:
+        """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
+        width = np.diff(self.breaks)[:, None]
+        u = width * np.linspace(0.0, 1.0, points)
+        return self.breaks[:-1, None] + u, self.at(u)
+
+    def at(self, u: Array) -> Array:
+        """Return values, shape (K, P, m), at u (K, P) or (K, P, m) behind each piece's beginning."""
+        u = u if u.ndim == 3 else u[..., None]
+        value: Array = self.coefficients[:, None, -1] + 0.0 * u
+        for power in range(self.coefficients.shape[1] - 2, -1, -1):
+            value = value * u + self.coefficients[:, None, power]
+        return value
+
+    def turning(self, points: int = 20) -> tuple[Array, Array]:
+        """Return where each column is extreme: places and values (K, P, m), among them each piece's ends.
+
+        Local extremes are refined by Newton's method from evenly spread points; two in one cell may be missed.
+        """
+        width = np.diff(self.breaks)[:, None, None]
+        grid = width * np.linspace(0.0, 1.0, points)[:, None]
+        low, high = np.maximum(grid - width / (points - 1), 0.0), np.minimum(grid + width / (points - 1), width)
+        first, second = self.derivative, self.derivative.derivative
+        u = np.broadcast_to(grid, (len(width), points, self.coefficients.shape[2]))
+        start = u
+        for _ in range(REFINEMENTS):
+            slope, bend = first.at(u), second.at(u)
+            step = np.divide(slope, bend, out=np.zeros_like(slope), where=bend != 0.0)
+            u = np.clip(u - step, low, high)
+        u = np.concatenate([start, u], axis=1)
+        return self.breaks[:-1, None, None] + u, self.at(u)
+
+
+def shifted(coefficients: Array, u: Array) -> Array:
+    """Return the polynomials (K, p+1, m) about another place: of x - u instead of x, u of shape (K,)."""
+    degrees = coefficients.shape[1]
+    matrix = np.zeros((len(coefficients), degrees, degrees))
+    for i in range(degrees):
+        for j in range(i, degrees):
+            matrix[:, i, j] = comb(j, i) * u ** (j - i)
+    return np.asarray(matrix @ coefficients)

@@ -1,0 +1,183 @@
+"""The classical motions between two configurations: cubic, quintic, and linear with parabolic blends."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description
+from dhkit.trajectories.interpolation import cubic_hermite, quintic_hermite
+from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
+from dhkit.trajectories.timing import check_duration, configuration, default_limits, timed
+from dhkit.trajectories.trajectory import Trajectory
+
+__all__ = ["cubic", "quintic", "trapezoidal"]
+
+LEAST_BLEND = 0.01
+"""Of the duration: shorter blends are not looked for, since accelerations grow without end."""
+GRID, ZOOMED, ZOOMS = 50, 15, 4
+"""Blends that are tried, then those between the best one's neighbours, so many times: to 2e-6 of the duration."""
+
+
+def cubic(
+    description: Description,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    qd0: ArrayLike | None = None,
+    qd1: ArrayLike | None = None,
+    limits: Limits | None = None,
+    torques: Torques | None = None,
+) -> Trajectory:
+    """Return the cubic polynomials of time that meet values and rates at both ends.
+
+    Craig 2005, Introduction to Robotics, section 7.3.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    q0, q1
+        Start and goal, shape (n,), rad and m.
+    duration
+        In s; None for the shortest that the limits allow, from rest to rest.
+    qd0, qd1
+        Rates at both ends, shape (n,), rad/s and m/s; 0 if not given.
+    limits
+        The robot's own if not given, without those of torque where a link has no body; a given duration is then held
+        against the joints' ranges alone.
+    torques
+        As for :func:`dhkit.trajectories.least_slowdown`.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, values that are not finite, or rates without a duration.
+    PlanningError
+        A joint leaves its limits on the way, the duration is too short for the limits given, or no duration keeps them.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> motion = cubic(library_robot("planar2r"), [0, 0], [0.5, 1.0], duration=2.0)
+    >>> motion.q(1.0), motion.qd(1.0)
+    (array([0.25, 0.5 ]), array([0.375, 0.75 ]))
+    """
+    q = np.stack([configuration(description, q0, "q0"), configuration(description, q1, "q1")])
+    ends = (qd0, qd1)
+    T = _unit(duration, ends)
+    qd = np.stack([configuration(description, qd0, "qd0"), configuration(description, qd1, "qd1")])
+    times = np.array([0.0, T])
+    return timed(Trajectory(description, times, cubic_hermite(times, q, qd)), duration, limits, torques)
+
+
+def quintic(
+    description: Description,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    qd0: ArrayLike | None = None,
+    qd1: ArrayLike | None = None,
+    qdd0: ArrayLike | None = None,
+    qdd1: ArrayLike | None = None,
+    limits: Limits | None = None,
+    torques: Torques | None = None,
+) -> Trajectory:
+    """Return the quintic polynomials of time that meet values, rates and accelerations at both ends.
+
+    Parameters
+    ----------
+    description, q0, q1, duration, qd0, qd1, limits, torques
+        As for :func:`cubic`.
+    qdd0, qdd1
+        Accelerations at both ends, shape (n,), per second squared; 0 if not given.
+
+    Raises
+    ------
+    ValueError, PlanningError
+        As for :func:`cubic`.
+    """
+    q = np.stack([configuration(description, q0, "q0"), configuration(description, q1, "q1")])
+    T = _unit(duration, (qd0, qd1, qdd0, qdd1))
+    qd = np.stack([configuration(description, qd0, "qd0"), configuration(description, qd1, "qd1")])
+    qdd = np.stack([configuration(description, qdd0, "qdd0"), configuration(description, qdd1, "qdd1")])
+    times = np.array([0.0, T])
+    return timed(Trajectory(description, times, quintic_hermite(times, q, qd, qdd)), duration, limits, torques)
+
+
+def trapezoidal(
+    description: Description,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    blend: float | None = None,
+    limits: Limits | None = None,
+    torques: Torques | None = None,
+) -> Trajectory:
+    """Return a motion of trapezoidal velocity: all joints together along the straight line between two configurations.
+
+    Linear with parabolic blends (Craig 2005, section 7.3; Spong, Hutchinson and Vidyasagar 2006, section 5.5.3).
+
+    Parameters
+    ----------
+    description, q0, q1, duration, limits, torques
+        As for :func:`cubic`.
+    blend
+        The share of the duration that accelerating takes, and braking again, in (0, 0.5]; None for the one that the
+        limits allow the shortest duration with.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, values that are not finite, or another blend.
+    PlanningError
+        As for :func:`cubic`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> motion = trapezoidal(arm, [0, 0], [0.6, 0.3], limits=Limits.of(arm, velocity=1, acceleration=5, torque=np.inf))
+    >>> round(motion.duration, 4)  # 0.6 / 1 + 1 / 5
+    0.8
+    """
+    check_duration(duration)
+    start, goal = configuration(description, q0, "q0"), configuration(description, q1, "q1")
+    if blend is not None and not 0 < blend <= 0.5:
+        raise ValueError(f"blend is {blend!r}; expected more than 0 and at most 0.5")
+    if blend is None:
+        bounds = limits or default_limits(description)
+        require_inside(_blended(description, start, goal, 0.5), bounds)
+        blend = _best_blend(description, start, goal, bounds, torques) if (start != goal).any() else 0.5
+    return timed(_blended(description, start, goal, blend), duration, limits, torques)
+
+
+def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
+    """Return the duration that a motion is first made for: another changes what rates and accelerations mean."""
+    check_duration(duration)
+    if duration is None and any(np.any(np.asarray(end)) for end in ends if end is not None):
+        raise ValueError("rates or accelerations at the ends are given, but no duration; expected a duration")
+    return 1.0 if duration is None else duration
+
+
+def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Trajectory:
+    """Return the motion over one second."""
+    way, rate = q1 - q0, (q1 - q0) / (1 - blend)
+    speed_up = np.stack([q0, np.zeros_like(way), rate / (2 * blend)])
+    cruise = np.stack([q0 + rate * blend / 2, rate, np.zeros_like(way)])
+    brake = np.stack([q1 - rate * blend / 2, rate, -rate / (2 * blend)])
+    if blend == 0.5:
+        return Trajectory(description, np.array([0.0, 0.5, 1.0]), np.stack([speed_up, brake]))
+    return Trajectory(description, np.array([0.0, blend, 1 - blend, 1.0]), np.stack([speed_up, cruise, brake]))
+
+
+def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
+    # The duration need not have one minimum alone in the blend: all are tried on a grid before one is refined.
+    low, high, count = LEAST_BLEND, 0.5, GRID
+    for _ in range(ZOOMS + 1):
+        blends = np.linspace(low, high, count)
+        motions = [_blended(description, q0, q1, float(blend)) for blend in blends]
+        best = int(np.argmin(least_slowdowns(motions, limits, torques)))
+        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], ZOOMED
+    return float(blends[best])

@@ -1,0 +1,236 @@
+"""How much a motion has to be slowed down, or may be sped up, to just keep its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Description
+from dhkit.dynamics import gravity_torque, inverse_dynamics
+from dhkit.errors import PlanningError
+from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.trajectory import Trajectory
+
+__all__ = ["Torques", "least_slowdown", "least_slowdowns", "require_inside"]
+
+Torques: TypeAlias = Callable[[Array, Array, Array], Array]
+"""From q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n)."""
+
+ROUNDING = 1e-12
+"""Of the largest torque: a difference below this is rounding, and limits nothing."""
+JUMP = 1e-6
+"""Of the largest value: what a velocity or an acceleration jumps by at a break, if it is more than rounding."""
+OUTSIDE = 1e-9
+"""rad and m: how far rounding may lead out of the joint limits."""
+FINER, DIPS = 2, 3
+"""How often the neighbourhoods of each joint's tightest samples are sampled again, and how many of them."""
+ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
+
+
+def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | None = None, points: int = 20) -> float:
+    """Return the smallest c for which ``trajectory.slowed(c)`` keeps its limits; below 1 it may be sped up.
+
+    A motion c times as slow has velocities over c, accelerations over c^2 and jerks over c^3, and torques
+    g + (tau - g) / c^2 where g are those that hold the arm (Hollerbach 1984, Dynamic scaling of manipulator
+    trajectories). That is exact without friction. It is meant for motions from rest to rest: how accelerations begin
+    and end is no jump, but one at a break inside is.
+
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    limits
+        Those of velocity, acceleration, jerk and torque are kept; positions do not change.
+    torques
+        From q, qd and qdd, shape (N, n) each, to torques (N, n), without friction; inverse dynamics if not given. Not
+        called where no torque is limited.
+    points
+        Torques are checked at so many times an interval, both its ends included, and more finely about the tightest;
+        velocities, accelerations and jerks at their extremes.
+
+    Returns
+    -------
+    float
+        0 for a motion that stands still.
+
+    Raises
+    ------
+    PlanningError
+        The arm cannot hold itself somewhere, or not while it moves; something jumps whose derivative is limited; or
+        nothing limits the motion.
+    DescriptionError
+        Torques are limited, and a link has no body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> motion = Trajectory(arm, [0, 1], [[[0, 0], [0, 0], [3, 0], [-2, 0]]])
+    >>> round(least_slowdown(motion, Limits.of(arm, velocity=0.5, torque=np.inf)), 12)
+    3.0
+    """
+    return float(least_slowdowns([trajectory], limits, torques, points)[0])
+
+
+def least_slowdowns(
+    trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None = None, points: int = 20
+) -> Array:
+    """Return :func:`least_slowdown` of several motions of one robot, shape (m,), their torques in one batch."""
+    slowest = np.array([_by_derivatives(trajectory, limits) for trajectory in trajectories])
+    if np.isfinite(limits.torque).any():
+        slowest = np.maximum(slowest, _by_torques(trajectories, limits, torques, points))
+    for trajectory, c in zip(trajectories, slowest, strict=True):
+        moving = np.abs(trajectory.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0) > 0
+        if c == 0 and moving.any():
+            name = trajectory.description.joints[int(np.flatnonzero(moving)[0])].name
+            raise PlanningError(
+                f"nothing limits the motion: {name} moves, and has neither a velocity, acceleration, jerk nor torque"
+                " limit that it could reach; give one in limits, or a duration"
+            )
+    return slowest
+
+
+def require_inside(trajectory: Trajectory, limits: Limits) -> None:
+    """Refuse a motion that leaves the joint limits.
+
+    Raises
+    ------
+    PlanningError
+        Names the joint, the limit and when.
+    """
+    t, q = trajectory.pieces.turning()
+    n = trajectory.n
+    t, q = t.reshape(-1, n), q.reshape(-1, n)
+    excess = np.maximum(limits.lower - q, q - limits.upper)
+    if excess.max() <= OUTSIDE:
+        return
+    row, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
+    below = q[row, i] < limits.lower[i]
+    side, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
+    unit = "m" if trajectory.description.numbers.prismatic[i] else "rad"
+    raise PlanningError(
+        f"{trajectory.description.joints[i].name} leaves its {side} limit, {limit:.6g} {unit}: it comes to"
+        f" {q[row, i]:.6g} {unit} at {t[row, i]:.4g} s"
+    )
+
+
+def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:
+    slowest = 0.0
+    for name, order in ORDERS.items():
+        limit = getattr(limits, name)
+        if np.isinf(limit).all():
+            continue
+        _refuse_jumps(trajectory, order - 1, name, limit)
+        _, values = trajectory.pieces.differentiated(order).turning()
+        slowest = max(slowest, float((np.abs(values).max(axis=(0, 1)) / limit).max() ** (1 / order)))
+    return slowest
+
+
+def _refuse_jumps(trajectory: Trajectory, order: int, limited: str, limit: Array) -> None:
+    """Refuse a limit of a derivative where what it is the derivative of jumps."""
+    if not order:
+        return
+    values = trajectory.pieces.differentiated(order)
+    inside = trajectory.breaks[1:-1]
+    jumps = np.abs(values(inside) - values(inside, "left"))
+    largest = np.abs(values.inside(2)[1]).max()
+    wrong = (jumps > JUMP * largest) & np.isfinite(limit)
+    if wrong.any():
+        row, i = np.argwhere(wrong)[0]
+        what = {1: "velocity", 2: "acceleration"}[order]
+        raise PlanningError(
+            f"the {what} of {trajectory.description.joints[int(i)].name} jumps at {inside[row]:.4g} s; at no speed does"
+            f" that keep a limit of {limited}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Samples of several motions, one below the other; N rows, those of a motion together."""
+
+    owner: NDArray[np.intp]
+    """The motion each sample belongs to, shape (N,)."""
+    piece: NDArray[np.intp]
+    """... and the interval of it."""
+    u: Array
+    """How far into the interval, s."""
+    step: Array
+    """How far apart samples are there, s."""
+    width: Array
+    """How long the interval is, s."""
+
+    @classmethod
+    def spread(cls, trajectories: Sequence[Trajectory], points: int) -> _Places:
+        """Return samples at both ends of every interval and between."""
+        pieces = [len(trajectory.breaks) - 1 for trajectory in trajectories]
+        owner = np.repeat(np.arange(len(trajectories)), pieces)
+        piece = np.concatenate([np.arange(count) for count in pieces])
+        width = np.concatenate([np.diff(trajectory.breaks) for trajectory in trajectories])
+        each = [np.repeat(array, points) for array in (owner, piece, width / (points - 1), width)]
+        return cls(each[0], each[1], np.outer(width, np.linspace(0, 1, points)).ravel(), each[2], each[3])
+
+    def around(self, rows: NDArray[np.intp], points: int) -> _Places:
+        """Return samples between the neighbours of some rows, which come motion by motion."""
+        r = np.repeat(rows, points)
+        u = self.u[r] + np.tile(np.linspace(-1, 1, points), len(rows)) * self.step[r]
+        finer = self.step[r] * 2 / (points - 1)
+        return _Places(self.owner[r], self.piece[r], np.clip(u, 0.0, self.width[r]), finer, self.width[r])
+
+    def states(self, trajectories: Sequence[Trajectory]) -> tuple[Array, Array, Array]:
+        """Return q, qd and qdd, shape (N, n) each."""
+        parts = np.split(np.arange(len(self.u)), np.searchsorted(self.owner, np.arange(1, len(trajectories))))
+        q, qd, qdd = (
+            np.concatenate(
+                [
+                    trajectory.pieces.differentiated(order).on(self.piece[rows], self.u[rows])
+                    for trajectory, rows in zip(trajectories, parts, strict=True)
+                ]
+            )
+            for order in range(3)
+        )
+        return q, qd, qdd
+
+
+def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
+    """Return the least slowdown by torques, shape (m,)."""
+    description = trajectories[0].description
+    places, most = _Places.spread(trajectories, points), np.full(len(trajectories), np.inf)
+    for _ in range(FINER + 1):
+        q, qd, qdd = places.states(trajectories)
+        if torques is None:
+            tau, g = inverse_dynamics(description, q, qd, qdd), gravity_torque(description, q)
+        else:
+            tau, g = torques(q, qd, qdd), torques(q, 0 * q, 0 * q)
+        moves = np.abs(tau - g) > ROUNDING * np.abs(tau).max()
+        spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
+        falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))
+        if falls.any():
+            row, i = (int(k) for k in np.argwhere(falls)[0])
+            when = trajectories[places.owner[row]].breaks[places.piece[row]] + places.u[row]
+            _refuse_holding(description, i, float(g[row, i]), float(limits.torque[i]), float(when))
+        room = np.divide(spare, np.abs(tau - g), out=np.full_like(g, np.inf), where=moves)
+        np.minimum.at(most, places.owner, room.min(axis=1))
+        places = places.around(_tightest(places.owner, room, len(trajectories)), points)
+    return np.asarray(1 / np.sqrt(most))
+
+
+def _tightest(owner: NDArray[np.intp], room: Array, count: int) -> NDArray[np.intp]:
+    """Return the rows of each joint's least rooms in each motion, those with no less beside them."""
+    beside = np.pad(room, ((1, 1), (0, 0)), constant_values=np.inf)
+    dips = np.where((room <= beside[:-2]) & (room <= beside[2:]), room, np.inf)
+    bounds = np.searchsorted(owner, np.arange(count + 1))
+    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:DIPS].ravel() for a, b in pairwise(bounds)]
+    return np.asarray(np.concatenate(rows), dtype=np.intp)
+
+
+def _refuse_holding(description: Description, i: int, needed: float, limit: float, when: float) -> None:
+    unit = "N" if description.numbers.prismatic[i] else "N m"
+    raise PlanningError(
+        f"{description.joints[i].name} cannot hold the arm while it moves at {when:.4g} s, at any speed: that takes"
+        f" {abs(needed):.6g} {unit} of {limit:.6g} {unit}"
+    )

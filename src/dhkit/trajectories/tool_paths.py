@@ -1,0 +1,168 @@
+"""Paths of the tool in space: a straight line and a circle, with their exact derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, check_pose
+
+__all__ = ["ToolCircle", "ToolLine", "ToolPath", "tool_circle", "tool_line"]
+
+
+class ToolPath(Protocol):
+    """Poses of the tool over s in [0, 1]."""
+
+    def poses(self, s: Array) -> Array:
+        """Return T_world_tool, shape (N, 4, 4), for s of shape (N,)."""
+
+    def twists(self, s: Array) -> Array:
+        """Return velocities by s of the tool's origin and angular ones, world axes, shape (N, 6), m and rad."""
+
+    def twist_rates(self, s: Array) -> Array:
+        """Return the derivatives of the twists by s, shape (N, 6)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLine:
+    """A straight line, turned evenly about one axis the shorter way round."""
+
+    T0: Array
+    """The first pose, shape (4, 4)."""
+    way: Array
+    """Shape (3,), m."""
+    turn: Array
+    """Rotation vector from the first to the last pose, world axes, shape (3,), rad."""
+
+    def poses(self, s: Array) -> Array:
+        """Return poses, shape (N, 4, 4)."""
+        return _poses(self.T0[:3, 3] + s[:, None] * self.way, s[:, None] * self.turn, self.T0)
+
+    def twists(self, s: Array) -> Array:
+        """Return the same twist everywhere, shape (N, 6)."""
+        return np.tile(np.concatenate([self.way, self.turn]), (len(s), 1))
+
+    def twist_rates(self, s: Array) -> Array:
+        """Return zeros, shape (N, 6)."""
+        return np.zeros((len(s), 6))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolCircle:
+    """An arc about an axis through a point."""
+
+    T0: Array
+    """The first pose, shape (4, 4)."""
+    centre: Array
+    """A point of the axis, shape (3,), m."""
+    turn: Array
+    """The axis times the angle, shape (3,), rad."""
+    turning: bool
+    """Whether the tool turns with the arc; else its orientation stays."""
+
+    def poses(self, s: Array) -> Array:
+        """Return poses, shape (N, 4, 4)."""
+        turn = s[:, None] * self.turn
+        return _poses(self.centre + self._radii(s), turn if self.turning else 0.0 * turn, self.T0)
+
+    def twists(self, s: Array) -> Array:
+        """Return twists, shape (N, 6)."""
+        velocity: Array = np.cross(self.turn, self._radii(s))
+        return np.asarray(np.concatenate([velocity, np.broadcast_to(self.turn * self.turning, velocity.shape)], axis=1))
+
+    def twist_rates(self, s: Array) -> Array:
+        """Return how the twists change: towards the axis, shape (N, 6)."""
+        towards = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
+        return np.asarray(np.concatenate([towards, np.zeros_like(towards)], axis=1))
+
+    def _radii(self, s: Array) -> Array:
+        radii: Array = np.einsum("kij,j->ki", _rotations(s[:, None] * self.turn), self.T0[:3, 3] - self.centre)
+        return radii
+
+
+def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
+    """Return the straight line between two poses; its orientation turns evenly about one axis (slerp).
+
+    Parameters
+    ----------
+    T0, T1
+        Poses of the tool in the world, shape (4, 4).
+
+    Raises
+    ------
+    ValueError
+        Other shapes, or matrices that are no poses.
+    """
+    from scipy.spatial.transform import Rotation
+
+    start, goal = _pose(T0, "T0"), _pose(T1, "T1")
+    turn = Rotation.from_matrix(goal[:3, :3] @ start[:3, :3].T).as_rotvec()
+    return ToolLine(start, goal[:3, 3] - start[:3, 3], turn)
+
+
+def tool_circle(
+    T0: ArrayLike, centre: ArrayLike, axis: ArrayLike, angle: float = 2 * np.pi, turning: bool = False
+) -> ToolCircle:
+    """Return an arc that begins at a pose.
+
+    Parameters
+    ----------
+    T0
+        The first pose, shape (4, 4), in the world.
+    centre
+        A point of the axis, shape (3,), m: the arc lies in the plane across the axis through the first position.
+    axis
+        The axis' direction, shape (3,), of any length but 0; it turns about it by the right hand.
+    angle
+        How far, rad.
+    turning
+        Whether the tool turns with the arc; else its orientation stays.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, no pose, values that are not finite, an axis of length 0, or a position on the axis.
+    """
+    start = _pose(T0, "T0")
+    point, direction = _vector(centre, "centre"), _vector(axis, "axis")
+    length = float(np.linalg.norm(direction))
+    if not length:
+        raise ValueError("axis has length 0; expected a direction")
+    if not np.isfinite(angle):
+        raise ValueError(f"angle is {angle!r}; expected a number, rad")
+    direction = direction / length
+    arm = start[:3, 3] - point
+    if not np.linalg.norm(np.cross(direction, arm)) > 0:
+        raise ValueError("T0 lies on the axis; expected a circle's beginning beside it")
+    return ToolCircle(start, point, direction * float(angle), turning)
+
+
+def _poses(positions: Array, turns: Array, T0: Array) -> Array:
+    T = np.zeros((len(positions), 4, 4))
+    T[:, :3, :3] = _rotations(turns) @ T0[:3, :3]
+    T[:, :3, 3] = positions
+    T[:, 3, 3] = 1.0
+    return T
+
+
+def _rotations(turns: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(turns).as_matrix())
+
+
+def _pose(T: ArrayLike, name: str) -> Array:
+    array = check_pose(T, name)
+    if array.shape != (4, 4) or not np.isfinite(array).all():
+        raise ValueError(f"{name} has shape {array.shape}; expected (4, 4), finite values")
+    return array
+
+
+def _vector(value: ArrayLike, name: str) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} has shape {array.shape}; expected (3,), finite values")
+    return array

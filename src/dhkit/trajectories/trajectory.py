@@ -1,0 +1,310 @@
+"""A motion of an arm, exactly: piecewise polynomials of time, their derivatives and their torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description
+from dhkit.description.frames import number_array
+from dhkit.errors import DescriptionError
+from dhkit.kernels import check_whole
+from dhkit.trajectories.interpolation import interpolated
+from dhkit.trajectories.pieces import Pieces, Side, shifted
+from dhkit.trajectories.samples import Samples
+
+if TYPE_CHECKING:
+    from dhkit.dynamics import Friction
+
+__all__ = ["Trajectory"]
+
+MEETS = 1e-9
+"""rad and m: two motions whose ends are nearer to each other are joined."""
+SAME_TIME = 1e-9
+"""Of a sample's interval: a last sample nearer to the end than this is the end."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory:
+    """A motion q(t) = sum_j coefficients[k, j] (t - breaks[k])^j on interval k; immutable, equal to its copies.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    breaks
+        Shape (K+1,), s, from 0, increasing.
+    coefficients
+        Shape (K, p+1, n), ascending powers, rad and m.
+    report
+        What its planner has to say; no part of equality.
+
+    Raises
+    ------
+    ValueError
+        Other shapes, values that are not finite, or breaks that do not begin with 0 and increase.
+    TypeError
+        Not numbers.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> motion = Trajectory(library_robot("planar2r"), [0, 2], [[[0, 1], [0.5, 0]]])
+    >>> motion.q(1.0), motion.qd([0.0, 1.0]).shape, motion.duration
+    (array([0.5, 1. ]), (2, 2), 2.0)
+    """
+
+    description: Description
+    breaks: Array
+    coefficients: Array
+    report: Any = None
+    pieces: Pieces = field(init=False)
+    """The same polynomials, without the robot."""
+
+    def __post_init__(self) -> None:
+        pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
+        for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.description.n
+
+    @property
+    def duration(self) -> float:
+        """In s."""
+        return self.pieces.end
+
+    # Values
+
+    def q(self, t: ArrayLike, side: Side = "right") -> Array:
+        """Return joint values, shape (..., n), rad and m, for times of shape (...), s.
+
+        Before the beginning and after the end the arm stands still there. NaN times give NaN rows.
+
+        Parameters
+        ----------
+        t
+            Times, any shape.
+        side
+            Which piece counts at a break: the one that begins (``"right"``) or the one that ends there.
+
+        Raises
+        ------
+        ValueError
+            Another side.
+        TypeError
+            Times that are not numbers.
+        """
+        t = number_array(t, "t", "(...)")
+        return self.pieces(np.clip(t, 0.0, self.duration), side)
+
+    def qd(self, t: ArrayLike, side: Side = "right") -> Array:
+        """Return joint rates, shape (..., n), as :meth:`q`: 0 before 0 and after the duration."""
+        return self._derivative(t, 1, side)
+
+    def qdd(self, t: ArrayLike, side: Side = "right") -> Array:
+        """Return joint accelerations, shape (..., n), as :meth:`qd`."""
+        return self._derivative(t, 2, side)
+
+    def jerk(self, t: ArrayLike, side: Side = "right") -> Array:
+        """Return the derivatives of the accelerations, shape (..., n), as :meth:`qd`."""
+        return self._derivative(t, 3, side)
+
+    def tau(self, t: ArrayLike, friction: bool | Friction = False, side: Side = "right") -> Array:
+        """Return joint torques by inverse dynamics, shape (..., n), N m and N.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        """
+        from dhkit.dynamics import inverse_dynamics
+
+        q, qd, qdd = self.q(t, side), self.qd(t, side), self.qdd(t, side)
+        return inverse_dynamics(self.description, q, qd, qdd, friction=friction)
+
+    def _derivative(self, t: ArrayLike, order: int, side: Side) -> Array:
+        t = number_array(t, "t", "(...)")
+        values = self.pieces.differentiated(order)(np.clip(t, 0.0, self.duration), side)
+        values[(t < 0.0) | (t > self.duration)] = 0.0
+        return values
+
+    def sample(self, rate: float | None = None, n: int | None = None) -> Samples:
+        """Return the motion at points in time.
+
+        Parameters
+        ----------
+        rate
+            Samples a second, from 0 on, and the very end.
+        n
+            Or how many, evenly spread, both ends among them.
+
+        Raises
+        ------
+        ValueError
+            Not exactly one of both, a rate that is not positive and finite, or fewer than two samples.
+        """
+        times = self.sample_times(rate, n)
+        return Samples(self.description, times, self.q(times), self.qd(times), self.qdd(times))
+
+    def sample_times(self, rate: float | None = None, n: int | None = None) -> Array:
+        """Return the times of :meth:`sample`, shape (N,), s."""
+        if (rate is None) == (n is None):
+            raise ValueError(f"sample: found rate={rate!r} and n={n!r}; expected one of them")
+        if n is not None:
+            check_whole("n", n, 2)
+            return np.linspace(0.0, self.duration, n)
+        if rate is None or not 0 < rate < np.inf:
+            raise ValueError(f"rate is {rate!r}; expected a positive number of samples a second")
+        last = int(np.ceil(self.duration * rate - SAME_TIME))
+        return np.append(np.arange(max(last, 1)) / rate, self.duration)
+
+    # Other motions
+
+    def slowed(self, c: float) -> Trajectory:
+        """Return the same path c times as slow, q(t / c); without the report, which is about this motion.
+
+        Raises
+        ------
+        ValueError
+            c is not positive and finite.
+        """
+        if not np.isfinite(c) or c <= 0:
+            raise ValueError(f"c is {c!r}; expected a positive number")
+        powers = np.arange(self.coefficients.shape[1])[:, None]
+        return Trajectory(self.description, self.breaks * c, self.coefficients / float(c) ** powers)
+
+    def reversed(self) -> Trajectory:
+        """Return the motion back, q(duration - t)."""
+        turned = shifted(self.coefficients, np.diff(self.breaks))[::-1]
+        signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
+        return Trajectory(self.description, self.duration - self.breaks[::-1], turned * signs)
+
+    def then(self, other: Trajectory) -> Trajectory:
+        """Return this motion with another behind it.
+
+        Raises
+        ------
+        DescriptionError
+            The other is another robot's.
+        ValueError
+            The other does not begin where this one ends, to 1e-9 rad or m; names the joint.
+        """
+        other.require(self.description)
+        end, start = self.q(self.duration), other.q(0.0)
+        apart = np.flatnonzero(np.abs(end - start) > MEETS)
+        if len(apart):
+            i = int(apart[0])
+            name = self.description.joints[i].name
+            raise ValueError(f"{name} ends at {end[i]:.9g} and goes on from {start[i]:.9g}; expected the same value")
+        degrees = max(self.coefficients.shape[1], other.coefficients.shape[1])
+        both = (self.coefficients, other.coefficients)
+        padded = [np.pad(c, ((0, 0), (0, degrees - c.shape[1]), (0, 0))) for c in both]
+        breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
+        return Trajectory(self.description, breaks, np.concatenate(padded))
+
+    @classmethod
+    def from_samples(
+        cls,
+        description: Description,
+        times: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
+    ) -> Trajectory:
+        """Return a motion through samples.
+
+        Through joint values alone goes a cubic spline with continuous accelerations and not-a-knot ends (de Boor
+        1978, A Practical Guide to Splines, chapter IV), a line through two and a parabola through three; with rates
+        it is piecewise cubic, and with accelerations piecewise quintic, each interval by its own ends.
+
+        Parameters
+        ----------
+        description
+            The robot.
+        times
+            Shape (N,), s, N >= 2, increasing; the motion begins with the first, which becomes 0.
+        q, qd, qdd
+            Shape (N, n) each, rad, m and seconds.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, times that do not increase, or accelerations without rates.
+        TypeError
+            Not numbers.
+        """
+        return cls(description, *interpolated(description, times, q, qd, qdd))
+
+    # Whose motion it is
+
+    def matches(self, description: Description) -> bool:
+        """Return whether it is a motion of this robot."""
+        return self.description == description or self.description.digest == description.digest
+
+    def require(self, description: Description) -> None:
+        """Refuse another robot.
+
+        Raises
+        ------
+        DescriptionError
+            It is a motion of another robot; names both.
+        """
+        if not self.matches(description):
+            own = self.description
+            raise DescriptionError(
+                f"the trajectory is one of {own.name} ({own.digest}); expected one of {description.name}"
+                f" ({description.digest})"
+            )
+
+    # Files
+
+    def save(self, path: str | Path, rate: float | None = None) -> Path:
+        """Write a file by its suffix and return its path; see :func:`dhkit.trajectories.files.save_trajectory`."""
+        from dhkit.trajectories.files import save_trajectory
+
+        return save_trajectory(self, path, rate)
+
+    @classmethod
+    def load(cls, path: str | Path, description: Description | None = None) -> Trajectory:
+        """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`."""
+        from dhkit.trajectories.files import load_trajectory
+
+        return load_trajectory(path, description)
+
+    @classmethod
+    def read(cls, path: str | Path, description: Description, degrees: bool = False) -> Trajectory:
+        """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`."""
+        from dhkit.trajectories.files import read_samples
+
+        return read_samples(path, description, degrees=degrees)
+
+    # Value semantics
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Trajectory):
+            return NotImplemented
+        return (
+            self.matches(other.description)
+            and np.array_equal(self.breaks, other.breaks)
+            and np.array_equal(self.coefficients, other.coefficients)
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.n, self.coefficients.shape, self.duration))
+
+    def __reduce__(self) -> tuple[type[Trajectory], tuple[Any, ...]]:
+        return Trajectory, (self.description, self.breaks, self.coefficients, self.report)
+
+    def __repr__(self) -> str:
+        pieces, powers = self.coefficients.shape[:2]
+        return (
+            f"<Trajectory of {self.description.name}: {self.duration:.4g} s, {pieces} "
+            f"{'piece' if pieces == 1 else 'pieces'} of degree {powers - 1}>"
+        )
