@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
+    from dhkit.planning import Constraint, Distances, ObjectiveLike, Planner, Scene
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
-    from dhkit.trajectories import Limits, Torques, Trajectory
+    from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
 
@@ -424,6 +425,67 @@ class Arm:
         from dhkit.trajectories import circle
 
         return circle(self._description, T0, centre, axis, angle, q0, duration, limits, turning, torques)
+
+    def planner(
+        self,
+        objective: ObjectiveLike = "time",
+        limits: Limits | None = None,
+        constraints: Sequence[Constraint] = (),
+        intervals: int | None = None,
+        friction: bool | Friction = False,
+    ) -> Planner:
+        """Return a planner of optimal motions, made once and asked often; see :class:`dhkit.planning.Planner`."""
+        from dhkit.planning import Planner
+
+        return Planner(self._description, objective, limits, constraints, intervals, friction)
+
+    def plan(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        objective: ObjectiveLike = "time",
+        *,
+        constraints: Sequence[Constraint] = (),
+        intervals: int | None = None,
+        friction: bool | Friction = False,
+        compare: bool = True,
+        **options: Any,
+    ) -> Trajectory:
+        """Return the best motion between two configurations, or to a pose of the tool; its planners are kept.
+
+        See :meth:`dhkit.planning.Planner.solve` for the options: ``via``, ``duration``, ``limits``, ``payload``,
+        ``obstacles`` and others.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> motion = arm.plan([0, 0], [1.0, 0.5], intervals=24)
+        >>> motion.report.certificate.ok, motion.duration < arm.quintic([0, 0], [1.0, 0.5]).duration
+        (True, True)
+        """
+        from dhkit.planning import Objective
+
+        key = (Objective.of(objective), tuple(constraints), intervals, friction)
+        planner = self._planners.get(key)
+        if planner is None:
+            planner = self._planners.setdefault(key, self.planner(key[0], None, constraints, intervals, friction))
+        return planner.solve(start, goal, compare=compare, **options)
+
+    @cached_property
+    def _planners(self) -> dict[object, Planner]:
+        return {}
+
+    def plan_path(self, path: JointPath, objective: ObjectiveLike = "time", **options: Any) -> Trajectory:
+        """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
+        from dhkit.planning import along_path
+
+        return along_path(self._description, path, objective=objective, **options)
+
+    def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
+        """Return how far the links are from obstacles, and from each other; see :func:`dhkit.planning.distance`."""
+        from dhkit.planning import distance
+
+        return distance(self._description, q, obstacles, self_collision)
 
     # Equations
 

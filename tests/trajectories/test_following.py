@@ -5,6 +5,7 @@ import pytest
 
 from dhkit.description import library_robot, pose, world_to_tool
 from dhkit.errors import PlanningError
+from dhkit.kinematics import inverse_kinematics
 from dhkit.trajectories import Limits, circle, joint_path, least_slowdown, straight_line, tool_circle, tool_line
 
 PROMISED = 1e-7  # m and rad
@@ -104,11 +105,30 @@ def test_a_line_out_of_reach_is_named():
         straight_line(ARM, T1, T0)
 
 
-def test_a_line_that_passes_a_singularity_is_named():
-    # The wrist straightens on the way from q5 = 0.5 to q5 = -0.5, where the other two axes of it would have to flip.
-    q = np.array([[0.1, 0.8, -2.5, 0.4, 0.5, 0.2], [0.3, 0.8, -2.5, -0.6, -0.5, 0.2]])
-    with pytest.raises(PlanningError, match=r"the path meets a singularity, and only a jump leads on, at s = 0\.\d+"):
-        straight_line(PUMA, *world_to_tool(PUMA, q), q[0])
+def test_a_line_on_which_a_branch_ends_is_named():
+    """Beyond this place the closed form has four solutions in place of eight: the followed one is among those lost."""
+    arm = library_robot("kr5")
+    q = np.array([[-1.56, -0.44, 1.87, 1.58, -1.47, 0.29], [-1.77, -0.55, 1.56, 1.25, -1.08, 0.17]])
+    T0, T1 = world_to_tool(arm, q)
+    with pytest.raises(PlanningError, match="the path meets a singularity, and only a jump leads on, at s = ") as error:
+        straight_line(arm, T0, T1, q[0])
+    end = float(str(error.value).split("s = ")[1].split(",")[0])
+    beside = tool_line(T0, T1).poses(np.array([end - 0.01, end + 0.01]))
+    assert np.array_equal(inverse_kinematics(arm, beside).valid.sum(axis=1), [8, 4])
+
+
+def test_a_line_that_begins_near_a_singularity_keeps_its_branch():
+    """The elbow is 2 degrees from stretched, where another branch is so near that a long step would end on it."""
+    q = np.array([2.0, 0.2, -1.5, -1.2, -0.7, 1.1])
+    T = tool_line(*world_to_tool(PUMA, [q, [2.2, -0.1, -1.6, -1.3, -0.6, 1.1]]))
+    path = joint_path(PUMA, T, q)
+    s = np.linspace(0, 1, 2001)
+    solutions = inverse_kinematics(PUMA, T.poses(s))
+    branches = [
+        np.abs(np.nan_to_num(row, nan=9) - at).max(axis=1).argmin()
+        for row, at in zip(solutions.q, path.q(s), strict=True)
+    ]
+    assert len(set(branches)) == 1
 
 
 def test_a_beginning_at_a_singularity_is_named():

@@ -108,3 +108,8 @@ def test_leaving_the_joint_limits_is_named():
     ):
         require_inside(motion, Limits.of(ARM))
     require_inside(motion, Limits.of(ARM, upper=3.5))
+
+
+def test_limits_of_another_number_of_joints_are_named():
+    with pytest.raises(ValueError, match="limits are of 6 joints; expected 2"):
+        cubic(ARM, [0, 0], [1, 1], limits=Limits.of(PUMA))

@@ -1,5 +1,6 @@
 """Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
 
+from dhkit.planning.along_path import along_path
 from dhkit.planning.constraints import (
     Constraint,
     MotorPower,
@@ -9,11 +10,12 @@ from dhkit.planning.constraints import (
     ToolSpeed,
     TorqueSpeedLine,
 )
-from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, Time
-from dhkit.planning.obstacles import Distances, Floor, Obstacle, distance
+from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
+from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
 from dhkit.planning.payload import Payload
 from dhkit.planning.planner import Planner
 from dhkit.planning.report import BranchReport, PlanReport
+from dhkit.planning.solver import Progress
 
 __all__ = [
     "BranchReport",
@@ -25,15 +27,19 @@ __all__ = [
     "Jerk",
     "MotorPower",
     "Objective",
+    "ObjectiveLike",
     "Obstacle",
     "Payload",
     "PlanReport",
     "Planner",
+    "Progress",
+    "Scene",
     "Time",
     "ToolAcceleration",
     "ToolDirection",
     "ToolOrientation",
     "ToolSpeed",
     "TorqueSpeedLine",
+    "along_path",
     "distance",
 ]

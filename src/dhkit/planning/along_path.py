@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate, Checker
 from dhkit.planning.constraints import Constraint, ToolAcceleration, ToolSpeed
 from dhkit.planning.costs import cost_of
-from dhkit.planning.feasibility import require_bounded, require_holdable
+from dhkit.planning.feasibility import require_holdable
 from dhkit.planning.mesh import graded
-from dhkit.planning.objectives import Objective, ObjectiveLike
+from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
 from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import Progress, ProgressCall, Solution, Stopped
 from dhkit.planning.states import States
@@ -28,8 +28,8 @@ from dhkit.planning.timing_program import (
     speed_bounds,
     timing_program,
 )
-from dhkit.trajectories import JointPath, Limits, Trajectory
-from dhkit.trajectories.timing import default_limits
+from dhkit.trajectories import JointPath, Limits, Trajectory, require_inside
+from dhkit.trajectories.timing import check_duration, default_limits
 
 __all__ = ["along_path"]
 
@@ -53,6 +53,9 @@ STANDS_STILL, TOO_STEEP = 1e-6, 1e4
 """Of the path's mean derivative: below the one the path stands still, above the other it is singular."""
 OUTSIDE = 1e-9
 """rad and m: how far rounding may lead out of the joint limits."""
+QUICKEST = Objective.of("time")
+LONGER = 1.5
+"""By what factor a motion of another objective is guessed to take longer than the quickest."""
 ROOM = 0.5
 """Share of the greatest speed at which a guess goes along its path."""
 
@@ -81,8 +84,7 @@ def along_path(
     path
         Of :func:`dhkit.trajectories.joint_path`, say. It must not have corners.
     objective
-        ``"time"``, ``"effort"``, ``"energy"``, a term such as ``Time()``, or a sum such as
-        ``Time() + 0.01 * Effort()``.
+        ``"time"``, ``"effort"``, or a sum such as ``Time() + 0.01 * Effort()``.
     duration
         In s; needed where the time does not count.
     limits
@@ -107,32 +109,44 @@ def along_path(
         The path leaves the joint limits, has a corner, stands still or is singular; the arm cannot hold itself
         somewhere on it; no motion keeps the limits, or none was found in time. Names the limit and the place.
     ValueError
-        Another robot's path, an objective that needs a duration, or one of jerk.
+        Another robot's path, an objective that needs a duration, or one of energy or jerk.
     """
     began = time.perf_counter()
     if isinstance(intervals, bool) or not isinstance(intervals, int) or not 6 <= intervals <= 2000:
         raise ValueError(f"intervals is {intervals!r}; expected a whole number from 6 to 2000")
     if path.description.n != description.n:
-        raise ValueError(f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}")
+        raise ValueError(
+            f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
+        )
     wanted = Objective.of(objective)
     _require_objective(wanted, duration)
-    task = _Task.of(description, path, wanted, duration, limits or default_limits(description), tuple(constraints), intervals)
-    task.require()
-    built = time.perf_counter()
-    program = timing_program(len(task.knots) - 1, sum(row.rest.shape[-1] for row in task.rows), task.terms)
-    ready = time.perf_counter()
-    found = _certified(task, program, began + time_limit, progress)
+    limits = limits or default_limits(description)
+    task = _Task.of(description, path, wanted, duration, limits, tuple(constraints), intervals)
+    _require_kept(task)
+    building = time.perf_counter()
+    programs = [timing_program(each.intervals, each.linear_rows, each.terms) for each in task.steps]
+    built = time.perf_counter() - building
+    found, iterations, solves = None, 0, 0
+    for each, program in zip(task.steps, programs, strict=True):
+        found = _certified(each, program, found, began + time_limit, progress)
+        iterations, solves = iterations + found.iterations, solves + found.solves
+        if duration is not None and found.trajectory.duration > duration * (1 + SLACK):
+            raise PlanningError(
+                f"{duration:.6g} s are too short: the limits allow the motion along the path in "
+                f"{found.trajectory.duration:.6g} s"
+            )
+    assert found is not None
     report = PlanReport(
         objective=str(wanted),
         cost=cost_of(wanted, found.trajectory, description),
         duration=found.trajectory.duration,
         certificate=found.certificate,
         joints=tuple(joint.name for joint in description.joints),
-        intervals=program.intervals,
-        iterations=found.iterations,
-        solves=found.solves,
-        build_seconds=ready - built,
-        solve_seconds=time.perf_counter() - began - (ready - built),
+        intervals=task.intervals,
+        iterations=iterations,
+        solves=solves,
+        build_seconds=built,
+        solve_seconds=time.perf_counter() - began - built,
         slow_down=found.slow_down,
         tightened=found.tightened,
     )
@@ -148,12 +162,12 @@ class _Task:
     objective: Objective
     duration: float | None
     limits: Limits
-    constraints: tuple[Constraint, ...]
     checker: Checker
-    knots: Array
     states: PathStates
     rows: list[TimingRows]
     terms: Terms | None
+    quickest_terms: Terms | None
+    """Those of the constraints alone."""
 
     @classmethod
     def of(
@@ -166,24 +180,272 @@ class _Task:
         constraints: tuple[Constraint, ...],
         intervals: int,
     ) -> _Task:
-        """Work a path out on a grid."""
-        others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
-        needs_torque = objective.needs_torque or any(c.needs_torque for c in constraints)
-        knots = _knots(path, intervals)
-        states = PathStates.of(
-            description,
-            path,
-            knots,
-            torque=bool(np.isfinite(limits.torque).any()) or needs_torque,
-            tool=any(isinstance(c, ToolSpeed | ToolAcceleration) for c in constraints),
-        )
+        """Work a path out on a grid, where there can be a motion along it."""
+        _require_path(description, path, limits)
+        needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
+        torque = any((*needed, *np.isfinite(limits.torque)))
+        tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
+        states = PathStates.of(description, path, _knots(path, intervals), torque=torque, tool=tool)
         rows = [
             TimingRows.of("torque", states, states.m, states.c, states.g, limits.torque),
             TimingRows.of("acceleration", states, states.qs, states.qss, 0 * states.q, limits.acceleration),
         ]
-        start = States(description, np.zeros(1), *(np.reshape(x, (1, -1)) for x in (path.q(0.0), still, still)))
-        T_start = start.T_world_tool[0] if constraints else np.eye(4)
+        T_start = world_to_tool(description, path.q(0.0)) if constraints else np.eye(4)
         parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
+        others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
         checker = Checker(description, limits, constraints, parameters)
-        terms = Terms.of(description, objective, others, limits)
-        return cls(description, path, objective, duration, limits, constraints, checker, knots, states, rows, terms)
+        terms, quickest = (Terms.of(description, wanted, others, limits) for wanted in (objective, QUICKEST))
+        return cls(description, path, objective, duration, limits, checker, states, rows, terms, quickest)
+
+    @property
+    def intervals(self) -> int:
+        """Of the grid."""
+        return len(self.states.steps)
+
+    @property
+    def knots(self) -> Array:
+        """Where the grid's intervals end, shape (K+1,)."""
+        return np.append(self.states.s[0], 1.0)
+
+    @property
+    def still(self) -> States:
+        """The arm at rest at the grid's ends of intervals."""
+        q = self.states.q.reshape(-1, self.description.n)
+        return States(self.description, self.states.s.ravel(), q, 0 * q, 0 * q)
+
+    @property
+    def tool_speeds(self) -> list[ToolSpeed]:
+        """Those of the constraints that bound b."""
+        return [constraint for constraint in self.checker.constraints if isinstance(constraint, ToolSpeed)]
+
+    def shares(self, reserved: dict[str, Array], what: str, count: int) -> Array:
+        """Return what is kept in reserve of a limit in each interval, shape (K, count)."""
+        return reserved.get(what, np.zeros((self.intervals, count)))
+
+    def largest_b(self, reserved: dict[str, Array]) -> Array:
+        """Return the bounds of b by limits of speed, shape (K+1,)."""
+        tools = [(tool, self.shares(reserved, tool.what, 1)) for tool in self.tool_speeds]
+        return speed_bounds(self.states, self.limits, self.shares(reserved, "velocity", self.description.n), tools)
+
+    @property
+    def linear_rows(self) -> int:
+        """How many there are at each end of an interval."""
+        return sum(int(row.limited.sum()) for row in self.rows)
+
+    @property
+    def steps(self) -> list[_Task]:
+        """The tasks that are solved one after another: the quickest motion is where others start from."""
+        if self.objective.only_time and self.duration is None:
+            return [self]
+        return [replace(self, objective=QUICKEST, duration=None, terms=self.quickest_terms), self]
+
+    def usual_duration(self) -> float:
+        """Return about how long the motion takes, s: that of b = beta 4 s (1 - s), pi / (2 sqrt beta)."""
+        shape = 4 * self.knots * (1 - self.knots)
+        with np.errstate(divide="ignore"):
+            beta = min(float(np.min(self.largest_b({}) / shape)), *(row.largest(shape) for row in self.rows))
+        return float(np.pi / (2 * np.sqrt(ROOM * beta)))
+
+    def b_bounds(self, reserved: dict[str, Array], unit: float) -> tuple[Array, Array]:
+        """Return the bounds of b at the knots inside, in units of a time, shape (K-1,)."""
+        high = np.maximum(self.largest_b(reserved)[1:-1] * unit**2, 2 * SMALLEST)
+        return np.full_like(high, SMALLEST), high
+
+    def g_bounds(self, reserved: dict[str, Array]) -> tuple[Array, Array]:
+        """Return the bounds of the program's rows."""
+        n = self.description.n
+        linear = [row.bounds(self.shares(reserved, row.what, n)) for row in self.rows]
+        parts = [[np.concatenate(side, axis=-1).ravel() for side in zip(*linear, strict=True)]]
+        if self.terms is not None:
+            low: list[Array] = []
+            high: list[Array] = []
+            for constraint, count in zip(self.terms.constraints, self.terms.counts, strict=True):
+                most = np.tile(1 - self.shares(reserved, constraint.what, count), (2, 1, 1))
+                high.append(most)
+                low.append(-most if constraint.low == -1 else np.full_like(most, constraint.low))
+            if high:
+                parts.append([np.concatenate(side, axis=-1).ravel() for side in (low, high)])
+        # In least time the intervals may as well take less than the duration, which keeps the program convex.
+        parts.append([np.array([-np.inf if self.objective.only_time else 0.0]), np.zeros(1)])
+        bounds = [np.concatenate(side) for side in zip(*parts, strict=True)]
+        return bounds[0], bounds[1]
+
+    def motion(self, b: Array) -> tuple[Trajectory, Array]:
+        """Return the motion with b at all knots, shape (K+1,), 1/s^2, and when its intervals end, likewise, s."""
+        speed, steps = np.sqrt(b), self.states.steps
+        sdd = (speed[1:] - speed[:-1]) * (speed[1:] + speed[:-1]) / (2 * steps)
+        ends = np.concatenate([[0.0], np.cumsum(2 * steps / (speed[1:] + speed[:-1]))])
+        law = np.stack([self.knots[:-1], speed[:-1], sdd / 2], axis=1)
+        trajectory = self.path.timed(ends, law)
+        if self.duration is not None:
+            c = self.duration / ends[-1]
+            return trajectory.slowed(c), ends * c
+        return trajectory, ends
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A certified motion, and what it took."""
+
+    trajectory: Trajectory
+    b: Array
+    """At the knots, shape (K+1,), 1/s^2."""
+    certificate: Certificate
+    slow_down: float
+    tightened: tuple[str, ...]
+    iterations: int
+    solves: int
+
+
+def _certified(
+    task: _Task, program: TimingProgram, quickest: _Found | None, deadline: float, progress: ProgressCall | None
+) -> _Found:
+    iterations = 0
+    if quickest is None:
+        unit = task.usual_duration()
+        shape = np.pi**2 * task.knots * (1 - task.knots)
+    else:
+        unit = task.duration or LONGER * quickest.trajectory.duration
+        shape = quickest.b * quickest.trajectory.duration**2
+    x = program.numbers(1.0, shape[1:-1])
+    guess, _ = task.motion(program.squares(x) / unit**2)
+    scale = 1.0 if task.terms is None else 1 / cost_of(task.objective, guess, task.description)
+    parameters = program.parameters(task.states, task.rows, unit, scale)
+    reserved: dict[str, Array] = {}
+
+    def told(now: Progress) -> object:
+        return progress and progress(replace(now, iteration=iterations + now.iteration, duration=now.duration * unit))
+
+    for solves in range(1, ROUNDS + 1):
+        durations = (0.0, np.inf) if task.duration is None else (1.0, 1.0)
+        low, high = (program.numbers(*pair) for pair in zip(durations, task.b_bounds(reserved, unit), strict=True))
+        rows = task.g_bounds(reserved)
+        try:
+            solution = program.solver(x, parameters, (low, high), rows, deadline, None if progress is None else told)
+        except Stopped:
+            raise PlanningError("no motion along the path was found within the time limit") from None
+        iterations += solution.iterations
+        if not solution.converged or solution.infeasibility > FEASIBLE:
+            raise _not_converged(task, solution, rows)
+        x = solution.x
+        b = program.squares(x) / unit**2
+        trajectory, ends = task.motion(b)
+        states = task.checker.states(trajectory, POINTS)
+        c = task.checker.slow_down(states) if task.duration is None else 1.0
+        if 1 < c < 1 + SMALL_STEP or (solves == ROUNDS and 1 < c < np.inf):
+            c *= 1 + SLACK
+            trajectory = trajectory.slowed(c)
+            states = task.checker.states(trajectory, POINTS)
+        certificate = task.checker.check(trajectory, states)
+        if certificate.ok:
+            return _Found(trajectory, b / c**2, certificate, c, tuple(reserved), iterations, solves)
+        reserved = _wider(task, reserved, states, trajectory.breaks, ends)
+    worst = certificate.worst
+    raise PlanningError(f"{worst.what} stays exceeded by {100 * worst.excess:.2g} % at {worst.time:.4g} s")
+
+
+def _wider(task: _Task, reserved: dict[str, Array], states: States, breaks: Array, ends: Array) -> dict[str, Array]:
+    """Return what is kept in reserve after a motion has exceeded its limits, interval by interval."""
+    # Breaks of the path lie between those of the grid.
+    interval = np.clip(np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1, 0, task.intervals - 1)
+    wider = dict(reserved)
+    for what, use in task.checker.measured(states):
+        excess = (use - 1).reshape(len(interval), -1, use.shape[1]).max(axis=1)
+        if (excess > 0).any():
+            worst = np.zeros((task.intervals, use.shape[1]))
+            np.maximum.at(worst, interval, excess)
+            wider[what] = np.minimum(task.shares(reserved, what, use.shape[1]) + WIDER * worst, MOST_RESERVED)
+    return wider
+
+
+def _not_converged(task: _Task, solution: Solution, bounds: tuple[Array, Array]) -> PlanningError:
+    """Say what stands in the way: a joint that cannot hold the arm, or else the row that misses its bounds most."""
+    names = [joint.name for joint in task.description.joints]
+    use = np.abs(task.states.g) / task.limits.torque
+    if use.max() > 1:
+        end, k, i = np.unravel_index(int(np.argmax(use)), use.shape)
+        unit = "N" if task.description.numbers.prismatic[i] else "N m"
+        return PlanningError(
+            f"joint {names[i]} cannot hold the arm at s = {task.states.s[end, k]:.4g}: it takes "
+            f"{abs(task.states.g[end, k, i]):.5g} {unit}, its limit is {task.limits.torque[i]:.5g} {unit}"
+        )
+    rows = [(row.what, names[i]) for row in task.rows for i in np.flatnonzero(row.limited)]
+    misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
+    misses = np.where(np.isnan(misses), np.inf, misses)[: 2 * task.intervals * len(rows)]
+    where = ""
+    if misses.size and misses.max() > FEASIBLE:
+        end, k, i = np.unravel_index(int(np.argmax(misses)), (2, task.intervals, len(rows)))
+        what, joint = rows[i]
+        where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {task.states.s[end, k]:.4g}"
+    return PlanningError(f"not converged ({solution.status} after {solution.iterations} iterations){where}")
+
+
+def _require_objective(objective: Objective, duration: float | None) -> None:
+    check_duration(duration)
+    if not all(isinstance(term, Time | Effort) for term in objective.terms):
+        raise ValueError(f"objective is {objective}; expected time and effort along a path")
+    if not objective.has_time and duration is None:
+        raise ValueError(f"objective {objective} says nothing about time; expected duration=, or Time() + ...")
+
+
+def _require_path(description: Description, path: JointPath, limits: Limits) -> None:
+    """Refuse a path that no motion can follow from rest to rest without stopping."""
+    names = [joint.name for joint in description.joints]
+    if np.isfinite(limits.jerk).any():
+        raise PlanningError("jerk is limited: along a path accelerations jump; give limits without those of jerk")
+    require_inside(path.timed([0.0, 1.0], [[0.0, 1.0]]), limits)
+    jumps = np.abs(_jumps(path, 1))
+    if jumps.size and jumps.max() > CORNER * np.abs(path.qs(path.breaks)).max():
+        k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
+        raise PlanningError(
+            f"the path has a corner at s = {path.breaks[k + 1]:.4g}, where joint {names[i]} turns suddenly: "
+            "plan to it and on from it"
+        )
+    s, slopes = path.pieces.derivative.inside(POINTS)
+    steepness = np.abs(slopes).max(axis=2)
+    mean = float(np.sum(steepness.mean(axis=1) * np.diff(path.breaks)))
+    if not steepness.min() > STANDS_STILL * mean:
+        raise PlanningError(
+            f"the path stands still at s = {s.flat[int(np.argmin(steepness))]:.4g}: no joint moves there"
+        )
+    if steepness.max() > TOO_STEEP * mean:
+        k, j, i = np.unravel_index(int(np.argmax(np.abs(slopes))), slopes.shape)
+        raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {names[i]} turns ever faster there")
+    for where, q in (("the path's beginning", path.q(0.0)), ("the path's end", path.q(1.0))):
+        require_holdable(description, limits, q, where)
+
+
+def _require_kept(task: _Task) -> None:
+    """Refuse a path that breaks a constraint at any speed, and one that nothing keeps from being jumped along."""
+    resting = {constraint.what for constraint in task.checker.constraints if not constraint.moving}
+    for what, use in task.checker.measured(task.still) if resting else []:
+        if what in resting and use.max() > 1 + CORNER:
+            s = task.states.s.flat[int(np.argmax(use.max(axis=1)))]
+            raise PlanningError(f"{what} is exceeded by {100 * (use.max() - 1):.2g} % at s = {s:.4g}, at any speed")
+    moves = np.abs(task.states.qs).max(axis=(0, 1)) > 0
+    limited = np.isfinite(task.limits.torque) | np.isfinite(task.limits.acceleration)
+    if task.objective.only_time and not (moves & limited).any():
+        raise PlanningError(
+            "nothing limits acceleration along the path: no joint that moves has a limit of it or of torque"
+        )
+
+
+def _jumps(path: JointPath, order: int) -> Array:
+    """Return by how much a derivative jumps at each inner break, shape (K-1, n)."""
+    pieces, inside = path.pieces.differentiated(order), path.breaks[1:-1]
+    jumps: Array = pieces(inside) - pieces(inside, "left")
+    return jumps
+
+
+def _knots(path: JointPath, intervals: int) -> Array:
+    """Return a grid with knots where the path's curvature jumps."""
+    knots, taken = graded(intervals), set()
+    jumps = np.abs(_jumps(path, 2)).max(axis=1)
+    for s in path.breaks[1:-1][jumps > CORNER * np.abs(path.qss(path.breaks)).max()]:
+        k = int(np.argmin(np.abs(knots[1:-1] - s))) + 1
+        if knots[k] in taken:
+            knots = np.insert(knots, np.searchsorted(knots, s), s)
+        else:
+            knots[k] = s
+        taken.add(s)
+    return knots

@@ -97,8 +97,8 @@ def knots_along(trajectory: Trajectory, mesh: Mesh, ends: Array) -> Knots:
         case Curve.CONSTANT:
             qdd = trajectory.qdd(middle)
         case Curve.JUMPING:
-            ends = [trajectory.qdd(t[:-1], "right"), trajectory.qdd(t[1:], "left")]
-            qdd = np.stack(ends, axis=1).reshape(-1, trajectory.n)
+            both = [trajectory.qdd(t[:-1], "right"), trajectory.qdd(t[1:], "left")]
+            qdd = np.stack(both, axis=1).reshape(-1, trajectory.n)
         case Curve.LINEAR:
             qdd = trajectory.qdd(t)
         case Curve.QUADRATIC:

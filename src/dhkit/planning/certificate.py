@@ -1,13 +1,13 @@
-"""What a motion really keeps: its limits on a dense grid, by an independent path, and the slow-down that they ask for."""
+"""What a motion really keeps: its limits on a dense grid, by an independent path, and the slow-down they ask for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.clear import Surroundings
+from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
@@ -78,7 +78,7 @@ class Checker:
     constraints: tuple[Constraint, ...] = ()
     parameters: tuple[Array, ...] = ()
     friction: Friction | None = None
-    surroundings: Surroundings = Surroundings()
+    surroundings: Surroundings = NOTHING
 
     def states(self, trajectory: Trajectory, points: int = POINTS) -> States:
         """Return a motion's states on a grid of so many times an interval, both sides of each break."""
@@ -86,9 +86,8 @@ class Checker:
         breaks = trajectory.breaks
         t = breaks[:-1, None] + np.diff(breaks)[:, None] * s
         # A break belongs to both its intervals: the last state of each comes from the left.
-        inner, last = t[:, :-1], t[:, -1:]
-        both = [States.of(self.description, trajectory, times, self.friction, side) for times, side in ((inner, "right"), (last, "left"))]
-        return both[0].beside(both[1], points)
+        inside = States.of(self.description, trajectory, t[:, :-1], self.friction, "right")
+        return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), points)
 
     def measured(self, states: States) -> list[tuple[str, Array]]:
         """Return every kind of limit with its use, shape (N, k): 1 where the limit is reached."""
@@ -161,7 +160,7 @@ class Checker:
 
     def _moving(self, states: States) -> list[tuple[str, Array]]:
         resting = {constraint.what for constraint in self.constraints if not constraint.moving}
-        moving = replace(self, surroundings=Surroundings())
+        moving = replace(self, surroundings=NOTHING)
         return [(what, use) for what, use in moving.measured(states) if what not in resting]
 
 
@@ -185,5 +184,3 @@ def _time_shares(trajectory: Trajectory, states: States) -> Array:
     weights /= weights.sum()
     shares: Array = np.outer(np.diff(trajectory.breaks), weights).ravel() / trajectory.duration
     return shares
-
-

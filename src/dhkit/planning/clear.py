@@ -17,7 +17,7 @@ from dhkit.planning.point import Point
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Clear", "Surroundings", "roomy"]
+__all__ = ["BEYOND", "NOTHING", "Clear", "Surroundings"]
 
 SIZES = (0, 1, 2, 4, 8, 16, 32)
 """How many obstacles programs have room for: one made for three serves four as well."""
@@ -29,19 +29,22 @@ BEYOND = 1.2
 class Clear(Constraint):
     """Links stay away from what fills the slots; its parameters come with each motion."""
 
-    slots: SceneSlots = SceneSlots()
+    slots: SceneSlots
     moving = False
     low = 1.0
     high = math.inf
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "clearance"
 
     def size(self, description: Description) -> int:
+        """Return how many parameters it takes."""
         return self.slots.size
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         return clearances(point.description, point.q, parameters, self.slots)
 
 
@@ -109,9 +112,10 @@ class Surroundings:
             return
         who, what = found.pair or ("the arm", "an obstacle")
         state = f"{1000 * gap:.3g} mm from" if gap > 0 else f"{-1000 * gap:.3g} mm inside"
-        raise PlanningError(
-            f"{where}: {who} is {state} {what}, {1000 * self.clearance:.3g} mm are asked for"
-        )
+        raise PlanningError(f"{where}: {who} is {state} {what}, {1000 * self.clearance:.3g} mm are asked for")
+
+
+NOTHING = Surroundings()
 
 
 def roomy(slots: SceneSlots) -> SceneSlots:

@@ -25,7 +25,13 @@ def classical(task: Task) -> tuple[tuple[str, float], ...]:
 
     None for what they cannot do: with configurations on the way, other ends than rest, obstacles, or friction.
     """
-    if len(task.points) > 2 or not task.rests or task.friction is not None or task.surroundings or task.checker.constraints:
+    if (
+        len(task.points) > 2
+        or not task.rests
+        or task.friction is not None
+        or task.surroundings
+        or task.checker.constraints
+    ):
         return ()
 
     def torques(q: Array, qd: Array, qdd: Array) -> Array:

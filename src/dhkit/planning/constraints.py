@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,6 +46,10 @@ class Constraint:
         """What it limits, in words."""
         raise NotImplementedError
 
+    def told(self, use: float) -> str:
+        """Return a use of the limit, 1 where it is reached, in words."""
+        return f"{100 * use:.4g} % of its limit"
+
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
         """Return what must stay between ``low`` and 1, k x 1."""
         raise NotImplementedError
@@ -77,12 +80,15 @@ class MotorPower(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "motor power"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         return point.tau * point.qd / _each(self.watts, point.n)
 
     def measured(self, states: States, parameters: Array) -> Array:
+        """Return the same of samples, shape (N, k)."""
         return states.tau * states.qd / _each(self.watts, states.n)
 
 
@@ -103,13 +109,16 @@ class TorqueSpeedLine(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "torque-speed line"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         n = point.n
         return point.tau / _each(self.stall_torque, n) + point.qd / _each(self.no_load_speed, n)
 
     def measured(self, states: States, parameters: Array) -> Array:
+        """Return the same of samples, shape (N, k)."""
         n = states.n
         measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(self.no_load_speed, n)
         return measured
@@ -126,15 +135,19 @@ class ToolSpeed(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "tool speed"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         import casadi
 
         return casadi.sumsqr(point.tool_velocity) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        return np.sum(states.tool_velocity**2, axis=1, keepdims=True) / self.limit**2
+        """Return the same of samples, shape (N, k)."""
+        square: Array = np.sum(states.tool_velocity**2, axis=1, keepdims=True)
+        return square / self.limit**2
 
 
 @dataclass(frozen=True)
@@ -148,15 +161,19 @@ class ToolAcceleration(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "tool acceleration"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         import casadi
 
         return casadi.sumsqr(point.tool_acceleration) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        return np.sum(states.tool_acceleration**2, axis=1, keepdims=True) / self.limit**2
+        """Return the same of samples, shape (N, k)."""
+        square: Array = np.sum(states.tool_acceleration**2, axis=1, keepdims=True)
+        return square / self.limit**2
 
 
 @dataclass(frozen=True)
@@ -179,21 +196,31 @@ class ToolDirection(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "tool direction"
 
+    def told(self, use: float) -> str:
+        """Return a use of the limit in words."""
+        return _told_angle(use, self.tolerance)
+
     def size(self, description: Description) -> int:
+        """Return how many parameters it takes."""
         return 3
 
     def values(self, description: Description, T_start: Array) -> Array:
+        """Return its parameters, shape (size,)."""
         return T_start[:3, :3] @ np.array(self.axis) if self.direction is None else np.array(self.direction)
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         import casadi
 
         axis = point.T_world_tool[:3, :3] @ casadi.DM(self.axis)
-        return _share_of_angle(casadi.dot(axis, parameters), self.tolerance)
+        share: casadi.SX = _share_of_angle(casadi.dot(axis, parameters), self.tolerance)
+        return share
 
     def measured(self, states: States, parameters: Array) -> Array:
+        """Return the same of samples, shape (N, k)."""
         cosine = (states.T_world_tool[:, :3, :3] @ np.array(self.axis)) @ parameters
         return np.asarray(_share_of_angle(cosine, self.tolerance))[:, None]
 
@@ -211,28 +238,43 @@ class ToolOrientation(Constraint):
 
     @property
     def what(self) -> str:
+        """What it limits, in words."""
         return "tool orientation"
 
+    def told(self, use: float) -> str:
+        """Return a use of the limit in words."""
+        return _told_angle(use, self.tolerance)
+
     def size(self, description: Description) -> int:
+        """Return how many parameters it takes."""
         return 9
 
     def values(self, description: Description, T_start: Array) -> Array:
+        """Return its parameters, shape (size,)."""
         return T_start[:3, :3].ravel(order="F")
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return what must stay within bounds, k x 1."""
         import casadi
 
         trace = casadi.dot(casadi.vec(point.T_world_tool[:3, :3]), parameters)
-        return _share_of_angle((trace - 1) / 2, self.tolerance)
+        share: casadi.SX = _share_of_angle((trace - 1) / 2, self.tolerance)
+        return share
 
     def measured(self, states: States, parameters: Array) -> Array:
+        """Return the same of samples, shape (N, k)."""
         trace = np.einsum("kij,ij->k", states.T_world_tool[:, :3, :3], parameters.reshape(3, 3, order="F"))
         return np.asarray(_share_of_angle((trace - 1) / 2, self.tolerance))[:, None]
 
 
-def _share_of_angle(cosine: casadi.SX | Array, tolerance: float) -> casadi.SX | Array:
+def _share_of_angle(cosine: Any, tolerance: float) -> Any:
     """Return (1 - cos angle) / (1 - cos tolerance)."""
     return (1 - cosine) / (1 - math.cos(tolerance))
+
+
+def _told_angle(use: float, tolerance: float) -> str:
+    angle = math.acos(max(-1.0, 1 - use * (1 - math.cos(tolerance))))
+    return f"{math.degrees(angle):.4g} deg off, {math.degrees(tolerance):.4g} deg are"
 
 
 def _each(value: float | tuple[float, ...], n: int) -> Array:
@@ -243,22 +285,20 @@ def _each(value: float | tuple[float, ...], n: int) -> Array:
 
 
 def _positive(name: str, value: float | ArrayLike) -> float | tuple[float, ...]:
-    numbers = (value,) if isinstance(value, Real) else tuple(np.ravel(np.asarray(value, dtype=float)).tolist())
-    if not numbers or any(not float(x) > 0 for x in numbers):
+    array = np.asarray(value, dtype=float)
+    if array.ndim > 1 or not array.size or not (array > 0).all():
         raise ValueError(f"{name}: {value!r}; expected positive numbers")
-    return float(numbers[0]) if isinstance(value, Real) else tuple(float(x) for x in numbers)
+    return float(array) if array.ndim == 0 else tuple(array.tolist())
 
 
 def _angle(name: str, value: float) -> None:
-    if not isinstance(value, Real) or not 0 < value < math.pi:
+    if not 0 < value < math.pi:
         raise ValueError(f"{name}: tolerance is {value!r}; expected an angle between 0 and pi, rad")
 
 
 def _unit(name: str, vector: ArrayLike) -> tuple[float, ...]:
     array = np.asarray(vector, dtype=float)
     length = float(np.linalg.norm(array)) if array.shape == (3,) else 0.0
-    if not math.isfinite(length) or length == 0:
+    if not 0 < length < math.inf:
         raise ValueError(f"{name}: {vector!r}; expected a vector of three numbers, not all 0")
     return tuple((array / length).tolist())
-
-

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.goals import Place
 from dhkit.planning.objectives import Objective
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
 
-__all__ = ["require_bounded", "require_holdable", "require_inside_limits", "require_speed"]
+__all__ = ["require_bounded", "require_holdable", "require_inside_limits", "require_kept", "require_speed"]
 
+BARELY = 1e-6
+"""By what share of a constraint rounding may exceed it."""
 EDGE = 1e-9
 """rad and m: how far outside its limits rounding may put a joint."""
 
@@ -33,7 +39,9 @@ def require_inside_limits(description: Description, limits: Limits, q: Array, wh
     if not excess.max() > EDGE:
         return
     i = int(np.argmax(excess))
-    side, limit = ("below its lower", limits.lower[i]) if q[i] < limits.lower[i] else ("above its upper", limits.upper[i])
+    side, limit = (
+        ("below its lower", limits.lower[i]) if q[i] < limits.lower[i] else ("above its upper", limits.upper[i])
+    )
     unit = unit_of(description, i)
     raise PlanningError(
         f"{where}: joint {description.joints[i].name} is at {q[i]:.6g} {unit}, {side} limit, {limit:.6g} {unit}"
@@ -80,6 +88,25 @@ def require_holdable(description: Description, limits: Limits, q: Array, where: 
         f"{where}: joint {description.joints[i].name} cannot hold the arm there: it takes {abs(g[i]):.5g} {unit}, "
         f"its limit is {limits.torque[i]:.5g} {unit}"
     )
+
+
+def require_kept(description: Description, constraints: Sequence[Constraint], T_start: Array, spot: Place) -> None:
+    """Refuse a place that breaks a constraint at rest, by its configuration or its pose.
+
+    Raises
+    ------
+    PlanningError
+        Names the constraint.
+    """
+    q = np.zeros(description.n) if spot.q is None else spot.q
+    still = np.zeros((1, description.n))
+    states = States(description, np.zeros(1), q[None], still, still)
+    if spot.T is not None:
+        states = states.with_tool(spot.T[None])
+    for constraint in constraints:
+        use = float(constraint.measured(states, constraint.values(description, T_start)).max())
+        if use > 1 + BARELY:
+            raise PlanningError(f"{spot.name}: its {constraint.what} is not allowed: {constraint.told(use)}")
 
 
 def require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:

@@ -61,7 +61,9 @@ def place(description: Description, value: ArrayLike | str, name: str) -> Place:
     if isinstance(value, str):
         known = description.numbers.configurations
         if value not in known:
-            raise PlanningError(f"{name}: {description.name} has no configuration {value!r}; it has {', '.join(known) or 'none'}")
+            raise PlanningError(
+                f"{name}: {description.name} has no configuration {value!r}; it has {', '.join(known) or 'none'}"
+            )
         return Place(name, np.array(known[value]))
     array = np.asarray(value, dtype=float)
     if array.shape == (4, 4):
@@ -97,7 +99,9 @@ def routes(description: Description, limits: Limits, places: Sequence[Place]) ->
         longer.sort(key=lambda way: _length(limits, np.stack(way[0])))
         ways = longer[:MOST]
     made = [
-        Route(np.stack(points), " then ".join(labels), _bound(limits, np.stack(points)), _length(limits, np.stack(points)))
+        Route(
+            np.stack(points), " then ".join(labels), _bound(limits, np.stack(points)), _length(limits, np.stack(points))
+        )
         for points, labels in ways
     ]
     return sorted(made, key=lambda route: (route.bound, route.length))
@@ -108,23 +112,27 @@ def _configurations(
 ) -> list[tuple[Array, str]]:
     if spot.q is not None:
         return [(spot.q, "")]
-    assert spot.T is not None
+    T = np.asarray(spot.T)
     try:
-        found = inverse_kinematics(description, spot.T)
+        found = inverse_kinematics(description, T)
         every, labels = found.q, [str(label) for label in found.branches]
         angles = found.within_limits(near)
     except DescriptionError:
-        every, labels = _iterated(description, spot.T, near)
+        every, labels = _iterated(description, T, near)
         angles = every
     if not np.isfinite(every).all(axis=-1).any():
-        raise UnreachableError(f"{spot.name}: no joint values have the tool in the pose: {_where(spot.T)} is out of reach")
-    inside = ((angles >= limits.lower - SAME**3) & (angles <= limits.upper + SAME**3)).all(axis=-1)
+        raise UnreachableError(f"{spot.name}: no joint values have the tool in the pose: {_where(T)} is out of reach")
+    inside = np.atleast_1d(((angles >= limits.lower - SAME**3) & (angles <= limits.upper + SAME**3)).all(axis=-1))
     if not inside.any():
         raise PlanningError(
-            f"{spot.name}: {_count(every)} of the pose at {_where(spot.T)}, all outside the joint limits: "
+            f"{spot.name}: {_count(every)} of the pose at {_where(T)}, all outside the joint limits: "
             f"{_excess(description, limits, every)}"
         )
-    return [(np.clip(q, limits.lower, limits.upper), label) for q, label, good in zip(angles, labels, inside, strict=True) if good]
+    return [
+        (np.clip(q, limits.lower, limits.upper), label)
+        for q, label, good in zip(angles, labels, inside, strict=True)
+        if good
+    ]
 
 
 def _count(every: Array) -> str:

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, TypeAlias
 
+import numpy as np
+
 from dhkit.description import Array
 from dhkit.planning.point import Point, gear_ratios
 from dhkit.planning.states import States
-
-import numpy as np
 
 if TYPE_CHECKING:
     import casadi
 
 __all__ = ["Effort", "Energy", "Jerk", "Objective", "ObjectiveLike", "Term", "Time"]
 
-SOFT = 1e-3
-"""Share of a joint's mean power over which regenerated power fades out, so that it can be differentiated."""
+SOFT = 0.02
+"""Share of a joint's greatest power over which regenerated power fades out, so that it can be differentiated."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class Time(Term):
     """The duration, s."""
 
     def measured(self, states: States) -> Array:
+        """Return 1 for each state."""
         return np.ones(len(states.times))
 
 
@@ -68,7 +69,9 @@ class Effort(Term):
         return casadi.sumsqr(point.tau)
 
     def measured(self, states: States) -> Array:
-        return np.sum(states.tau**2, axis=1)
+        """Return tau . tau."""
+        squares: Array = np.sum(states.tau**2, axis=1)
+        return squares
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,9 @@ class Jerk(Term):
     """The integral of the jerks' squares, rad^2/s^5 or m^2/s^5; such motions begin and end without acceleration."""
 
     def measured(self, states: States) -> Array:
-        return np.sum(states.jerk**2, axis=1)
+        """Return the jerks' squared length."""
+        squares: Array = np.sum(states.jerk**2, axis=1)
+        return squares
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ class Energy(Term):
     torque is gear tau_m.
     """
 
-    motor_constants: tuple[float, ...] = ()
+    motor_constants: float | tuple[float, ...] = ()
     """k of each joint's motor, N m per square root of W; one number counts for all; empty: no heat."""
     regenerates: bool = False
     """Whether braking gives its power back."""
@@ -95,16 +100,21 @@ class Energy(Term):
     def __post_init__(self) -> None:
         super().__post_init__()
         constants = self.motor_constants
-        given = tuple(float(k) for k in ((constants,) if isinstance(constants, Real) else constants))
+        given = (float(constants),) if isinstance(constants, float | int) else tuple(float(k) for k in constants)
         if any(not math.isfinite(k) or k <= 0 for k in given):
             raise ValueError(f"Energy: motor constants are {given}; expected positive numbers, N m per root of W")
         object.__setattr__(self, "motor_constants", given)
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """The motor constants, one or of each joint."""
+        return self.motor_constants if isinstance(self.motor_constants, tuple) else (self.motor_constants,)
 
     def integrand(self, point: Point) -> casadi.SX:
         """Return the electrical power, W."""
         import casadi
 
-        n, constants = point.n, self.motor_constants
+        n, constants = point.n, self.constants
         if len(constants) not in (0, 1, n):
             raise ValueError(f"Energy: {len(constants)} motor constants; expected 1 or {n}")
         total = casadi.SX(0)
@@ -120,11 +130,12 @@ class Energy(Term):
         return total
 
     def measured(self, states: States) -> Array:
+        """Return the electrical power, W."""
         power = states.tau * states.qd
         if not self.regenerates:
             power = np.maximum(power, 0.0)
-        if self.motor_constants:
-            power = power + (states.tau / (np.array(self.motor_constants) * gear_ratios(states.description))) ** 2
+        if self.constants:
+            power = power + (states.tau / (np.array(self.constants) * gear_ratios(states.description))) ** 2
         total: Array = np.sum(power, axis=1)
         return total
 
@@ -158,7 +169,9 @@ class Objective:
             return cls((objective,))
         if isinstance(objective, str):
             if objective not in NAMED:
-                raise ValueError(f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like")
+                raise ValueError(
+                    f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like"
+                )
             return cls((NAMED[objective],))
         raise TypeError(f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like")
 

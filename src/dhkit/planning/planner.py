@@ -17,10 +17,16 @@ from dhkit.planning.certificate import Checker
 from dhkit.planning.clear import Clear, Surroundings
 from dhkit.planning.comparison import classical, coarser
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.feasibility import require_bounded, require_holdable, require_inside_limits, require_speed
+from dhkit.planning.feasibility import (
+    require_bounded,
+    require_holdable,
+    require_inside_limits,
+    require_kept,
+    require_speed,
+)
 from dhkit.planning.goals import Place, Route, place, routes
 from dhkit.planning.guess import leg_durations
-from dhkit.planning.mesh import Mesh
+from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.payload import Payload
@@ -36,9 +42,9 @@ from dhkit.trajectories import Limits, Trajectory
 __all__ = ["Planner"]
 
 EXPANDED = 400
-"""Up to so many joints times intervals a program is expanded into scalars: solved in half the time, made in ten times."""
-CONVERGENCE = {True: 1e-6, False: 1e-8}
-"""Ipopt's tolerance in least time, as a share of it, and for smooth objectives."""
+"""Up to so many joints times intervals a program is expanded into scalars: solved twice as fast, made in ten times."""
+CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}
+"""Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
 USUAL = 48
 """Intervals of arms of six joints; of fewer joints more, as they cost less."""
 NUMBERS = 288
@@ -79,8 +85,8 @@ class Planner:
     constraints
         What else must be kept: ``ToolSpeed(0.5)`` and the like.
     intervals
-        Of the mesh: 48 for arms of six joints and more, more for smaller ones, unless given. Finer meshes find slightly
-        better motions in more time.
+        Of the mesh. Unless given 48 for arms of six joints and more, and more for smaller ones; half of that for
+        objectives without time. Finer meshes find slightly better motions in more time.
     friction
         Of the drives, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
 
@@ -107,9 +113,7 @@ class Planner:
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> None:
-        if intervals is None:
-            intervals = max(USUAL, NUMBERS // description.n)
-        if isinstance(intervals, bool) or not isinstance(intervals, int) or not 6 <= intervals <= 2000:
+        if intervals is not None and (type(intervals) is not int or not 6 <= intervals <= 2000):
             raise ValueError(f"intervals is {intervals!r}; expected a whole number from 6 to 2000")
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
@@ -118,7 +122,9 @@ class Planner:
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
         self.constraints = tuple(constraints)
-        self.intervals = intervals
+        usual = max(USUAL, NUMBERS // description.n)
+        # Smooth motions need half as many: their accelerations are parabolas.
+        self.intervals = intervals or (usual if self.objective.has_time else usual // 2)
         chosen = Friction.chosen(friction)
         self.friction = SMOOTHED if chosen is not None and chosen.width == 0 else chosen
         self._programs: dict[tuple[object, ...], Program] = {}
@@ -254,7 +260,7 @@ class Planner:
                 jerk_limited=jerk_limited,
             )
             expand = self.description.n * problem.mesh.intervals <= EXPANDED
-            made = Program.of(problem, CONVERGENCE[self.objective.has_time], expand=expand)
+            made = Program.of(problem, CONVERGENCE[curve], expand=expand)
             self._programs[key] = made
             return made, time.perf_counter() - began
 
@@ -274,6 +280,13 @@ class Planner:
                 require_holdable(loaded, limits, spot.q, spot.name)
             if wish.surroundings:
                 wish.surroundings.require(description, spot.q, spot.name)
+        resting = [constraint for constraint in self.constraints if not constraint.moving]
+        T_start = _tool(description, ways[0].points[0])
+        for spot in places:
+            require_kept(description, resting, T_start, spot)
+        if wish.duration is not None and wish.duration < ways[0].bound:
+            least = f"the speed limits alone ask for {ways[0].bound:.6g} s"
+            raise PlanningError(f"a duration of {wish.duration:.6g} s is too short: {least}")
         moves = np.max([np.ptp(way.points, axis=0) for way in ways], axis=0) > 0
         if not moves.any() and all(at_rest.values()):
             raise PlanningError("start and goal are the same configuration")
@@ -304,7 +317,12 @@ class Planner:
         )
 
     def _best(
-        self, wish: _Wish, ways: Sequence[Route], warm: Trajectory | None, deadline: float, progress: ProgressCall | None
+        self,
+        wish: _Wish,
+        ways: Sequence[Route],
+        warm: Trajectory | None,
+        deadline: float,
+        progress: ProgressCall | None,
     ) -> tuple[tuple[Task, Found], tuple[BranchReport, ...], float, tuple[int, int]]:
         """Return the best motion along any way, what the others cost, seconds of making, iterations and solves."""
         best: tuple[Task, Found] | None = None
@@ -336,10 +354,9 @@ class Planner:
             if best is None or found.cost < best[1].cost:
                 best, chosen = (task, found), number
         if best is None:
-            assert failure is not None
-            if len(ways) == 1:
-                raise failure
-            raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}") from None
+            if failure is None or len(ways) == 1:
+                raise failure or PlanningError("no motion found")
+            raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}")
         told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
         return best, told, seconds, (iterations, solves)
 

@@ -54,7 +54,9 @@ class Knots:
         """Return the motion that a program's numbers are."""
         legs, knots, columns = len(mesh.legs), mesh.intervals + 1, mesh.curve.columns(mesh.intervals)
         parts = np.split(vector, np.cumsum([legs, n * knots, n * knots]))
-        return cls(parts[0], *(part.reshape(count, n) for part, count in zip(parts[1:], (knots, knots, columns), strict=True)))
+        return cls(
+            parts[0], *(part.reshape(count, n) for part, count in zip(parts[1:], (knots, knots, columns), strict=True))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +196,7 @@ class Problem:
             return shares
         if self.mesh.curve is Curve.JUMPING:
             return np.repeat(shares / 2, 2)
-        around = (np.append(shares, 0.0) + np.append(0.0, shares)) / 2
+        around: Array = (np.append(shares, 0.0) + np.append(0.0, shares)) / 2
         if self.mesh.curve is Curve.LINEAR:
             return around
         both = np.empty(2 * len(shares) + 1)

@@ -25,6 +25,11 @@ class BranchReport:
     reason: str = ""
     """Why there is no motion."""
 
+    def __str__(self) -> str:
+        if self.reason:
+            return f"{self.branch}: no motion: {self.reason}"
+        return f"{self.branch}: {'' if self.solved else 'at least '}{self.duration:.4f} s"
+
 
 @dataclass(frozen=True)
 class PlanReport:
@@ -107,21 +112,21 @@ class PlanReport:
         lines.append(
             f"certified by {certificate.reference} in {certificate.states} states: largest excess "
             f"{max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
-            f"({-100 * worst.excess:.2g} % left) at {worst.time:.3f} s"
+            f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
         )
         if self.slow_down > 1:
             lines.append(f"slowed down by {100 * (self.slow_down - 1):.3f} % to keep its limits between knots")
         if self.tightened:
             lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
-        active = [f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:TOLD]]
-        lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {', '.join(active) or 'none'}")
+        active = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:TOLD]) or "none"
+        lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.coarse is not None:
-            lines.append(f"mesh: {self.coarse[0]} intervals cost {100 * (self.sensitivity or 0):.2f} % more than {self.intervals}")
+            more = f"{100 * (self.sensitivity or 0):.2f} % more"
+            lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")
         for name, duration in self.classical:
-            lines.append(f"{name} along the straight joint path: {duration:.4f} s, {100 * (duration / self.duration - 1):.1f} % more")
-        for branch in self.branches:
-            cost = "no motion: " + branch.reason if branch.reason else f"{'' if branch.solved else 'at least '}{branch.duration:.4f} s"
-            lines.append(f"{'->' if branch.chosen else '  '} {branch.branch}: {cost}")
+            more = f"{100 * (duration / self.duration - 1):.1f} % more"
+            lines.append(f"{name} along the straight joint path: {duration:.4f} s, {more}")
+        lines += [f"{'->' if branch.chosen else '  '} {branch}" for branch in self.branches]
         lines.append(
             f"{self.solves} program{'s' * (self.solves != 1)}, {self.iterations} iterations, "
             f"{self.solve_seconds:.3f} s (and {self.build_seconds:.2f} s to build)"

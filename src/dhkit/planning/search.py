@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,8 +33,8 @@ ROUNDS = 8
 """How often a motion is solved for anew at most, to be certified."""
 SLACK = 2e-7
 """What a slow-down adds, for what lies between the certificate's states."""
-FACTORS = (1.0, 2.5, 0.6)
-"""What guessed durations are multiplied by, one start after another."""
+FACTORS = (2.5, 0.6)
+"""What guessed durations are multiplied by where the first start fails."""
 STARTS = 4
 """Of arms of two or three joints: their programs have more than one optimum, and are small."""
 DETOURS = 8
@@ -89,6 +90,10 @@ class Search:
     iterations: int = 0
     solves: int = 0
     tightened: list[str] = field(default_factory=list)
+    value: float = np.inf
+    """Of the last solution's objective."""
+    failure: PlanningError | None = None
+    """The first."""
 
     def __call__(self, warm: Trajectory | None = None) -> Found:
         """Return the best certified motion.
@@ -98,9 +103,41 @@ class Search:
         PlanningError
             No start converges, limits stay exceeded, or the time is over.
         """
+        try:
+            for knots in self._solutions(warm):
+                try:
+                    return self._certified(knots)
+                except PlanningError as error:
+                    self._note(error)
+        except _TimeIsOver:
+            starts = f"{self.solves} start{'s' * (self.solves > 1)}"
+            raise PlanningError(
+                f"no motion found{self._around} within the time limit, in {starts}{self._why}"
+            ) from None
+        if self.failure is None or not self.task.surroundings:
+            raise self.failure or PlanningError("no motion found")
+        raise PlanningError(f"no motion found{self._around}, in {self.solves} starts{self._why}") from None
+
+    @property
+    def _around(self) -> str:
+        surroundings = self.task.surroundings
+        if not surroundings:
+            return ""
+        return f" that keeps {1000 * surroundings.clearance:.3g} mm clear of {surroundings.names}"
+
+    @property
+    def _why(self) -> str:
+        return f"; the first: {self.failure}" if self.failure else ""
+
+    def _note(self, error: PlanningError) -> None:
+        if isinstance(error, _TimeIsOver):
+            raise error
+        self.failure = self.failure or error
+
+    def _certified(self, knots: Knots) -> Found:
+        """Return a solution as a motion that keeps its limits everywhere, solved anew where it must be."""
         task, mesh = self.task, self.program.mesh
         margins, inflation = Margins(mesh), np.zeros(len(task.surroundings.obstacles) + 1)
-        knots = self._first(margins, inflation, warm)
         for _ in range(ROUNDS):
             trajectory = assembled(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
             trajectory, certificate, c = self._kept(trajectory)
@@ -116,7 +153,9 @@ class Search:
             guess = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
             knots = self._solution(guess, margins, inflation)
         worst = certificate.worst
-        raise PlanningError(f"{self._whose(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {ROUNDS} rounds")
+        raise PlanningError(
+            f"{self._whose(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {ROUNDS} rounds"
+        )
 
     def _kept(self, trajectory: Trajectory) -> tuple[Trajectory, Certificate, float]:
         """Return a motion, slowed down where that is all it takes, its certificate, and by what it was slowed down."""
@@ -143,58 +182,40 @@ class Search:
 
     # Starts
 
-    def _first(self, margins: Margins, inflation: Array, warm: Trajectory | None) -> Knots:
-        """Return the best solution of a few starts."""
-        task, mesh, problem = self.task, self.program.mesh, self.program.problem
-        if warm is not None and len(mesh.legs) == 1:
+    def _solutions(self, warm: Trajectory | None) -> Iterator[Knots]:
+        """Yield solutions, those to be tried first first."""
+        task, mesh = self.task, self.program.mesh
+        margins, inflation = Margins(mesh), np.zeros(len(task.surroundings.obstacles) + 1)
+        many = 1 < task.arm.n <= FEW and self.program.problem.objective.has_time and not task.surroundings
+        found: list[tuple[float, Knots]] = []
+        for guess in self._guesses(warm, STARTS if many else 1):
             try:
-                return self._solution(knots_along(warm, mesh, np.array([warm.duration])), margins, inflation)
-            except PlanningError:
-                pass
+                knots = self._solution(guess(), margins, inflation)
+            except PlanningError as error:
+                if found and isinstance(error, _TimeIsOver):
+                    break
+                self._note(error)
+                continue
+            if not many:
+                yield knots
+            else:
+                found.append((self.value, knots))
+        yield from (knots for _, knots in sorted(found, key=lambda item: item[0]))
+
+    def _guesses(self, warm: Trajectory | None, many: int) -> Iterator[Callable[[], Knots]]:
+        """Yield what to start from: a motion that is known, straight ways, and detours."""
+        task, mesh = self.task, self.program.mesh
+        if warm is not None and len(mesh.legs) == 1:
+            yield lambda: knots_along(warm, mesh, np.array([warm.duration]))
         durations = leg_durations(task.description, task.limits, task.points)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
-        open_time = task.duration is None
-        straight = [durations * (factor if open_time else 1.0) for factor in (FACTORS if open_time else (1.0,))]
-        guesses = [lambda d=d: straight_knots(task, mesh, d) for d in straight]
-        more = STARTS - 1 if 1 < problem.n <= FEW and problem.objective.has_time else 0
-        if task.surroundings:
-            more = max(more, DETOURS)
-        guesses += [lambda k=k: detour(task, mesh, durations, seed=k) for k in range(more)]
-        want = 1 + (more if not task.surroundings else 0)
-        best: tuple[float, Knots] | None = None
-        failure: PlanningError | None = None
-        solved = 0
-        for number, guess in enumerate(guesses):
-            if solved and 0 < number < len(straight):
-                continue  # another speed is for starts that fail
-            try:
-                knots = self._solution(guess(), margins, inflation)
-            except _Late as error:
-                if best is None:
-                    raise PlanningError(f"{error}{self._lately(failure)}") from None
-                break
-            except PlanningError as error:
-                failure = failure or error
-                continue
-            solved += 1
-            if best is None or self._value < best[0]:
-                best = self._value, knots
-            if solved >= want:
-                break
-        if best is None:
-            assert failure is not None
-            if task.surroundings:
-                raise PlanningError(
-                    f"no way found around {task.surroundings.names} that keeps {1000 * task.surroundings.clearance:.3g} mm "
-                    f"clear, from {len(guesses)} starts; the first: {failure}"
-                )
-            raise failure
-        return best[1]
-
-    def _lately(self, failure: PlanningError | None) -> str:
-        around = f" around {self.task.surroundings.names}" if self.task.surroundings else ""
-        return f"{around}; the first start: {failure}" if failure else around
+        yield lambda: straight_knots(task, mesh, durations)
+        for seed in range(DETOURS if task.surroundings else many - 1):
+            yield lambda seed=seed: detour(task, mesh, durations, seed)  # type: ignore[misc]
+        if self.failure is not None and task.duration is None:
+            for factor in FACTORS:
+                yield lambda factor=factor: straight_knots(task, mesh, durations * factor)  # type: ignore[misc]
 
     def _solution(self, guess: Knots, margins: Margins, inflation: Array) -> Knots:
         """Solve from a guess.
@@ -217,10 +238,10 @@ class Search:
         try:
             solution = self.program.solver(guess.vector, parameters, inside, bounds, self.deadline, self.progress)
         except Stopped:
-            raise _Late(f"no motion found within the time limit, after {self.solves} start{'s' * (self.solves > 1)}") from None
+            raise _TimeIsOver from None
         self.iterations += solution.iterations
         if solution.converged and solution.infeasibility <= FEASIBLE:
-            self._value = solution.cost
+            self.value = solution.cost
             return Knots.of(solution.x, mesh, problem.n)
         raise PlanningError(self._missed(solution, bounds))
 
@@ -244,8 +265,8 @@ class Search:
         return max(cost_of(objective, trajectory, task.description, task.friction), SMALLEST)
 
 
-class _Late(PlanningError):
-    """The time is over."""
+class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)
+    """The deadline has passed."""
 
 
 SMALLEST = 1e-9

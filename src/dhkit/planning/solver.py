@@ -129,7 +129,9 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
     """Return what Ipopt calls once an iteration."""
     import casadi
 
-    class Watch(casadi.Callback):  # type: ignore[misc]
+    class Watch(casadi.Callback):
+        raised: BaseException | None = None
+
         def __init__(self) -> None:
             casadi.Callback.__init__(self)
             self.construct("watch", {})
@@ -152,7 +154,7 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             size = {"x": nx, "lam_x": nx, "f": 1, "g": ng, "lam_g": ng, "lam_p": np_}[casadi.nlpsol_out(i)]
             return casadi.Sparsity.dense(size, 1)
 
-        def eval(self, arguments: list[casadi.DM]) -> list[int]:
+        def eval(self, arguments: Any) -> list[int]:
             self.iteration += 1
             now = time.perf_counter()
             try:

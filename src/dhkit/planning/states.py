@@ -56,8 +56,14 @@ class States:
             rows = [a.reshape(-1, count - 1, *width), b.reshape(-1, 1, *width)]
             return np.concatenate(rows, axis=1).reshape(-1, *width)
 
-        names = ("times", "q", "qd", "qdd", "jerk")
-        return replace(self, **{name: joined(getattr(self, name), getattr(last, name)) for name in names})
+        return replace(
+            self,
+            times=joined(self.times, last.times),
+            q=joined(self.q, last.q),
+            qd=joined(self.qd, last.qd),
+            qdd=joined(self.qdd, last.qdd),
+            jerk=joined(self.jerk, last.jerk),
+        )
 
     @property
     def n(self) -> int:
@@ -100,11 +106,15 @@ class States:
         """Of the tool's origin, world axes, shape (N, 3), m/s^2."""
         return self._tool[2]
 
+    def with_tool(self, T_world_tool: Array) -> States:
+        """Return the same with the tool at rest in poses (N, 4, 4) of which the joint values are not known."""
+        other = replace(self)
+        other.__dict__["_tool"] = (T_world_tool, np.zeros((self.n, 3)), np.zeros((self.n, 3)))
+        return other
+
     def slowed(self, c: float) -> States:
         """Return the states of the motion c times as slow; torques by their law, tau(t / c) = g + (tau - g) / c^2."""
-        slower = replace(
-            self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3
-        )
+        slower = replace(self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3)
         known: dict[str, Any] = slower.__dict__
         if "_rigid" in self.__dict__:
             known["_rigid"] = self.gravity_torque + (self._rigid - self.gravity_torque) / c**2
@@ -140,7 +150,11 @@ class States:
         import pinocchio as pin
 
         data, frame, axes = model.createData(), model.getFrameId("tool"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        T, velocity, acceleration = np.empty((len(self.q), 4, 4)), np.empty((len(self.q), 3)), np.empty((len(self.q), 3))
+        T, velocity, acceleration = (
+            np.empty((len(self.q), 4, 4)),
+            np.empty((len(self.q), 3)),
+            np.empty((len(self.q), 3)),
+        )
         for k, state in enumerate(zip(self.q, self.qd, self.qdd, strict=True)):
             pin.forwardKinematics(model, data, *state)
             T[k] = pin.updateFramePlacement(model, data, frame).homogeneous

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-
 import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.certificate import Checker
-from dhkit.planning.clear import Surroundings
+from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import TINY_TIME, Problem, Rows
 from dhkit.planning.solver import Solution
@@ -45,7 +44,7 @@ class Task:
     parameters: tuple[Array, ...] = ()
     """Of each constraint."""
     friction: Friction | None = None
-    surroundings: Surroundings = Surroundings()
+    surroundings: Surroundings = NOTHING
 
     @property
     def is_loaded(self) -> bool:
@@ -179,7 +178,9 @@ def _sizes(limits: Limits) -> Array:
 def usual_accelerations(limits: Limits, guess: Array) -> Array:
     """Return by what accelerations are measured, shape (n,): their limits, or twice the largest of a first guess."""
     largest = np.maximum(2 * np.abs(guess).max(axis=0), 1e-3)
-    usual: Array = np.where(np.isfinite(limits.acceleration), limits.acceleration, np.maximum(largest, 0.05 * largest.max()))
+    usual: Array = np.where(
+        np.isfinite(limits.acceleration), limits.acceleration, np.maximum(largest, 0.05 * largest.max())
+    )
     return usual
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from dhkit.planning.objectives import Objective, Time
 from dhkit.planning.point import LOAD, Point
 from dhkit.planning.solver import Solver
 from dhkit.trajectories import JointPath, Limits
+from dhkit.trajectories.pieces import Side
 
 if TYPE_CHECKING:
     import casadi
@@ -57,8 +58,8 @@ class PathStates:
     def of(cls, description: Description, path: JointPath, knots: Array, *, torque: bool, tool: bool) -> PathStates:
         """Work a path out on a grid; where it bends suddenly, each interval has its own side."""
         first, second = path.pieces.derivative, path.pieces.derivative.derivative
-        ends = ((knots[:-1], "right"), (knots[1:], "left"))
-        q, qs, qss = (np.stack([piece(s, side) for s, side in ends]) for piece in (path.pieces, first, second))  # type: ignore[arg-type]
+        ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
+        q, qs, qss = (np.stack([piece(s, side) for s, side in ends]) for piece in (path.pieces, first, second))
         still = np.zeros_like(q)
         m = c = g = still
         if torque:
@@ -104,14 +105,17 @@ class PathPoint(Point):
 
     @cached_property
     def tau(self) -> casadi.SX:
+        """Joint torques, n x 1, N m and N."""
         return self._tau
 
     @cached_property
     def tool_velocity(self) -> casadi.SX:
+        """The velocity of the tool's origin, 3 x 1, m/s."""
         return self._tool[0]
 
     @cached_property
     def tool_acceleration(self) -> casadi.SX:
+        """Its acceleration, 3 x 1, m/s^2."""
         return self._tool[1]
 
 
@@ -120,6 +124,8 @@ class TimingRows:
     """Rows of one kind that are linear in b: low <= left b_k + right b_(k+1) <= high; scaled so that 1 is a limit."""
 
     what: str
+    limited: Array
+    """Which joints have such a limit, shape (n,): one row for each of those."""
     left: Array
     """Shape (2, K, rows)."""
     right: Array
@@ -132,11 +138,20 @@ class TimingRows:
         limited = np.isfinite(limit)
         by_sdd, by_b, rest = (array[..., limited] / limit[limited] for array in (by_sdd, by_b, rest))
         slope = by_sdd / (2 * states.steps[:, None])
-        return cls(what, np.stack([by_b[0] - slope[0], -slope[1]]), np.stack([slope[0], by_b[1] + slope[1]]), rest)
+        left, right = np.stack([by_b[0] - slope[0], -slope[1]]), np.stack([slope[0], by_b[1] + slope[1]])
+        return cls(what, limited, left, right, rest)
 
-    def bounds(self, share: Array) -> tuple[Array, Array]:
-        """Return bounds of ``left b_k + right b_(k+1)``, shape (2, K, rows), that keep a share (K, rows) in reserve."""
-        return -(1 - share) - self.rest, (1 - share) - self.rest
+    def bounds(self, shares: Array) -> tuple[Array, Array]:
+        """Return bounds of ``left b_k + right b_(k+1)``, shape (2, K, rows), that keep shares (K, n) in reserve."""
+        most = 1 - shares[:, self.limited]
+        return -most - self.rest, most - self.rest
+
+    def largest(self, shape: Array) -> float:
+        """Return by what b of a shape (K+1,) may be multiplied to keep the rows where standing still keeps them."""
+        value = self.left * shape[:-1, None] + self.right * shape[1:, None]
+        spare = 1 - np.sign(value) * self.rest
+        with np.errstate(divide="ignore"):
+            return float(np.min(np.where(spare > 0, spare / np.abs(value), np.inf), initial=np.inf))
 
 
 @dataclass(frozen=True)
@@ -185,8 +200,9 @@ class Terms:
         point = self.point
         cost = casadi.SX(0)
         for term in self.objective.terms:
-            if not isinstance(term, Time):
-                cost += term.weight * term.integrand(point)
+            integrand = term.integrand(point)
+            if integrand is not None:
+                cost += term.weight * integrand
         inputs = [point.sdd, point.b, point.speed, point.path]
         return casadi.Function("on_path", inputs, [casadi.vertcat(*self.rows), cost], {"cse": True})
 
@@ -196,7 +212,8 @@ class TimingProgram:
 
     Its numbers are the duration and b at the knots inside, in units of a time that its caller chooses; its rows are
     the linear ones, (2, K, rows) flattened; those of ``terms``, a column of rows for each end, left ends first; and by
-    how much the intervals take longer than the duration.
+    how much the intervals take longer than the duration. In least time it is convex. Other objectives are not: slow
+    motions linger where gravity is least, and logarithms of b follow them over their decades.
     """
 
     def __init__(self, intervals: int, rows: int, terms: Terms | None) -> None:
@@ -208,7 +225,9 @@ class TimingProgram:
         left, right = casadi.MX.sym("left", rows, 2 * K), casadi.MX.sym("right", rows, 2 * K)
         path = casadi.MX.sym("path", terms.function.numel_in(3) if terms else 0, 2 * K)
         rate, scale = casadi.MX.sym("rate"), casadi.MX.sym("scale")
-        duration, inside, rest = x[0], x[1:].T, casadi.DM(1, 1)
+        self.logarithmic = terms is not None and not terms.objective.only_time
+        inside = casadi.exp(x[1:]).T if self.logarithmic else x[1:].T
+        duration, rest = x[0], casadi.DM(1, 1)
         b, speed = casadi.horzcat(rest, inside, rest), casadi.horzcat(rest, casadi.sqrt(inside), rest)
         # Written as a sum of speeds: at rest the square root has no derivative, and there it is a constant.
         times = 2 * steps / (speed[:-1] + speed[1:])
@@ -222,12 +241,22 @@ class TimingProgram:
             )
             g.append(casadi.vec(values[0]))
             weight = sum(term.weight for term in terms.objective.terms if isinstance(term, Time))
-            f = scale * (weight * duration + casadi.dot(casadi.horzcat(times, times) / 2, values[1]) / rate)
+            f = scale / rate * (weight * duration + casadi.dot(casadi.horzcat(times, times) / 2, values[1]))
         g.append(casadi.sum2(times) - duration)
         p = casadi.vertcat(*(casadi.vec(part) for part in (steps, left, right, path, rate, scale)))
         tolerance = CONVEX if terms is None or terms.objective.has_time else SMOOTH
         program = {"x": x, "p": p, "f": f, "g": casadi.vertcat(*g)}
-        self.solver = Solver(program, 1, tolerance=tolerance, expand=True)
+        self.solver = Solver(program, 1, tolerance=tolerance, expand=False)
+
+    def numbers(self, duration: float, b: Array) -> Array:
+        """Return the program's numbers for b at the knots inside, shape (K-1,)."""
+        with np.errstate(divide="ignore"):
+            return np.concatenate([[duration], np.log(b) if self.logarithmic else b])
+
+    def squares(self, x: Array) -> Array:
+        """Return b at all knots, shape (K+1,), of the program's numbers."""
+        inside = np.exp(x[1:]) if self.logarithmic else np.maximum(x[1:], 0.0)
+        return np.concatenate([[0.0], inside, [0.0]])
 
     def parameters(self, states: PathStates, rows: list[TimingRows], unit: float, scale: float) -> Array:
         """Return the program's parameters; ``unit``: its time, s."""

@@ -28,7 +28,7 @@ CHECKS = 9
 CLOSES = 1e-12
 """What may be missing at a knot, rad and shares of the reach; rounding leaves 1e-15."""
 NEWTON_STEPS, DAMPING = 8, 1e-13
-FIRST_STEP, SHORTEST_STEP = 1 / 16, 1e-6
+FIRST_STEP, SHORTEST_STEP = 1 / 16, 1e-9
 """Of the path, when it is first followed."""
 TAME = 0.25
 """How much of a step may be its second order, or an error: beside a singularity another branch is near, but no nearer

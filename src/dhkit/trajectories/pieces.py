@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array
 from dhkit.description.frames import number_array
 
-__all__ = ["Pieces", "Side", "shifted"]
+__all__ = ["Pieces", "Side", "joined", "shifted"]
 
 Side: TypeAlias = Literal["right", "left"]
 """Which piece counts at a break."""
@@ -93,6 +93,12 @@ class Pieces:
             value = value * u[..., None] + self.coefficients[piece, power]
         return value
 
+    def backwards(self) -> Pieces:
+        """Return f(end - x)."""
+        turned = shifted(self.coefficients, np.diff(self.breaks))[::-1]
+        signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
+        return Pieces(self.end - self.breaks[::-1], turned * signs)
+
     def inside(self, points: int) -> tuple[Array, Array]:
         """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
         width = np.diff(self.breaks)[:, None]
@@ -124,6 +130,14 @@ class Pieces:
             u = np.clip(u - step, low, high)
         u = np.concatenate([start, u], axis=1)
         return self.breaks[:-1, None, None] + u, self.at(u)
+
+
+def joined(first: Pieces, second: Pieces) -> tuple[Array, Array]:
+    """Return breaks and coefficients of one function that goes on with another's pieces."""
+    both = (first.coefficients, second.coefficients)
+    degrees = max(c.shape[1] for c in both)
+    padded = [np.pad(c, ((0, 0), (0, degrees - c.shape[1]), (0, 0))) for c in both]
+    return np.concatenate([first.breaks, first.end + second.breaks[1:]]), np.concatenate(padded)
 
 
 def shifted(coefficients: Array, u: Array) -> Array:

@@ -65,6 +65,8 @@ def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | No
         nothing limits the motion.
     DescriptionError
         Torques are limited, and a link has no body.
+    ValueError
+        The limits are of another number of joints.
 
     Examples
     --------
@@ -81,6 +83,7 @@ def least_slowdowns(
     trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None = None, points: int = 20
 ) -> Array:
     """Return :func:`least_slowdown` of several motions of one robot, shape (m,), their torques in one batch."""
+    _check_joints(trajectories[0], limits)
     slowest = np.array([_by_derivatives(trajectory, limits) for trajectory in trajectories])
     if np.isfinite(limits.torque).any():
         slowest = np.maximum(slowest, _by_torques(trajectories, limits, torques, points))
@@ -90,7 +93,7 @@ def least_slowdowns(
             name = trajectory.description.joints[int(np.flatnonzero(moving)[0])].name
             raise PlanningError(
                 f"nothing limits the motion: {name} moves, and has neither a velocity, acceleration, jerk nor torque"
-                " limit that it could reach; give one in limits, or a duration"
+                " limit that it could reach; give one, or a duration"
             )
     return slowest
 
@@ -102,7 +105,10 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     ------
     PlanningError
         Names the joint, the limit and when.
+    ValueError
+        The limits are of another number of joints.
     """
+    _check_joints(trajectory, limits)
     t, q = trajectory.pieces.turning()
     n = trajectory.n
     t, q = t.reshape(-1, n), q.reshape(-1, n)
@@ -117,6 +123,11 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
         f"{trajectory.description.joints[i].name} leaves its {side} limit, {limit:.6g} {unit}: it comes to"
         f" {q[row, i]:.6g} {unit} at {t[row, i]:.4g} s"
     )
+
+
+def _check_joints(trajectory: Trajectory, limits: Limits) -> None:
+    if limits.velocity.shape != (trajectory.n,):
+        raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {trajectory.n}")
 
 
 def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:

@@ -14,7 +14,7 @@ from dhkit.description.frames import number_array
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
 from dhkit.trajectories.interpolation import interpolated
-from dhkit.trajectories.pieces import Pieces, Side, shifted
+from dhkit.trajectories.pieces import Pieces, Side, joined
 from dhkit.trajectories.samples import Samples
 
 if TYPE_CHECKING:
@@ -79,8 +79,6 @@ class Trajectory:
     def duration(self) -> float:
         """In s."""
         return self.pieces.end
-
-    # Values
 
     def q(self, t: ArrayLike, side: Side = "right") -> Array:
         """Return joint values, shape (..., n), rad and m, for times of shape (...), s.
@@ -162,10 +160,7 @@ class Trajectory:
             return np.linspace(0.0, self.duration, n)
         if rate is None or not 0 < rate < np.inf:
             raise ValueError(f"rate is {rate!r}; expected a positive number of samples a second")
-        last = int(np.ceil(self.duration * rate - SAME_TIME))
-        return np.append(np.arange(max(last, 1)) / rate, self.duration)
-
-    # Other motions
+        return np.append(np.arange(max(int(np.ceil(self.duration * rate - SAME_TIME)), 1)) / rate, self.duration)
 
     def slowed(self, c: float) -> Trajectory:
         """Return the same path c times as slow, q(t / c); without the report, which is about this motion.
@@ -182,9 +177,8 @@ class Trajectory:
 
     def reversed(self) -> Trajectory:
         """Return the motion back, q(duration - t)."""
-        turned = shifted(self.coefficients, np.diff(self.breaks))[::-1]
-        signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
-        return Trajectory(self.description, self.duration - self.breaks[::-1], turned * signs)
+        back = self.pieces.backwards()
+        return Trajectory(self.description, back.breaks, back.coefficients)
 
     def then(self, other: Trajectory) -> Trajectory:
         """Return this motion with another behind it.
@@ -203,11 +197,7 @@ class Trajectory:
             i = int(apart[0])
             name = self.description.joints[i].name
             raise ValueError(f"{name} ends at {end[i]:.9g} and goes on from {start[i]:.9g}; expected the same value")
-        degrees = max(self.coefficients.shape[1], other.coefficients.shape[1])
-        both = (self.coefficients, other.coefficients)
-        padded = [np.pad(c, ((0, 0), (0, degrees - c.shape[1]), (0, 0))) for c in both]
-        breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
-        return Trajectory(self.description, breaks, np.concatenate(padded))
+        return Trajectory(self.description, *joined(self.pieces, other.pieces))
 
     @classmethod
     def from_samples(
@@ -284,8 +274,6 @@ class Trajectory:
         from dhkit.trajectories.files import read_samples
 
         return read_samples(path, description, degrees=degrees)
-
-    # Value semantics
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Trajectory):
