@@ -13,8 +13,7 @@ from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate, Checker
 from dhkit.planning.constraints import Constraint, ToolAcceleration, ToolSpeed
 from dhkit.planning.costs import cost_of
-from dhkit.planning.feasibility import require_holdable
-from dhkit.planning.mesh import graded
+from dhkit.planning.feasibility import require_holdable, unit_of
 from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
 from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import Progress, ProgressCall, Solution, Stopped
@@ -28,7 +27,7 @@ from dhkit.planning.timing_program import (
     speed_bounds,
     timing_program,
 )
-from dhkit.trajectories import JointPath, Limits, Trajectory, require_inside
+from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
 __all__ = ["along_path"]
@@ -51,6 +50,10 @@ CORNER = 1e-6
 """Share of the largest derivative by which it may jump: rounding."""
 STANDS_STILL, TOO_STEEP = 1e-6, 1e4
 """Of the path's mean derivative: below the one the path stands still, above the other it is singular."""
+EVENLY, TINY = 0.3, 1e-12
+"""Share of knots that lie evenly, and a time that nothing takes, s."""
+FEWEST, MOST = 6, 2000
+"""Intervals."""
 OUTSIDE = 1e-9
 """rad and m: how far rounding may lead out of the joint limits."""
 QUICKEST = Objective.of("time")
@@ -112,8 +115,8 @@ def along_path(
         Another robot's path, an objective that needs a duration, or one of energy or jerk.
     """
     began = time.perf_counter()
-    if isinstance(intervals, bool) or not isinstance(intervals, int) or not 6 <= intervals <= 2000:
-        raise ValueError(f"intervals is {intervals!r}; expected a whole number from 6 to 2000")
+    if not isinstance(intervals, int) or not FEWEST <= intervals <= MOST:
+        raise ValueError(f"intervals is {intervals!r}; expected a whole number from {FEWEST} to {MOST}")
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
@@ -126,25 +129,17 @@ def along_path(
     building = time.perf_counter()
     programs = [timing_program(each.intervals, each.linear_rows, each.terms) for each in task.steps]
     built = time.perf_counter() - building
-    found, iterations, solves = None, 0, 0
-    for each, program in zip(task.steps, programs, strict=True):
-        found = _certified(each, program, found, began + time_limit, progress)
-        iterations, solves = iterations + found.iterations, solves + found.solves
-        if duration is not None and found.trajectory.duration > duration * (1 + SLACK):
-            raise PlanningError(
-                f"{duration:.6g} s are too short: the limits allow the motion along the path in "
-                f"{found.trajectory.duration:.6g} s"
-            )
-    assert found is not None
+    found, *before = _solved(task, programs, began + time_limit, progress)
+    cost = cost_of(wanted, found.trajectory, description)
     report = PlanReport(
         objective=str(wanted),
-        cost=cost_of(wanted, found.trajectory, description),
+        cost=cost,
         duration=found.trajectory.duration,
         certificate=found.certificate,
         joints=tuple(joint.name for joint in description.joints),
         intervals=task.intervals,
-        iterations=iterations,
-        solves=solves,
+        iterations=found.iterations + sum(each.iterations for each in before),
+        solves=found.solves + sum(each.solves for each in before),
         build_seconds=built,
         solve_seconds=time.perf_counter() - began - built,
         slow_down=found.slow_down,
@@ -185,11 +180,11 @@ class _Task:
         needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
         torque = any((*needed, *np.isfinite(limits.torque)))
         tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
-        states = PathStates.of(description, path, _knots(path, intervals), torque=torque, tool=tool)
-        rows = [
-            TimingRows.of("torque", states, states.m, states.c, states.g, limits.torque),
-            TimingRows.of("acceleration", states, states.qs, states.qss, 0 * states.q, limits.acceleration),
-        ]
+        rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
+        states = PathStates.of(description, path, rough, torque=torque, tool=tool)
+        knots = _knots(path, intervals, rough, _even_speeds(states, limits, constraints))
+        states = PathStates.of(description, path, knots, torque=torque, tool=tool)
+        rows = _rows(states, limits)
         T_start = world_to_tool(description, path.q(0.0)) if constraints else np.eye(4)
         parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
         others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
@@ -213,18 +208,13 @@ class _Task:
         q = self.states.q.reshape(-1, self.description.n)
         return States(self.description, self.states.s.ravel(), q, 0 * q, 0 * q)
 
-    @property
-    def tool_speeds(self) -> list[ToolSpeed]:
-        """Those of the constraints that bound b."""
-        return [constraint for constraint in self.checker.constraints if isinstance(constraint, ToolSpeed)]
-
     def shares(self, reserved: dict[str, Array], what: str, count: int) -> Array:
         """Return what is kept in reserve of a limit in each interval, shape (K, count)."""
         return reserved.get(what, np.zeros((self.intervals, count)))
 
     def largest_b(self, reserved: dict[str, Array]) -> Array:
         """Return the bounds of b by limits of speed, shape (K+1,)."""
-        tools = [(tool, self.shares(reserved, tool.what, 1)) for tool in self.tool_speeds]
+        tools = [(tool, self.shares(reserved, tool.what, 1)) for tool in _tool_speeds(self.checker.constraints)]
         return speed_bounds(self.states, self.limits, self.shares(reserved, "velocity", self.description.n), tools)
 
     @property
@@ -295,6 +285,19 @@ class _Found:
     tightened: tuple[str, ...]
     iterations: int
     solves: int
+
+
+def _solved(task: _Task, programs: list[TimingProgram], deadline: float, progress: ProgressCall | None) -> list[_Found]:
+    """Return what each step of a task has found, the last one first."""
+    found: list[_Found] = []
+    for step, program in zip(task.steps, programs, strict=True):
+        found.insert(0, _certified(step, program, found[0] if found else None, deadline, progress))
+        quickest = found[-1].trajectory.duration
+        if task.duration is not None and quickest > task.duration * (1 + SLACK):
+            raise PlanningError(
+                f"{task.duration:.6g} s are too short: the limits allow the motion along the path in {quickest:.6g} s"
+            )
+    return found
 
 
 def _certified(
@@ -393,7 +396,7 @@ def _require_path(description: Description, path: JointPath, limits: Limits) -> 
     names = [joint.name for joint in description.joints]
     if np.isfinite(limits.jerk).any():
         raise PlanningError("jerk is limited: along a path accelerations jump; give limits without those of jerk")
-    require_inside(path.timed([0.0, 1.0], [[0.0, 1.0]]), limits)
+    _require_inside(path, limits)
     jumps = np.abs(_jumps(path, 1))
     if jumps.size and jumps.max() > CORNER * np.abs(path.qs(path.breaks)).max():
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
@@ -413,6 +416,20 @@ def _require_path(description: Description, path: JointPath, limits: Limits) -> 
         raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {names[i]} turns ever faster there")
     for where, q in (("the path's beginning", path.q(0.0)), ("the path's end", path.q(1.0))):
         require_holdable(description, limits, q, where)
+
+
+def _require_inside(path: JointPath, limits: Limits) -> None:
+    """Refuse a path that leaves the joint limits."""
+    s, q = (array.reshape(-1, path.description.n) for array in path.pieces.turning())
+    excess = np.maximum(limits.lower - q, q - limits.upper)
+    if excess.max() <= OUTSIDE:
+        return
+    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
+    side, limit = ("lower", limits.lower[i]) if q[k, i] < limits.lower[i] else ("upper", limits.upper[i])
+    raise PlanningError(
+        f"{path.description.joints[i].name} leaves its {side} limit, {limit:.6g} {unit_of(path.description, int(i))}, "
+        f"along the path: it comes to {q[k, i]:.6g} at s = {s[k, i]:.4g}"
+    )
 
 
 def _require_kept(task: _Task) -> None:
@@ -437,9 +454,44 @@ def _jumps(path: JointPath, order: int) -> Array:
     return jumps
 
 
-def _knots(path: JointPath, intervals: int) -> Array:
-    """Return a grid with knots where the path's curvature jumps."""
-    knots, taken = graded(intervals), set()
+def _rows(states: PathStates, limits: Limits) -> list[TimingRows]:
+    return [
+        TimingRows.of("torque", states, states.m, states.c, states.g, limits.torque),
+        TimingRows.of("acceleration", states, states.qs, states.qss, 0 * states.q, limits.acceleration),
+    ]
+
+
+def _tool_speeds(constraints: tuple[Constraint, ...]) -> list[ToolSpeed]:
+    """Return those of the constraints that bound b."""
+    return [constraint for constraint in constraints if isinstance(constraint, ToolSpeed)]
+
+
+def _even_speeds(states: PathStates, limits: Limits, constraints: tuple[Constraint, ...]) -> Array:
+    """Return the greatest even speed along the path in each interval, shape (K,), 1/s."""
+    nothing = np.zeros((len(states.steps), 1))
+    bounds = speed_bounds(states, limits, nothing, [(tool, nothing) for tool in _tool_speeds(constraints)])
+    most = np.minimum(bounds[:-1], bounds[1:])
+    for row in _rows(states, limits):
+        most = np.minimum(most, row.even.min(axis=0))
+    return np.sqrt(most)
+
+
+def _knots(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Array:
+    """Return a grid with steps that take about the same time, and knots where the path's curvature jumps.
+
+    From rest s grows as t^2 and so do the first knots; where the joints have to go slowly, near singularities, the
+    grid is finer.
+
+    Parameters
+    ----------
+    rough, speeds
+        A first grid, shape (K+1,), and the greatest even speed in its intervals, shape (K,).
+    """
+    steps = np.diff(rough)
+    times = steps / speeds
+    share = (1 - EVENLY) * times / max(float(times.sum()), TINY) + EVENLY * steps
+    x = (1 - np.cos(np.linspace(0.0, np.pi, intervals + 1))) / 2
+    knots, taken = np.interp(x, np.concatenate([[0.0], np.cumsum(share) / share.sum()]), rough), set()
     jumps = np.abs(_jumps(path, 2)).max(axis=1)
     for s in path.breaks[1:-1][jumps > CORNER * np.abs(path.qss(path.breaks)).max()]:
         k = int(np.argmin(np.abs(knots[1:-1] - s))) + 1

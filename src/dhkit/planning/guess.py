@@ -14,7 +14,7 @@ from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.trajectories import Limits, Trajectory
 
-__all__ = ["detour", "leg_durations", "straight_knots"]
+__all__ = ["detour", "leg_durations", "straight_knots", "usual_accelerations"]
 
 SAMPLES = 17
 """States by which a leg's duration is guessed."""
@@ -55,6 +55,22 @@ def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
     velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
     times = np.concatenate([[0.0], np.cumsum(durations)])
     return knots_along(Trajectory.from_samples(task.arm, times, task.points, velocities), mesh, times[1:])
+
+
+def usual_accelerations(task: Task, guess: Knots) -> Array:
+    """Return by what accelerations are measured, shape (n,): what a joint's torque gives it alone, or its limit.
+
+    Where neither is limited, twice the largest of a first guess.
+    """
+    limits, n = task.limits, task.arm.n
+    largest = np.maximum(2 * np.abs(guess.qdd).max(axis=0), 1e-3)
+    usual = np.where(np.isfinite(limits.acceleration), limits.acceleration, np.inf)
+    if np.isfinite(limits.torque).any():
+        q = np.tile((task.points[0] + task.points[-1]) / 2, (n, 1))
+        pushed = States(task.description, np.zeros(n), q, np.zeros((n, n)), np.eye(n))
+        inertia = np.diagonal(pushed.tau - pushed.gravity_torque)
+        usual = np.minimum(usual, limits.torque / np.maximum(inertia, 1e-12))
+    return np.where(np.isfinite(usual), usual, np.maximum(largest, 0.05 * largest.max()))
 
 
 def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:

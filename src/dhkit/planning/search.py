@@ -14,11 +14,11 @@ from dhkit.planning.assembly import assembled, knots_along
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.clear import BEYOND
 from dhkit.planning.costs import cost_of
-from dhkit.planning.guess import detour, leg_durations, straight_knots
+from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import Knots, Problem, Rows
 from dhkit.planning.solver import ProgressCall, Solution, Solver, Stopped
-from dhkit.planning.task import FEW, Margins, Task, g_bounds, usual_accelerations, worst_row, x_bounds
+from dhkit.planning.task import FEW, Margins, Task, g_bounds, worst_row, x_bounds
 from dhkit.trajectories import Trajectory
 
 __all__ = ["Found", "Program", "Search"]
@@ -37,6 +37,8 @@ FACTORS = (2.5, 0.6)
 """What guessed durations are multiplied by where the first start fails."""
 STARTS = 4
 """Of arms of two or three joints: their programs have more than one optimum, and are small."""
+LONGEST, FACTORS_TRIED = 100.0, 24
+"""Durations that are tried for objectives of time and something else: from the fastest to so many seconds."""
 DETOURS = 8
 """Starts around obstacles at most."""
 
@@ -142,7 +144,7 @@ class Search:
             trajectory = assembled(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
             trajectory, certificate, c = self._kept(trajectory)
             if certificate.ok:
-                cost = cost_of(self.program.problem.objective, trajectory, task.description, task.friction)
+                cost = self._cost(trajectory)
                 return Found(trajectory, certificate, cost, c, tuple(self.tightened), self.iterations, self.solves)
             exceeded = [check.what for check in certificate.checks if check.excess > 0]
             self.tightened += [what for what in exceeded if what not in self.tightened]
@@ -210,12 +212,26 @@ class Search:
         durations = leg_durations(task.description, task.limits, task.points)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
+        elif not self.program.problem.objective.only_time:
+            durations *= self._best_factor(durations)
         yield lambda: straight_knots(task, mesh, durations)
         for seed in range(DETOURS if task.surroundings else many - 1):
             yield lambda seed=seed: detour(task, mesh, durations, seed)  # type: ignore[misc]
         if self.failure is not None and task.duration is None:
             for factor in FACTORS:
                 yield lambda factor=factor: straight_knots(task, mesh, durations * factor)  # type: ignore[misc]
+
+    def _best_factor(self, durations: Array) -> float:
+        """Return by what to slow down a straight way so that it costs least."""
+        factors = np.geomspace(1.0, LONGEST / max(float(durations.sum()), 1e-6), FACTORS_TRIED)
+        costs = []
+        for factor in factors:
+            knots = straight_knots(self.task, self.program.mesh, durations * factor)
+            costs.append(self._cost(assembled(self.task.arm, self.program.mesh, knots, fixed_ends=False)))
+        return float(factors[int(np.argmin(costs))])
+
+    def _cost(self, trajectory: Trajectory) -> float:
+        return cost_of(self.program.problem.objective, trajectory, self.task.description, self.task.friction)
 
     def _solution(self, guess: Knots, margins: Margins, inflation: Array) -> Knots:
         """Solve from a guess.
@@ -231,7 +247,7 @@ class Search:
             task.load,
             (*task.parameters, task.surroundings.values(inflation)) if task.surroundings else task.parameters,
             1.0 / self._scale(guess),
-            usual_accelerations(task.limits, guess.qdd),
+            usual_accelerations(task, guess),
         )
         inside = x_bounds(task, mesh, margins, jerk_counts=problem.jerk_counts)
         self.solves += 1
@@ -258,11 +274,9 @@ class Search:
 
     def _scale(self, guess: Knots) -> float:
         """Return the cost of a guess, by which costs are divided."""
-        objective, task = self.program.problem.objective, self.task
-        if objective.only_time:
+        if self.program.problem.objective.only_time:
             return float(guess.durations.sum())
-        trajectory = assembled(task.arm, self.program.mesh, guess, fixed_ends=False)
-        return max(cost_of(objective, trajectory, task.description, task.friction), SMALLEST)
+        return max(self._cost(assembled(self.task.arm, self.program.mesh, guess, fixed_ends=False)), SMALLEST)
 
 
 class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)

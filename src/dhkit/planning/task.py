@@ -175,15 +175,6 @@ def _sizes(limits: Limits) -> Array:
     return np.where(finite, np.maximum(np.abs(limits.lower), np.abs(limits.upper)), 1.0)
 
 
-def usual_accelerations(limits: Limits, guess: Array) -> Array:
-    """Return by what accelerations are measured, shape (n,): their limits, or twice the largest of a first guess."""
-    largest = np.maximum(2 * np.abs(guess).max(axis=0), 1e-3)
-    usual: Array = np.where(
-        np.isfinite(limits.acceleration), limits.acceleration, np.maximum(largest, 0.05 * largest.max())
-    )
-    return usual
-
-
 def curve_for(n: int, has_time: bool, jerk_counts: bool) -> Curve:
     """Return how accelerations run: the fewest numbers that come near to the best motion.
 

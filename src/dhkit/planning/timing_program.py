@@ -35,7 +35,7 @@ CONVEX, SMOOTH = 1e-6, 1e-8
 
 @dataclass(frozen=True, eq=False)
 class PathStates:
-    """A path and its arm's mechanics at both ends of K intervals: arrays of shape (2, K, ...), their left ends first."""
+    """A path and its arm's mechanics at both ends of K intervals: shapes (2, K, ...), left ends first."""
 
     s: Array
     """Shape (2, K)."""
@@ -148,10 +148,19 @@ class TimingRows:
 
     def largest(self, shape: Array) -> float:
         """Return by what b of a shape (K+1,) may be multiplied to keep the rows where standing still keeps them."""
-        value = self.left * shape[:-1, None] + self.right * shape[1:, None]
-        spare = 1 - np.sign(value) * self.rest
-        with np.errstate(divide="ignore"):
-            return float(np.min(np.where(spare > 0, spare / np.abs(value), np.inf), initial=np.inf))
+        return float(self._most(self.left * shape[:-1, None] + self.right * shape[1:, None]).min())
+
+    @property
+    def even(self) -> Array:
+        """The largest b that keeps the rows where it does not change, shape (2, K)."""
+        return self._most(self.left + self.right)
+
+    def _most(self, used: Array) -> Array:
+        spare = 1 - np.sign(used) * self.rest
+        with np.errstate(divide="ignore", invalid="ignore"):
+            most = np.where((spare > 0) & (used != 0), spare / np.abs(used), np.inf)
+        smallest: Array = most.min(axis=2, initial=np.inf)
+        return smallest
 
 
 @dataclass(frozen=True)

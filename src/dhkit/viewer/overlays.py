@@ -1,4 +1,4 @@
-"""What is drawn beside the arm, as the numbers that a page takes: colors of points and ghosts, ellipsoids as balls."""
+"""What is drawn beside the arm, as the numbers that a page takes: colors, ellipsoids as balls, obstacles as solids."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from dhkit.description import Array
 
 if TYPE_CHECKING:
     from dhkit.kinematics.manipulability import Ellipsoid
+    from dhkit.planning.obstacles import Scene
 
-__all__ = ["ball_transforms", "color_bytes", "ghost_tints", "heat_colors"]
+__all__ = ["ball_transforms", "color_bytes", "ghost_tints", "heat_colors", "solids"]
 
 GREY = (0.5, 0.55, 0.62)
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""
 HEAT = ("viridis", 0.87)
 """A scale of even steps, told apart by colour-blind people too, and where to end it: its palest is lost on white."""
+FLOOR = 1.2
+"""Half an edge of a floor as it is drawn, of the arm's size: it has no end."""
 THINNEST = 0.01
 """Half axes below this share of the longest are drawn as this: a ball pressed flat has no normals."""
 
@@ -115,3 +118,38 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
     T[:, :3, 3] = centers
     T[:, :3, :3] = axes * (scale * drawn)[:, None, :]
     return np.asarray(T[most[:, 0] > 0])
+
+
+def solids(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
+    """Return obstacles as :class:`dhkit.viewer.protocol.Obstacles` has them.
+
+    Parameters
+    ----------
+    obstacles
+        Of :mod:`dhkit.planning`.
+    size
+        The arm's, m: floors reach a little farther.
+
+    Returns
+    -------
+    tuple
+        Transforms, half edges and radii, shapes (k, 4, 4), (k, 3) and (k,), m.
+
+    Raises
+    ------
+    TypeError
+        Something else than obstacles and floors.
+    ValueError
+        More than one floor.
+    """
+    from dhkit.planning.obstacles import Floor, check_obstacles
+
+    scene = check_obstacles(obstacles)
+    T, half_edges, radii = np.tile(np.eye(4), (len(scene), 1, 1)), np.zeros((len(scene), 3)), np.zeros(len(scene))
+    for k, obstacle in enumerate(scene):
+        if isinstance(obstacle, Floor):
+            T[k, 2, 3] = obstacle.height
+            half_edges[k, :2] = FLOOR * size
+        else:
+            T[k], half_edges[k], radii[k] = obstacle.T_world_obstacle, obstacle.half_sizes, obstacle.radius
+    return T, half_edges, radii

@@ -21,6 +21,7 @@ MODULES = (
     "player.js",
     "trace.js",
     "overlays.js",
+    "obstacles.js",
     "labels.js",
     "smooth.js",
     "quality.js",

@@ -10,7 +10,8 @@ of joints n (u16), sequence (u32), time (f64, s). What follows depends on the ty
 - frames: nothing; flag 1 shows them;
 - points: count N (u32), then points in the world (f32, N x 3) and their colors (u8, N x 3);
 - ellipsoids: count k (u32), then transforms of the unit ball (f32, k x 12);
-- ghosts: count k (u32), then transforms (f32, k x (n + 2) x 12) and tints (u8, k x 3).
+- ghosts: count k (u32), then transforms (f32, k x (n + 2) x 12) and tints (u8, k x 3);
+- obstacles: count k (u32), then of each a transform (f32, 12), half edges (f32, 3) and a radius (f32).
 
 A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Page to
 Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn.
@@ -40,12 +41,14 @@ __all__ = [
     "Ghosts",
     "Header",
     "MessageType",
+    "Obstacles",
     "Pose",
     "ProtocolError",
     "decode_animation",
     "decode_ellipsoids",
     "decode_ghosts",
     "decode_header",
+    "decode_obstacles",
     "decode_points",
     "decode_pose",
     "decode_scene",
@@ -55,6 +58,7 @@ __all__ = [
     "encode_ellipsoids",
     "encode_frames",
     "encode_ghosts",
+    "encode_obstacles",
     "encode_points",
     "encode_pose",
     "encode_scene",
@@ -83,6 +87,7 @@ class MessageType(IntEnum):
     POINTS = 6
     ELLIPSOIDS = 7
     GHOSTS = 8
+    OBSTACLES = 9
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,21 @@ class Ghosts:
     """Shape (k, n + 2, 3, 4): links and tool in the world."""
     tints: NDArray[np.uint8]
     """Shape (k, 3): red, green and blue."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Solids that stand still: all that is within a radius of a box.
+
+    A ball has no edges, a capsule only one along z; a level square without a third edge stands for a floor.
+    """
+
+    transforms: Array
+    """Shape (k, 3, 4): the boxes in the world."""
+    half_edges: Array
+    """Shape (k, 3), m."""
+    radii: Array
+    """Shape (k,), m."""
 
 
 def encode_scene(scene: Scene) -> bytes:
@@ -269,6 +289,19 @@ def decode_ghosts(message: bytes) -> Ghosts:
     nodes = _expect(message, MessageType.GHOSTS).joints + 2
     transforms, tints = _counted(message, 12 * nodes)
     return Ghosts(transforms.reshape(-1, nodes, 3, 4), tints)
+
+
+def encode_obstacles(transforms: Array, half_edges: Array, radii: Array) -> bytes:
+    """Return a message of :class:`Obstacles`, shapes (k, 4, 4), (k, 3) and (k,), m; none take them away."""
+    rows = np.concatenate([transforms[:, :3, :].reshape(-1, 12), half_edges, radii[:, None]], axis=1)
+    return _header(MessageType.OBSTACLES) + LENGTH.pack(len(rows)) + _floats(rows)
+
+
+def decode_obstacles(message: bytes) -> Obstacles:
+    """Return the solids in a message of them."""
+    _expect(message, MessageType.OBSTACLES)
+    rows = _counted(message, 16)[0]
+    return Obstacles(rows[:, :12].reshape(-1, 3, 4), rows[:, 12:15], rows[:, 15])
 
 
 def encode_frames(visible: bool) -> bytes:

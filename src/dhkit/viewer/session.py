@@ -20,7 +20,8 @@ class Slot(IntEnum):
     POINTS = 3
     ELLIPSOIDS = 4
     GHOSTS = 5
-    MOTION = 6
+    OBSTACLES = 6
+    MOTION = 7
     """A pose or an animation."""
 
 

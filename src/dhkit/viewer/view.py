@@ -18,7 +18,7 @@ from dhkit.errors import ModelError
 from dhkit.trajectories import Trajectory
 from dhkit.viewer import protocol
 from dhkit.viewer.motion import check_motion, frame_times, sampled
-from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints
+from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
 from dhkit.viewer.session import Slot
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from dhkit.kinematics.manipulability import Ellipsoid
+    from dhkit.planning.obstacles import Scene
     from dhkit.viewer.server import ViewerServer
 
 __all__ = ["View"]
@@ -229,6 +230,24 @@ class View:
         shown = np.isfinite(states).all(axis=1)
         transforms = node_transforms(self._description, states[shown])
         self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
+
+    def obstacles(self, obstacles: Scene | None) -> None:
+        """Draw translucent obstacles, in place of the last; None takes them away.
+
+        Parameters
+        ----------
+        obstacles
+            As :meth:`dhkit.Arm.plan` takes them: ``Obstacle.box(...)`` and the like, and ``Floor()``.
+
+        Raises
+        ------
+        TypeError
+            Something else than obstacles and floors.
+        ValueError
+            More than one floor.
+        """
+        drawn = solids(() if obstacles is None else obstacles, scene_size(self._description))
+        self._publish(Slot.OBSTACLES, protocol.encode_obstacles(*drawn))
 
     def frames(self, visible: bool) -> None:
         """Show or hide the DH frames."""

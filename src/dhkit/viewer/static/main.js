@@ -1,7 +1,8 @@
 // The viewer's page, live and offline: messages from Python move the scene, the person moves the rest.
 
 import { Connection } from "./connection.js";
-import { ANIMATION, ELLIPSOIDS, FRAMES, GHOSTS, POINTS, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
+import { ANIMATION, ELLIPSOIDS, FRAMES, GHOSTS, OBSTACLES } from "./messages.js";
+import { POINTS, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
 import { Player } from "./player.js";
 import { Readout } from "./readout.js";
 import { Stage, THREE } from "./stage.js";
@@ -31,6 +32,7 @@ class Page {
       [POINTS]: () => this.takeOverlay(() => this.stage.setPoints(message)),
       [ELLIPSOIDS]: () => this.takeOverlay(() => this.stage.setEllipsoids(message)),
       [GHOSTS]: () => this.takeOverlay(() => this.stage.setGhosts(message)),
+      [OBSTACLES]: () => this.takeOverlay(() => this.stage.setObstacles(message)),
     };
     take[message.type]();
     this.drawn.push(message.sequence);

@@ -1,9 +1,10 @@
 // Messages from Python: the layout is described in dhkit/viewer/protocol.py.
 
 export const SCENE = 1, POSE = 2, ANIMATION = 3, TRACE = 4, FRAMES = 5;
-export const POINTS = 6, ELLIPSOIDS = 7, GHOSTS = 8;
+export const POINTS = 6, ELLIPSOIDS = 7, GHOSTS = 8, OBSTACLES = 9;
 const HEADER = 16, FLAG = 1;
 export const PER_TRANSFORM = 12;
+export const PER_SOLID = PER_TRANSFORM + 4; // half edges and a radius
 
 export function decode(buffer) {
   const view = new DataView(buffer);
@@ -55,6 +56,7 @@ const BODIES = {
     const { floats, bytes } = counted(buffer, view, (joints + 2) * PER_TRANSFORM);
     return { transforms: floats, tints: bytes };
   },
+  [OBSTACLES]: (buffer, view) => ({ solids: counted(buffer, view, PER_SOLID).floats }),
 };
 
 // So many floats for each of what a message counts, and the bytes behind them.

@@ -1,20 +1,23 @@
-// What is drawn beside the arm: a cloud of points, ellipsoids, and ghosts, which are the arm in further states.
+// What is drawn beside the arm: a cloud of points, ellipsoids, ghosts, which are the arm in further states, and obstacles.
 
-import { PER_TRANSFORM, placements } from "./messages.js";
+import { PER_SOLID, PER_TRANSFORM, placements } from "./messages.js";
+import { isFloor, solid } from "./obstacles.js";
 
 const SPRITE = 32; // px
+const NAMES = ["points", "ellipsoids", "ghosts", "obstacles"];
 const GHOST = 0.3, BALL = 0.3; // opacities
 
 export class Overlays {
   constructor(scene, THREE) {
     this.THREE = THREE;
-    this.layers = Object.fromEntries(["points", "ellipsoids", "ghosts"].map((name) => [name, new Layer(scene, THREE)]));
+    this.layers = Object.fromEntries(NAMES.map((name) => [name, new Layer(scene, THREE)]));
     this.dot = sprite(THREE);
     this.ballColor = new THREE.Color();
+    this.solidColor = new THREE.Color();
   }
 
   get empty() {
-    return Object.values(this.layers).every((layer) => layer.box.isEmpty());
+    return Object.values(this.layers).every((layer) => !layer.group.children.length);
   }
 
   // Take all that is shown into a box.
@@ -26,9 +29,11 @@ export class Overlays {
     for (const layer of Object.values(this.layers)) layer.group.visible = visible;
   }
 
-  color(color) {
-    this.ballColor.set(color);
-    this.layers.ellipsoids.group.traverse((object) => object.material?.color.set(color));
+  color(balls, solids) {
+    this.ballColor.set(balls);
+    this.solidColor.set(solids);
+    this.layers.ellipsoids.group.traverse((object) => object.material?.color.set(balls));
+    this.layers.obstacles.group.traverse((object) => object.material?.color.set(solids));
   }
 
   // size: diameter of a point; three.js takes it for a field of view of 90 degrees.
@@ -76,6 +81,19 @@ export class Overlays {
       box.union(boxAt(positions, quaternions, k));
     }
     this.layers.ghosts.fill(ghosts, box, { shared: true });
+  }
+
+  setObstacles({ solids }) {
+    const { THREE } = this;
+    const objects = [], box = new THREE.Box3();
+    for (let at = 0; at < solids.length; at += PER_SOLID) {
+      const numbers = solids.subarray(at, at + PER_SOLID);
+      const object = solid(numbers, this.solidColor, THREE);
+      // A floor has no end that could be in view.
+      if (!isFloor(numbers)) box.union(new THREE.Box3().copy(object.geometry.boundingBox).applyMatrix4(object.matrix));
+      objects.push(object);
+    }
+    this.layers.obstacles.fill(objects, box);
   }
 }
 

@@ -60,7 +60,7 @@ export class Stage {
     this.key.shadow.mapSize.set(1024, 1024);
     this.key.shadow.radius = 4;
     this.fill = new THREE.DirectionalLight(0xffffff, 0.16);
-    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.16 }));
+    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.16, depthWrite: false }));
     this.floor.receiveShadow = true;
     this.viewer.scene.add(this.sky, this.key, this.key.target, this.fill, this.floor);
   }
@@ -86,7 +86,7 @@ export class Stage {
     this.sky.groundColor.set(dark ? 0x6a7080 : 0xb4b8c4);
     this.floor.material.opacity = dark ? 0.35 : 0.13;
     for (const trace of [this.given, this.drawn]) trace.color(value("--accent"));
-    this.overlays.color(value("--accent"));
+    this.overlays.color(value("--accent"), value("--obstacle"));
     this.dirty();
   }
 
@@ -285,6 +285,11 @@ export class Stage {
   setGhosts(message) {
     const { nodes } = this;
     this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state) });
+    this.overlaid();
+  }
+
+  setObstacles(message) {
+    this.overlays.setObstacles(message);
     this.overlaid();
   }
 

@@ -1,0 +1,200 @@
+"""Every way in which there is no motion, and what is said of it."""
+
+import math
+import re
+import time
+
+import numpy as np
+import pytest
+
+import dhkit
+from dhkit.description import library_robot, pose
+from dhkit.errors import DescriptionError, PlanningError, UnreachableError
+from dhkit.planning import MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
+from dhkit.trajectories import Limits, Trajectory
+from planning_reference import bare, slide
+
+PUMA = library_robot("puma560")
+START = np.array([0.0, 0.8, -1.0, 0.0, 0.5, 0.0])
+GOAL = np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
+
+
+@pytest.fixture(scope="module")
+def planner():
+    return Planner(PUMA, intervals=16)
+
+
+def refused(message, call, kind=PlanningError):
+    with pytest.raises(kind) as raised:
+        call()
+    assert re.search(message, str(raised.value)), str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_start_or_goal_outside_the_limits(planner):
+    outside = GOAL + [3.0, 0, 0, 0, 0, 0]
+    refused(
+        r"^goal: joint waist is at 4.2 rad, above its upper limit, 2.79253 rad$", lambda: planner.solve(START, outside)
+    )
+    low = START - [0, 2.0, 0, 0, 0, 0]
+    refused(
+        r"^start: joint shoulder is at -1.2 rad, below its lower limit, -0.785398 rad$",
+        lambda: planner.solve(low, GOAL),
+    )
+    refused(r"^via 1: joint waist", lambda: planner.solve(START, GOAL, via=[outside]))
+
+
+def test_a_speed_beyond_its_limit(planner):
+    fast = [0, 0, 5.0, 0, 0, 0]
+    refused(
+        r"^goal: joint elbow moves with 5 rad/s, above its limit, 2.1293 rad/s$",
+        lambda: planner.solve(START, GOAL, goal_velocity=fast),
+    )
+
+
+def test_too_weak_to_hold_the_arm(planner):
+    refused(
+        r"^start: joint shoulder cannot hold the arm there: it takes 186.7 N m, its limit is 186.4 N m$",
+        lambda: planner.solve(START, GOAL, payload=Payload(40.0)),
+    )
+
+
+def test_a_pose_out_of_reach(planner):
+    T = pose((3.0, 0, 0))
+    refused(
+        r"^goal: no joint values have the tool in the pose: \(3, 0, 0\) m is out of reach$",
+        lambda: planner.solve(START, T),
+    )
+    with pytest.raises(UnreachableError):
+        planner.solve(START, T)
+
+
+def test_a_pose_that_is_reached_outside_the_limits_alone():
+    limits = Limits.of(PUMA, lower=START - 0.01, upper=START + 0.01)
+    T = dhkit.Arm(PUMA).fk(GOAL)
+    refused(
+        r"^goal: \d solutions of the pose at \(.*\) m, all outside the joint limits: at best joint \w+ by [\d.]+ rad$",
+        lambda: Planner(PUMA, limits=limits).solve(START, T),
+    )
+
+
+def test_what_is_no_pose_or_configuration(planner):
+    T = np.eye(4)
+    T[0, 0] = 2.0
+    refused(r"^goal: ", lambda: planner.solve(START, T))
+    refused(r"^goal: puma560 has no configuration 'redy'; it has .*ready", lambda: planner.solve(START, "redy"))
+    refused(r"goal has shape \(5,\); expected", lambda: planner.solve(START, GOAL[:5]), ValueError)
+    refused(r"goal has values that are not finite", lambda: planner.solve(START, np.full(6, np.nan)), ValueError)
+    refused(r"start is a pose", lambda: planner.solve(np.eye(4), GOAL), ValueError)
+
+
+def test_nowhere_to_go(planner):
+    refused("^start and goal are the same configuration$", lambda: planner.solve(START, START))
+
+
+def test_an_obstacle_around_start_or_goal(planner):
+    tool = dhkit.Arm(PUMA).fk(GOAL)[:3, 3]
+    around = [Obstacle.sphere(0.05, tool, name="ball")]
+    refused(
+        r"^goal: link \d is [\d.]+ mm inside ball, 10 mm are asked for$",
+        lambda: planner.solve(START, GOAL, obstacles=around),
+    )
+    beside = [Obstacle.sphere(0.05, dhkit.Arm(PUMA).fk(START)[:3, 3], name="ball")]
+    refused(r"^start: link \d is .* ball", lambda: planner.solve(START, GOAL, obstacles=beside))
+
+
+def test_no_way_around_an_obstacle():
+    """A slide cannot pass what lies on it: whatever is tried, it is said within the time limit."""
+    arm = dhkit.Arm.load("polar_rp").description
+    q0, q1 = np.array([-0.5, 0.6]), np.array([0.5, 0.6])
+    frames = dhkit.Arm(arm).fk(np.array([0.0, 0.6]))[:3, 3]
+    wall = [Obstacle.capsule(0.05, frames * 0.05, frames * 3, name="wall")]
+    began = time.perf_counter()
+    refused(
+        r"^no motion found that keeps 10 mm clear of wall",
+        lambda: Planner(arm, intervals=24).solve(q0, q1, obstacles=wall, time_limit=5.0),
+    )
+    assert time.perf_counter() - began < 15
+
+
+def test_not_converged(planner):
+    """Too little time for what the torques give, though not for the speeds."""
+    refused(
+        r"^not converged \(.*, \d+ iterations\): [\w ]+ misses its bound by [\d.e+-]+ at \d+ % of the way$",
+        lambda: Planner(PUMA, "effort", intervals=8).solve(START, GOAL, duration=0.842, time_limit=60),
+    )
+
+
+def test_a_duration_below_what_speeds_allow():
+    refused(
+        r"^a duration of 0.5 s is too short: the speed limits alone ask for 0.838475 s$",
+        lambda: Planner(PUMA, "effort").solve(START, GOAL, duration=0.5),
+    )
+
+
+def test_the_time_limit(planner):
+    refused("^no motion found within the time limit, in 1 start$", lambda: planner.solve(START, GOAL, time_limit=1e-4))
+
+
+def test_a_constraint_that_an_end_breaks():
+    flat = Planner(PUMA, constraints=[ToolDirection(tolerance=0.05)])
+    refused(
+        r"^goal: its tool direction is not allowed: [\d.]+ deg off, 2.865 deg are$", lambda: flat.solve(START, GOAL)
+    )
+    kept = Planner(PUMA, constraints=[ToolOrientation()])
+    refused(r"^goal: its tool orientation is not allowed", lambda: kept.solve(START, GOAL))
+
+
+def test_a_joint_without_limits():
+    arm = slide()
+    refused(
+        r"^joint joint1 has neither a torque, nor an acceleration, nor a jerk limit: in least time it would jump; ",
+        lambda: Planner(arm).solve([0], [1]),
+    )
+
+
+def test_an_arm_without_bodies():
+    arm = bare()
+    motion = Planner(arm, limits=Limits.of(arm, velocity=1.0, acceleration=2.0), intervals=24).solve([0, 0], [1, -0.5])
+    assert motion.duration == pytest.approx(1 / 1.0 + 1.0 / 2.0, rel=5e-3)
+    refused("body", lambda: Planner(arm, "effort").solve([0, 0], [1, 1], duration=1.0), DescriptionError)
+
+
+def test_other_robots_motions(planner):
+    other = Trajectory.from_samples(library_robot("planar2r"), [0, 1], [[0, 0], [1, 1]])
+    refused("planar2r", lambda: planner.solve(START, GOAL, warm=other), DescriptionError)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "message"),
+    [
+        (lambda: Planner(PUMA, "tome"), ValueError, "objective is 'tome'; expected one of time, effort, energy, jerk"),
+        (lambda: Planner(PUMA, 3), TypeError, "objective is 3"),
+        (lambda: Planner(PUMA, intervals=3), ValueError, "intervals is 3; expected a whole number from 6 to 2000"),
+        (lambda: Planner(PUMA, constraints=["slow"]), TypeError, "constraints has 'slow'"),
+        (lambda: Planner(PUMA, limits=3), TypeError, "limits is 3"),
+        (lambda: Planner(PUMA, limits=Limits.of(slide())), ValueError, "limits are of 1 joints; puma560 has 6"),
+        (lambda: ToolSpeed(-1), ValueError, "ToolSpeed: -1; expected positive numbers"),
+        (lambda: MotorPower((1, math.nan)), ValueError, "MotorPower"),
+        (lambda: ToolDirection(axis=(0, 0, 0)), ValueError, "ToolDirection"),
+        (lambda: ToolOrientation(4.0), ValueError, "tolerance is 4.0"),
+        (lambda: dhkit.Time(-1), ValueError, "Time: weight is -1"),
+        (lambda: dhkit.Energy(motor_constants=(0.0,)), ValueError, "Energy: motor constants"),
+    ],
+)
+def test_what_is_no_planner(make, kind, message):
+    refused(re.escape(message), make, kind)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"duration": -1.0}, "duration is -1.0"),
+        ({"time_limit": 0}, "time_limit is 0"),
+        ({"clearance": -0.1}, "clearance is -0.1"),
+        ({"start_velocity": [0, 0]}, "start_velocity"),
+        ({"goal_velocity": [math.inf] * 6}, "goal_velocity"),
+    ],
+)
+def test_what_is_no_wish(planner, options, message):
+    refused(re.escape(message), lambda: planner.solve(START, GOAL, **options), ValueError)

@@ -1,0 +1,85 @@
+"""Optima that are known, through the same planner as any arm."""
+
+import numpy as np
+import pytest
+
+from dhkit.planning import Effort, Planner, Time
+from dhkit.trajectories import Limits
+from planning_reference import luus, pendulum, slide
+
+ODD = 161
+"""Intervals whose knots are nowhere near the switches."""
+
+
+def relative(seen, known):
+    return abs(seen / known - 1)
+
+
+@pytest.mark.parametrize("intervals", [None, ODD])
+@pytest.mark.parametrize("distance", [0.7, -0.03, 11.0])
+def test_double_integrator(law, intervals, distance):
+    motion = Planner(slide(), limits=Limits.of(slide(), torque=2.0), intervals=intervals).solve([0], [distance])
+    law.holds("bang-bang: 2 sqrt(d / a)", relative(motion.duration, 2 * np.sqrt(abs(distance) / 2.0)), 1e-4)
+
+
+@pytest.mark.parametrize("limited", ["torque", "acceleration"])
+def test_double_integrator_with_a_speed_limit(law, limited):
+    arm = slide()
+    limits = Limits.of(arm, velocity=0.5, **{limited: 2.0})
+    motion = Planner(arm, limits=limits).solve([0], [0.7])
+    law.holds("bang, cruise, bang: d / v + v / a", relative(motion.duration, 0.7 / 0.5 + 0.5 / 2.0), 1e-4)
+
+
+def test_triple_integrator(law):
+    motion = Planner(slide(), limits=Limits.of(slide(), jerk=3.0)).solve([0], [0.7])
+    law.holds("limited jerk: (32 d / J)^(1/3)", relative(motion.duration, (32 * 0.7 / 3.0) ** (1 / 3)), 1e-4)
+    assert np.abs(motion.qdd([0.0, motion.duration])).max() < 1e-9
+
+
+def test_minimum_effort(law):
+    motion = Planner(slide(), "effort").solve([0], [0.7], duration=1.3)
+    law.holds("effort: 12 d^2 / T^3", relative(motion.report.cost, 12 * 0.7**2 / 1.3**3), 1e-6)
+    t = np.linspace(0, 1.3, 50)
+    assert np.allclose(
+        motion.qdd(t)[:, 0], 6 * 0.7 / 1.3**2 * (1 - 2 * t / 1.3), atol=1e-4
+    )  # a cost is flat at its least
+
+
+def test_minimum_jerk(law):
+    motion = Planner(slide(), "jerk").solve([0], [0.7], duration=1.3)
+    law.holds("jerk: 720 d^2 / T^5", relative(motion.report.cost, 720 * 0.7**2 / 1.3**5), 1e-6)
+    x = np.linspace(0, 1, 50)
+    assert np.allclose(motion.q(1.3 * x)[:, 0], 0.7 * (10 * x**3 - 15 * x**4 + 6 * x**5), atol=1e-6)
+
+
+@pytest.mark.parametrize("most", [1 / 9, 0.1, 1 / 16])
+def test_bryson_denham(law, most):
+    """Least integral of u^2 / 2 from 0 back to 0 in 1 s, from speed 1 to -1, below a wall (Bryson & Ho 1975, 3.11)."""
+    arm = slide()
+    planner = Planner(arm, "effort", limits=Limits.of(arm, lower=-1.0, upper=most))
+    motion = planner.solve([0], [0], duration=1.0, start_velocity=[1.0], goal_velocity=[-1.0])
+    law.holds("Bryson and Denham: 4 / (9 l)", relative(motion.report.cost / 2, 4 / (9 * most)), 1e-4)
+    law.holds("height above the wall", motion.q(np.linspace(0, 1, 10_001)).max() - most, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("most", "known"), [(1.0, 4.030018688), (1.5, 3.027339520), (2.0, 2.566590758), (5.0, 1.590961069)]
+)
+def test_pendulum(law, most, known):
+    arm = pendulum()
+    motion = Planner(arm, limits=Limits.of(arm, torque=most)).solve([0.0], [np.pi])
+    law.holds("pendulum x'' = u - sin x from 0 to pi", relative(motion.duration, known), 2e-4)
+
+
+def test_luus(law):
+    """Luus 2000, Iterative Dynamic Programming; the way there is by a bent elbow that the straight path has not."""
+    arm = luus()
+    motion = Planner(arm, limits=Limits.of(arm, torque=1.0)).solve([0.0, 0.5], [0.522, 0.5])
+    law.holds("two-link arm of Luus: 2.9823", abs(motion.duration - 2.9823), 5e-4)
+
+
+def test_time_and_effort_together():
+    """With T free, T + w 12 d^2 / T^3 is least at T = (36 w d^2)^(1/4)."""
+    w, d = 0.2, 0.7
+    motion = Planner(slide(), Time() + w * Effort()).solve([0], [d])
+    assert relative(motion.duration, (36 * w * d**2) ** 0.25) < 1e-3
