@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typer.core import TyperCommand
@@ -14,10 +15,16 @@ from dhkit.description import Array, check_pose, pose
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 
-__all__ = ["gathering", "joint_values", "numbers", "target"]
+if TYPE_CHECKING:
+    from dhkit.planning import Floor, Objective, Obstacle, Payload
+    from dhkit.trajectories import Limits
+
+__all__ = ["gathering", "joint_limits", "joint_values", "numbers", "objective", "obstacles", "payload", "target"]
 
 LARGEST = 10_000
 """Bytes of a file with a matrix at most."""
+PLUS = re.compile(r"(?<![\d.][eE])\+")
+"""Between two terms, not in 1e+4."""
 
 
 def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
@@ -82,23 +89,135 @@ def target(
     return placed
 
 
+def objective(text: str) -> Objective:
+    """Return an objective: words such as time and effort, with a factor before each that wants one, joined by +.
+
+    Raises
+    ------
+    DescriptionError
+        Another word, or a factor that is no positive number.
+
+    Examples
+    --------
+    >>> str(objective("time + 1e-4 effort"))
+    '1 time + 0.0001 effort'
+    """
+    from dhkit.planning.objectives import NAMED, Objective
+
+    terms = []
+    for term in PLUS.split(text):
+        words = term.replace("*", " ").split()
+        if not words or words[-1] not in NAMED:
+            raise DescriptionError(f"--objective: found {term.strip()!r}; expected {', '.join(NAMED)}, or a sum of them")
+        factor = float(numbers(words[:-1], "--objective", [1])[0]) if words[1:] else 1.0
+        if factor <= 0:
+            raise DescriptionError(f"--objective: found {term.strip()!r}; expected a positive factor")
+        terms.append(factor * NAMED[words[-1]])
+    return Objective(tuple(terms))
+
+
+def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed: float) -> Limits:
+    """Return an arm's limits, some of them in place of its own.
+
+    Parameters
+    ----------
+    given
+        Numbers by ``velocity``, ``acceleration``, ``jerk`` and ``torque``: one for all joints, or one for each.
+    degrees
+        Whether angles are in degrees.
+    speed
+        Share of the velocities that may be used.
+
+    Raises
+    ------
+    DescriptionError
+        Another count, or no expressions.
+    ValueError
+        A limit that is not positive.
+    """
+    from dhkit.trajectories import Limits
+
+    limits = {}
+    for name, text in given.items():
+        if text is None:
+            continue
+        values = np.broadcast_to(numbers([text], f"--{name}", sorted({1, arm.n})), arm.n)
+        turns = degrees and name != "torque"
+        limits[name] = np.where(arm.description.numbers.prismatic | (not turns), values, np.radians(values))
+    return Limits.of(arm.description, **limits).scaled(velocity=speed)
+
+
+def payload(text: str | None) -> Payload | None:
+    """Return a load: its mass, kg, and after an @ its centre of mass in the tool's frame, m.
+
+    Raises
+    ------
+    DescriptionError
+        Other numbers, or no expressions.
+    """
+    from dhkit.planning import Payload
+
+    if text is None:
+        return None
+    mass, _, com = text.partition("@")
+    x, y, z = numbers([com], "--payload", [3]) if com else (0.0, 0.0, 0.0)
+    return Payload(float(numbers([mass], "--payload", [1])[0]), (float(x), float(y), float(z)))
+
+
+def obstacles(boxes: Sequence[str], spheres: Sequence[str], floor: str | None) -> list[Obstacle | Floor]:
+    """Return what is in the way: boxes "SX SY SZ @ X Y Z", balls "R @ X Y Z" and the height of a floor, m.
+
+    Raises
+    ------
+    DescriptionError
+        Other numbers, or no expressions.
+    ValueError
+        Sizes that are not positive.
+    """
+    from dhkit.planning import Floor, Obstacle
+
+    scene: list[Obstacle | Floor] = []
+    for k, text in enumerate(boxes):
+        size, centre = _placed(text, "--box", 3, "SX SY SZ @ X Y Z")
+        scene.append(Obstacle.box(size, centre, _numbered("box", k, boxes)))
+    for k, text in enumerate(spheres):
+        radius, centre = _placed(text, "--sphere", 1, "R @ X Y Z")
+        scene.append(Obstacle.sphere(float(radius[0]), centre, _numbered("sphere", k, spheres)))
+    if floor is not None:
+        scene.append(Floor(float(numbers([floor], "--floor", [1])[0])))
+    return scene
+
+
+def _placed(text: str, what: str, count: int, expected: str) -> tuple[Array, Array]:
+    sizes, at, position = text.partition("@")
+    if not at or len(_split([sizes])) != count or len(_split([position])) != 3:
+        raise DescriptionError(f'{what}: found {text!r}; expected "{expected}", m')
+    return numbers([sizes], what, [count]), numbers([position], what, [3])
+
+
+def _numbered(name: str, k: int, among: Sequence[str]) -> str:
+    return name if len(among) == 1 else f"{name} {k + 1}"
+
+
 def gathering(counts: Mapping[str, int | None]) -> type[TyperCommand]:
     """Return a kind of command whose options take several words, negative numbers too.
 
     Parameters
     ----------
     counts
-        How many values each option takes; None: all words up to the next that begins with two dashes.
+        How many values each option takes; None: all words up to the next option.
     """
 
     class Gathering(TyperCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            return super().parse_args(ctx, _gathered(args, counts))
+            # A short option ends the words too; other words behind one dash are negative numbers.
+            short = {name for option in self.params for name in option.opts if not name.startswith("--")}
+            return super().parse_args(ctx, _gathered(args, counts, short))
 
     return Gathering
 
 
-def _gathered(args: Sequence[str], counts: Mapping[str, int | None]) -> list[str]:
+def _gathered(args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]) -> list[str]:
     """Return arguments with the words after each of some options made into one."""
     gathered, rest = [], list(args)
     while rest:
@@ -108,12 +227,16 @@ def _gathered(args: Sequence[str], counts: Mapping[str, int | None]) -> list[str
             continue
         values: list[str] = []
         count = counts[word]
-        while rest and not rest[0].startswith("--") and (count is None or len(_split(values)) < count):
+        while rest and not _is_option(rest[0], short) and (count is None or len(_split(values)) < count):
             values.append(rest.pop(0))
         if not values:
             raise DescriptionError(f"{word}: no values; expected {'some' if count is None else count} after it")
         gathered.append(" ".join(values))
     return gathered
+
+
+def _is_option(word: str, short: Collection[str]) -> bool:
+    return word.startswith("--") or word in short
 
 
 def _split(words: Sequence[str]) -> list[str]:

@@ -17,7 +17,7 @@ from dhkit.cli import info as info_command
 from dhkit.cli import inverse as inverse_command
 from dhkit.cli import verify as verify_command
 from dhkit.cli import workspace as workspace_command
-from dhkit.cli.arguments import gathering, joint_values, target
+from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError, DhkitError
 
@@ -154,6 +154,102 @@ def ik(
         numeric=numeric,
         json=json,
     )
+
+
+PLAN_WORDS: dict[str, int | None] = {
+    **dict.fromkeys(("--from", "--to", "--via", "--matrix", "--like", "--objective", "--payload", "--box", "--sphere")),
+    **dict.fromkeys(("--velocity", "--acceleration", "--jerk", "--torque")),
+    **{"--xyz": 3, "--euler": 3, "--floor": 1},
+}
+
+
+@app.command(cls=gathering(PLAN_WORDS))
+def plan(
+    robot: Robot,
+    start: Annotated[
+        str, typer.Option("--from", metavar="Q ...", help="Joint values, or the name of a configuration.")
+    ] = "ready",
+    to: Annotated[str | None, typer.Option(metavar="Q ...", help="The same at the goal.")] = None,
+    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Or the tool's position there, m.")] = None,
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
+    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    matrix: Annotated[
+        str | None, typer.Option(metavar="M11 ... M44", help="Or the pose by row, 16 or 12 numbers; or a file of them.")
+    ] = None,
+    like: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Or where these joint values put the tool, by any branch.")
+    ] = None,
+    via: Annotated[
+        list[str] | None, typer.Option(metavar="Q ...", help="Pass here on the way; may be given again.")
+    ] = None,
+    wanted: Annotated[
+        str, typer.Option("--objective", help='time, effort, energy, jerk, or a sum: "time + 1e-4 effort".')
+    ] = "time",
+    duration: Annotated[float | None, typer.Option(help="s; for objectives without time.")] = None,
+    speed: Annotated[float, typer.Option(min=0.001, max=1, help="Share of the joints' speeds that may be used.")] = 1.0,
+    velocity: Annotated[
+        str | None, typer.Option(metavar="V ...", help="Limit in place of the robot's, for all joints or each; rad/s.")
+    ] = None,
+    acceleration: Annotated[str | None, typer.Option(metavar="A ...", help="Likewise; rad/s^2.")] = None,
+    jerk: Annotated[str | None, typer.Option(metavar="J ...", help="Likewise; rad/s^3.")] = None,
+    torque: Annotated[str | None, typer.Option(metavar="T ...", help="Likewise; N m.")] = None,
+    load: Annotated[
+        str | None,
+        typer.Option("--payload", metavar="KG [@ X Y Z]", help="Load, its centre of mass in the tool's frame, m."),
+    ] = None,
+    tool_speed: Annotated[float | None, typer.Option(help="Limit of the tool's speed, m/s.")] = None,
+    box: Annotated[
+        list[str] | None, typer.Option(metavar="SX SY SZ @ X Y Z", help="Keep away from it; edges and centre, m.")
+    ] = None,
+    sphere: Annotated[
+        list[str] | None, typer.Option(metavar="R @ X Y Z", help="Keep away from it; radius and centre, m.")
+    ] = None,
+    floor: Annotated[str | None, typer.Option(metavar="Z", help="Stay above this height, m.")] = None,
+    clearance: Annotated[float, typer.Option(min=0, help="How far to keep away, m.")] = 0.01,
+    self_collision: Annotated[bool, typer.Option("--self-collision", help="Keep links from each other too.")] = False,
+    line: Annotated[bool, typer.Option("--line", help="The tool goes straight.")] = False,
+    intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Of the mesh.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0.01, help="To search, s.")] = 30.0,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    json: Json = False,
+) -> int:
+    """Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.
+
+    Sliding joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.
+    """
+    from dhkit.cli import plan as plan_command
+
+    arm = Arm.load(robot)
+    pose = {"xyz": xyz, "matrix": matrix, "like": like}
+    if sum(given is not None for given in (to, *pose.values())) != 1:
+        raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
+    task = plan_command.Task(
+        arm=arm,
+        start=joint_values(arm, [start], degrees, "values of --from"),
+        goal=target(arm, **pose, euler=euler, order=order, degrees=degrees)
+        if to is None
+        else joint_values(arm, [to], degrees, "values of --to"),
+        via=[joint_values(arm, [place], degrees, "values of --via") for place in via or ()],
+        objective=objective(wanted),
+        duration=duration,
+        limits=joint_limits(
+            arm, {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "torque": torque}, degrees, speed
+        ),
+        payload=payload(load),
+        tool_speed=tool_speed,
+        obstacles=obstacles(box or (), sphere or (), floor),
+        clearance=clearance,
+        self_collision=self_collision,
+        intervals=intervals,
+        time_limit=time_limit,
+    )
+    files = plan_command.Files(output, html, figure)
+    return plan_command.run(task, files, line=line, degrees=degrees, json=json)
 
 
 @app.command()

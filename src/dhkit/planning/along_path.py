@@ -42,8 +42,10 @@ MOST_RESERVED = 0.95
 """Share of a limit that margins take at most."""
 ROUNDS = 5
 """How often limits are tightened at most."""
+LAST_STEP, TRIES = 1.0, 5
+"""What a slow-down may cost after the last round, and how many it may take to find it."""
 SLACK = 2e-7
-"""What a slow-down adds, for what lies between the certificate's states."""
+"""By what share of a limit a motion may exceed it, and what a slow-down adds."""
 POINTS = 8
 """States an interval by which a motion is certified: intervals are many."""
 CORNER = 1e-6
@@ -127,9 +129,10 @@ def along_path(
     task = _Task.of(description, path, wanted, duration, limits, tuple(constraints), intervals)
     _require_kept(task)
     building = time.perf_counter()
-    programs = [timing_program(each.intervals, each.linear_rows, each.terms) for each in task.steps]
+    for step in task.steps:
+        _ = step.program
     built = time.perf_counter() - building
-    found, *before = _solved(task, programs, began + time_limit, progress)
+    found, *before = _solved(task, began + time_limit, progress)
     cost = cost_of(wanted, found.trajectory, description)
     report = PlanReport(
         objective=str(wanted),
@@ -137,7 +140,7 @@ def along_path(
         duration=found.trajectory.duration,
         certificate=found.certificate,
         joints=tuple(joint.name for joint in description.joints),
-        intervals=task.intervals,
+        intervals=len(found.knots) - 1,
         iterations=found.iterations + sum(each.iterations for each in before),
         solves=found.solves + sum(each.solves for each in before),
         build_seconds=built,
@@ -158,6 +161,8 @@ class _Task:
     duration: float | None
     limits: Limits
     checker: Checker
+    needs: dict[str, bool]
+    """What is asked of :class:`PathStates`."""
     states: PathStates
     rows: list[TimingRows]
     terms: Terms | None
@@ -180,17 +185,18 @@ class _Task:
         needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
         torque = any((*needed, *np.isfinite(limits.torque)))
         tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
+        needs = {"torque": torque, "tool": tool}
         rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
-        states = PathStates.of(description, path, rough, torque=torque, tool=tool)
+        states = PathStates.of(description, path, rough, **needs)
         knots = _knots(path, intervals, rough, _even_speeds(states, limits, constraints))
-        states = PathStates.of(description, path, knots, torque=torque, tool=tool)
+        states = PathStates.of(description, path, knots, **needs)
         rows = _rows(states, limits)
         T_start = world_to_tool(description, path.q(0.0)) if constraints else np.eye(4)
         parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
         others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
         checker = Checker(description, limits, constraints, parameters)
         terms, quickest = (Terms.of(description, wanted, others, limits) for wanted in (objective, QUICKEST))
-        return cls(description, path, objective, duration, limits, checker, states, rows, terms, quickest)
+        return cls(description, path, objective, duration, limits, checker, needs, states, rows, terms, quickest)
 
     @property
     def intervals(self) -> int:
@@ -218,9 +224,16 @@ class _Task:
         return speed_bounds(self.states, self.limits, self.shares(reserved, "velocity", self.description.n), tools)
 
     @property
-    def linear_rows(self) -> int:
-        """How many there are at each end of an interval."""
-        return sum(int(row.limited.sum()) for row in self.rows)
+    def program(self) -> TimingProgram:
+        """The program that it asks for; made once."""
+        return timing_program(self.intervals, sum(int(row.limited.sum()) for row in self.rows), self.terms)
+
+    def halved(self, which: Array) -> _Task:
+        """Return the task on a grid some of whose intervals (K,) are halved."""
+        middles = (self.knots[1:] + self.knots[:-1])[which] / 2
+        knots = np.sort(np.concatenate([self.knots, middles]))
+        states = PathStates.of(self.description, self.path, knots, **self.needs)
+        return replace(self, states=states, rows=_rows(states, self.limits))
 
     @property
     def steps(self) -> list[_Task]:
@@ -278,8 +291,10 @@ class _Found:
     """A certified motion, and what it took."""
 
     trajectory: Trajectory
+    knots: Array
+    """Shape (K+1,)."""
     b: Array
-    """At the knots, shape (K+1,), 1/s^2."""
+    """At the knots, 1/s^2."""
     certificate: Certificate
     slow_down: float
     tightened: tuple[str, ...]
@@ -287,11 +302,11 @@ class _Found:
     solves: int
 
 
-def _solved(task: _Task, programs: list[TimingProgram], deadline: float, progress: ProgressCall | None) -> list[_Found]:
+def _solved(task: _Task, deadline: float, progress: ProgressCall | None) -> list[_Found]:
     """Return what each step of a task has found, the last one first."""
     found: list[_Found] = []
-    for step, program in zip(task.steps, programs, strict=True):
-        found.insert(0, _certified(step, program, found[0] if found else None, deadline, progress))
+    for step in task.steps:
+        found.insert(0, _certified(step, found[0] if found else None, deadline, progress))
         quickest = found[-1].trajectory.duration
         if task.duration is not None and quickest > task.duration * (1 + SLACK):
             raise PlanningError(
@@ -300,65 +315,121 @@ def _solved(task: _Task, programs: list[TimingProgram], deadline: float, progres
     return found
 
 
-def _certified(
-    task: _Task, program: TimingProgram, quickest: _Found | None, deadline: float, progress: ProgressCall | None
-) -> _Found:
-    iterations = 0
+def _certified(task: _Task, quickest: _Found | None, deadline: float, progress: ProgressCall | None) -> _Found:
+    """Return a certified motion: where limits are missed between the grid's knots, it is refined or tightened."""
     if quickest is None:
         unit = task.usual_duration()
-        shape = np.pi**2 * task.knots * (1 - task.knots)
+        b = (np.pi / unit) ** 2 * task.knots * (1 - task.knots)
     else:
         unit = task.duration or LONGER * quickest.trajectory.duration
-        shape = quickest.b * quickest.trajectory.duration**2
-    x = program.numbers(1.0, shape[1:-1])
-    guess, _ = task.motion(program.squares(x) / unit**2)
-    scale = 1.0 if task.terms is None else 1 / cost_of(task.objective, guess, task.description)
-    parameters = program.parameters(task.states, task.rows, unit, scale)
+        b = np.interp(task.knots, quickest.knots, quickest.b) * (quickest.trajectory.duration / unit) ** 2
+    cost = 1.0 if task.terms is None else cost_of(task.objective, task.motion(b)[0], task.description)
     reserved: dict[str, Array] = {}
+    tightened: list[str] = []
+    iterations = 0
 
     def told(now: Progress) -> object:
         return progress and progress(replace(now, iteration=iterations + now.iteration, duration=now.duration * unit))
 
     for solves in range(1, ROUNDS + 1):
-        durations = (0.0, np.inf) if task.duration is None else (1.0, 1.0)
-        low, high = (program.numbers(*pair) for pair in zip(durations, task.b_bounds(reserved, unit), strict=True))
-        rows = task.g_bounds(reserved)
-        try:
-            solution = program.solver(x, parameters, (low, high), rows, deadline, None if progress is None else told)
-        except Stopped:
-            raise PlanningError("no motion along the path was found within the time limit") from None
+        solution = _solution(task, reserved, b, unit, cost, deadline, None if progress is None else told)
         iterations += solution.iterations
-        if not solution.converged or solution.infeasibility > FEASIBLE:
-            raise _not_converged(task, solution, rows)
-        x = solution.x
-        b = program.squares(x) / unit**2
+        b = task.program.squares(solution.x) / unit**2
         trajectory, ends = task.motion(b)
+        made = _made_good(task, trajectory, LAST_STEP if solves == ROUNDS else SMALL_STEP)
+        if made is not None:
+            slower, certificate, c = made
+            return _Found(slower, task.knots, b / c**2, certificate, c, tuple(tightened), iterations, solves)
         states = task.checker.states(trajectory, POINTS)
-        c = task.checker.slow_down(states) if task.duration is None else 1.0
-        if 1 < c < 1 + SMALL_STEP or (solves == ROUNDS and 1 < c < np.inf):
-            c *= 1 + SLACK
-            trajectory = trajectory.slowed(c)
-            states = task.checker.states(trajectory, POINTS)
-        certificate = task.checker.check(trajectory, states)
-        if certificate.ok:
-            return _Found(trajectory, b / c**2, certificate, c, tuple(reserved), iterations, solves)
-        reserved = _wider(task, reserved, states, trajectory.breaks, ends)
-    worst = certificate.worst
+        excess = _excess(task, states, trajectory.breaks, ends)
+        tightened += [what for what, share in excess.items() if (share > 0).any() and what not in tightened]
+        knots = task.knots
+        task, reserved = _wider(task, reserved, excess)
+        b = np.interp(task.knots, knots, b)
+    worst = task.checker.check(trajectory, states).worst
     raise PlanningError(f"{worst.what} stays exceeded by {100 * worst.excess:.2g} % at {worst.time:.4g} s")
 
 
-def _wider(task: _Task, reserved: dict[str, Array], states: States, breaks: Array, ends: Array) -> dict[str, Array]:
-    """Return what is kept in reserve after a motion has exceeded its limits, interval by interval."""
+def _solution(
+    task: _Task,
+    reserved: dict[str, Array],
+    b: Array,
+    unit: float,
+    cost: float,
+    deadline: float,
+    progress: ProgressCall | None,
+) -> Solution:
+    """Solve a task's program from b at its knots, in units of a time and a cost."""
+    program = task.program
+    parameters = program.parameters(task.states, task.rows, unit, 1 / cost)
+    durations = (0.0, np.inf) if task.duration is None else (1.0, 1.0)
+    low, high = (program.numbers(*pair) for pair in zip(durations, task.b_bounds(reserved, unit), strict=True))
+    rows = task.g_bounds(reserved)
+    start = program.numbers(1.0, b[1:-1] * unit**2)
+    try:
+        solution = program.solver(start, parameters, (low, high), rows, deadline, progress)
+    except Stopped:
+        raise PlanningError("no motion along the path was found within the time limit") from None
+    if not solution.converged or solution.infeasibility > FEASIBLE:
+        raise _not_converged(task, solution, rows)
+    return solution
+
+
+def _made_good(task: _Task, trajectory: Trajectory, most: float) -> tuple[Trajectory, Certificate, float] | None:
+    """Return a motion slowed down until it keeps its limits, its certificate and by what; None beyond ``most``."""
+    c = 1.0
+    for _ in range(TRIES):
+        slower = trajectory if c == 1.0 else trajectory.slowed(c)
+        states = task.checker.states(slower, POINTS)
+        over = max((float(peak.max()) for _, peak in _peaks(task, states)), default=0.0)
+        if over <= SLACK:
+            certificate = task.checker.check(slower, states)
+            return (slower, certificate, c) if certificate.ok else None
+        if task.duration is not None:
+            return None
+        step = task.checker.slow_down(states)
+        c *= step * (1 + SLACK) if step > 1 else 1 + 2 * over
+        if not c <= 1 + most:
+            return None
+    return None
+
+
+def _peaks(task: _Task, states: States) -> list[tuple[str, Array]]:
+    """Return each kind of limit with by what share it is exceeded, shape (intervals, POINTS, rows).
+
+    Between two states a use is as high as a parabola through them and the next one can be.
+    """
+    found = []
+    for what, use in task.checker.measured(states):
+        values = use.reshape(-1, POINTS, use.shape[1])
+        bend = np.abs(np.diff(values, 2, axis=1))
+        found.append((what, values + np.pad(bend, ((0, 0), (1, 1), (0, 0)), mode="edge") / 8 - 1))
+    return found
+
+
+def _excess(task: _Task, states: States, breaks: Array, ends: Array) -> dict[str, Array]:
+    """Return by what share each kind of limit is exceeded in each interval of the grid, shape (K, rows)."""
     # Breaks of the path lie between those of the grid.
     interval = np.clip(np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1, 0, task.intervals - 1)
-    wider = dict(reserved)
-    for what, use in task.checker.measured(states):
-        excess = (use - 1).reshape(len(interval), -1, use.shape[1]).max(axis=1)
-        if (excess > 0).any():
-            worst = np.zeros((task.intervals, use.shape[1]))
-            np.maximum.at(worst, interval, excess)
-            wider[what] = np.minimum(task.shares(reserved, what, use.shape[1]) + WIDER * worst, MOST_RESERVED)
-    return wider
+    found = {}
+    for what, peaks in _peaks(task, states):
+        found[what] = np.zeros((task.intervals, peaks.shape[2]))
+        np.maximum.at(found[what], interval, peaks.max(axis=1))
+    return found
+
+
+def _wider(task: _Task, reserved: dict[str, Array], excess: dict[str, Array]) -> tuple[_Task, dict[str, Array]]:
+    """Return a task with intervals halved where limits are exceeded much, and what to keep in reserve elsewhere."""
+    much = np.any([(share > SMALL_STEP).any(axis=1) for share in excess.values()], axis=0)
+    if task.intervals + much.sum() > 2 * MOST:
+        much[:] = False
+    copies, wider = 1 + much, {}
+    for what, share in excess.items():
+        # What is missed inside an interval falls with its length squared.
+        more = WIDER * share / np.where(much, 4, 1)[:, None]
+        total = np.minimum(task.shares(reserved, what, share.shape[1]) + more, MOST_RESERVED)
+        wider[what] = np.repeat(total, copies, axis=0)
+    return task.halved(much) if much.any() else task, wider
 
 
 def _not_converged(task: _Task, solution: Solution, bounds: tuple[Array, Array]) -> PlanningError:

@@ -47,7 +47,7 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 """Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
 USUAL = 48
 """Intervals of arms of six joints; of fewer joints more, as they cost less."""
-NUMBERS = 288
+NUMBERS = 384
 """Joints times intervals: what arms of few joints get."""
 LEISURELY = 2.0
 """Where a duration is needed and none is given: times that of the fastest cubics."""
