@@ -15,6 +15,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
+from dhkit.cli.quickest import race, there_and_back
 from dhkit.cli.straight import Branches, Line, branches, straight_line
 from dhkit.cli.tour import tour
 from dhkit.description import Array, write_atomically
@@ -22,12 +23,15 @@ from dhkit.dynamics import dynamics_graph
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.symbolic import operation_count
 from dhkit.symbolic.equations import equations_latex, latex_document, readable
+from dhkit.trajectories import Trajectory
 from dhkit.verification import VerificationReport
 
 __all__ = ["run"]
 
 PRINTED = 5_000
 """Terms of M, C and g that are printed; of longer ones M and g."""
+SAMPLES = 801
+"""By which a motion's largest torque is told."""
 OWN = 1e-6
 """Share of the reach: an arm whose frames are all nearer to another's than this looks the same."""
 
@@ -69,6 +73,7 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
     shown: list[Shown] = []
     stage("ik", lambda: _inverse(arm, shown))
+    stage("plan", lambda: _plan(arm, folder, 16 if quick else None))
     stage("page", lambda: _page(arm, shown[0], folder / "index.html"))
     ok = all(report.ok for report in reports)
     if json:
@@ -158,6 +163,35 @@ def _followed(line: Line | None) -> str:
     if line is None:
         return "no straight line found that it follows without a jump"
     return f"a line of {line.length:.2g} m in {len(line.q)} poses: {line.switches} switches"
+
+
+def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
+    """Plan a motion in least time, and write it with what it and the quintic use of the limits, and a page of both."""
+    from dhkit.viewer import plot_uses
+
+    try:
+        best, quintic = race(arm, intervals)
+    except (DhkitError, ValueError) as error:
+        return f"skipped: {error}"
+    best.save(folder / "plan.npz")
+    picture = io.BytesIO()
+    plot_uses({"least time": best, "quintic": quintic}).savefig(picture, format="png", dpi=120)
+    write_atomically(folder / "plan.png", picture.getvalue())
+    with arm.view() as view:
+        view.play(there_and_back(best, quintic))
+        view.save_html(folder / "plan.html")
+    certificate = best.report.certificate
+    kept = "all limits kept" if certificate.ok else "limits NOT kept"
+    return (
+        f"{_worth(best)}, the quintic {_worth(quintic)}: {kept} in {certificate.states} states, by "
+        f"{certificate.reference}; {folder / 'plan.html'}: there in least time, back by the quintic"
+    )
+
+
+def _worth(motion: Trajectory) -> str:
+    tau = motion.sample(n=SAMPLES).tau
+    largest = 100 * float(np.max(np.abs(tau) / motion.description.numbers.effort))
+    return f"{motion.duration:.3f} s with torques up to {largest:.0f} %"
 
 
 def _page(arm: Arm, shown: Shown, path: Path) -> str:

@@ -27,6 +27,8 @@ PATIENCE = 1.0
 """s: a search that takes longer shows how far it is."""
 SAMPLES = 801
 """By which a motion's largest rates and torques are told."""
+SEEN = 0.005
+"""Share of the time from which on an active limit is told."""
 FIGURES = (".png", ".svg", ".pdf")
 PAGES = (".html", ".htm")
 
@@ -226,7 +228,8 @@ def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None
     _print_joints(task, motion, degrees)
     worst = certificate.worst
     verdict = "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
-    reached = ", ".join(f"{name} {100 * share:.0f} %" for name, share in report.active_limits()) or "none"
+    active = [(name, share) for name, share in report.active_limits() if share >= SEEN]
+    reached = ", ".join(f"{name} {100 * share:.0f} %" for name, share in active) or "none"
     say(f"\ncertificate: {verdict} in {certificate.states} states, by {certificate.reference}")
     say(f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s")
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {reached}")
@@ -252,7 +255,7 @@ def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None
                 "→" if branch.chosen else "",
                 branch.branch,
                 f"{branch.duration:.4f}" if np.isfinite(branch.duration) else "",
-                branch.reason or ("" if branch.solved else "at least: not tried"),
+                branch.reason or ("" if branch.solved else "at least, so not tried"),
             )
             for branch in report.branches
         ]

@@ -49,8 +49,9 @@ def classical(task: Task) -> tuple[tuple[str, float], ...]:
 
 def coarser(planner: Planner, task: Task, motion: Trajectory, deadline: float) -> tuple[int, float] | None:
     """Return a mesh of half as many intervals and the cost on it; nothing where the time is over."""
-    intervals = max(6, planner.intervals // 2)
-    if time.perf_counter() > deadline or intervals == planner.intervals:
+    usual = planner.intervals_for(task)
+    intervals = max(6, usual // 2)
+    if time.perf_counter() > deadline or intervals == usual:
         return None
     try:
         program, made = planner.program(task, intervals)

@@ -47,6 +47,7 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 """Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
 USUAL = 48
 """Intervals of arms of six joints; of fewer joints more, as they cost less."""
+LEAST_USUAL = 24
 NUMBERS = 384
 """Joints times intervals: what arms of few joints get."""
 LEISURELY = 2.0
@@ -86,7 +87,7 @@ class Planner:
         What else must be kept: ``ToolSpeed(0.5)`` and the like.
     intervals
         Of the mesh. Unless given 48 for arms of six joints and more, and more for smaller ones; half of that for
-        objectives without time. Finer meshes find slightly better motions in more time.
+        objectives without time, and around obstacles. Finer meshes find slightly better motions in more time.
     friction
         Of the drives, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
 
@@ -124,6 +125,7 @@ class Planner:
         self.constraints = tuple(constraints)
         usual = max(USUAL, NUMBERS // description.n)
         # Smooth motions need half as many: their accelerations are parabolas.
+        self._given = intervals
         self.intervals = intervals or (usual if self.objective.has_time else usual // 2)
         chosen = Friction.chosen(friction)
         self.friction = SMOOTHED if chosen is not None and chosen.width == 0 else chosen
@@ -238,7 +240,7 @@ class Planner:
 
     def program(self, task: Task, intervals: int | None = None) -> tuple[Program, float]:
         """Return the program for a task, and the seconds that it took to make just now."""
-        intervals = self.intervals if intervals is None else intervals
+        intervals = self.intervals_for(task) if intervals is None else intervals
         legs, limits, slots = len(task.points) - 1, task.limits, task.surroundings.slots
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
@@ -263,6 +265,12 @@ class Planner:
             made = Program.of(problem, CONVERGENCE[curve], expand=expand)
             self._programs[key] = made
             return made, time.perf_counter() - began
+
+    def intervals_for(self, task: Task) -> int:
+        """Return the intervals of a task's mesh: half where every knot is held against obstacles, unless given."""
+        if self._given is None and task.surroundings:
+            return max(LEAST_USUAL, self.intervals // 2)
+        return self.intervals
 
     # One motion
 

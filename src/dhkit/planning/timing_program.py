@@ -29,8 +29,9 @@ __all__ = ["PathPoint", "PathStates", "Terms", "TimingProgram", "TimingRows"]
 
 SMALLEST = 1e-7
 """The smallest b inside, where 1 is about the path's mean: ipopt widens bounds by a tenth of it."""
-CONVEX, SMOOTH = 1e-6, 1e-8
-"""Ipopt's tolerances in least time, where it is of 1, and for other objectives."""
+LEAST_TIME, SMOOTH = 1e-7, 1e-8
+"""Ipopt's tolerances where time counts, which is then 1, and for other objectives; each limit that is reached costs a
+tenth of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +254,7 @@ class TimingProgram:
             f = scale / rate * (weight * duration + casadi.dot(casadi.horzcat(times, times) / 2, values[1]))
         g.append(casadi.sum2(times) - duration)
         p = casadi.vertcat(*(casadi.vec(part) for part in (steps, left, right, path, rate, scale)))
-        tolerance = CONVEX if terms is None or terms.objective.has_time else SMOOTH
+        tolerance = LEAST_TIME if terms is None or terms.objective.has_time else SMOOTH
         program = {"x": x, "p": p, "f": f, "g": casadi.vertcat(*g)}
         self.solver = Solver(program, 1, tolerance=tolerance, expand=False)
 

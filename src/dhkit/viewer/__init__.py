@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dhkit.viewer.figures import plot, plot_arm, plot_motion
 from dhkit.viewer.overlays import heat_colors
-from dhkit.viewer.trajectory_figures import plot_trajectory
+from dhkit.viewer.trajectory_figures import plot_trajectory, plot_uses
 from dhkit.viewer.view import View
 from dhkit.viewer.workspace_figures import plot_ellipsoid, plot_workspace
 
@@ -19,5 +19,6 @@ __all__ = [
     "plot_ellipsoid",
     "plot_motion",
     "plot_trajectory",
+    "plot_uses",
     "plot_workspace",
 ]

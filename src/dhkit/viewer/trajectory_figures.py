@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array
+from dhkit.description import Array, Description
 from dhkit.trajectories import Samples, Trajectory
 from dhkit.viewer.figures import CURVE_COLORS, GRID_COLOR, draw_path, plot, space
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_trajectory"]
+__all__ = ["plot_trajectory", "plot_uses"]
 
 SAMPLES = 401
 """Spread evenly; breaks, where accelerations jump, are drawn from both sides."""
@@ -29,6 +30,8 @@ ROOM = 0.12
 """Above and below curves, of what they span."""
 NEAR = 0.35
 """A limit farther from its joint's curve than this share of what all curves span is left out: it would flatten them."""
+WHOLE = 112.0
+"""%: what is shown where the limits are the frame."""
 STYLES = ("-", "-.", ":")
 """Of joints behind the seventh colour."""
 
@@ -75,18 +78,69 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
         axes.tick_params(labelbottom=row == len(panels) - 1)
         axes.set_xlim(0.0, trajectory.duration)
     axes.set_xlabel("time [s]")
+    _name_joints(figure, description)
+    draw_path(space(figure, grid[:, 1]), description, samples.q)
+    return figure
+
+
+def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
+    """Return how much of their limits motions of one arm use: rates and torques, a motion a row, over the same time.
+
+    Parameters
+    ----------
+    motions
+        By what each is called; of an arm with a body, a speed limit and a torque limit on every link.
+
+    Raises
+    ------
+    ValueError
+        No motion, or a joint without one of these limits.
+    DescriptionError
+        Motions of different robots, or a link without a body.
+    """
+    from matplotlib.figure import Figure
+
+    if not motions:
+        raise ValueError("motions is empty; expected trajectories by their names")
+    description = next(iter(motions.values())).description
+    numbers, end = description.numbers, max(motion.duration for motion in motions.values())
+    for what, limits in (("speed", numbers.velocity), ("torque", numbers.effort)):
+        if not np.isfinite(limits).all():
+            name = description.joints[int(np.argmin(np.isfinite(limits)))].name
+            raise ValueError(f"joint {name} has no {what} limit; expected one of each joint")
+    figure = Figure(figsize=(11.5, 1.1 + 2.4 * len(motions)), layout="constrained")
+    figure.suptitle(f"{description.name}: what motions use of the limits", fontsize=13, fontweight="bold")
+    grid = figure.subplots(len(motions), 2, sharex=True, sharey=True, squeeze=False)
+    for row, (name, motion) in zip(grid, motions.items(), strict=True):
+        motion.require(description)
+        samples = _samples(motion)
+        row[0].set_title(f"{name}: {motion.duration:.3f} s", fontsize=11, fontweight="bold", loc="left")
+        shares = {"rate": samples.qd / numbers.velocity, "torque": samples.tau / numbers.effort}
+        for axes, (what, values) in zip(row, shares.items(), strict=True):
+            _curves(axes, _share(f"{what} / limit [%]", np.arange(description.n), values), samples.times)
+            largest = f"up to {100 * float(np.abs(values).max()):.0f} %"
+            axes.set_title(largest, fontsize=10, color=SHARED_COLOR, loc="right")
+            axes.axvline(motion.duration, color=SHARED_COLOR, lw=1.0)
+            for limit in (-100, 100):
+                axes.axhline(limit, color=SHARED_COLOR, **LIMIT_STYLE)
+    grid[0, 0].set_xlim(0.0, end)
+    grid[0, 0].set_ylim(-WHOLE, WHOLE)
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    _name_joints(figure, description)
+    return figure
+
+
+def _name_joints(figure: Figure, description: Description) -> None:
     names = [joint.name for joint in description.joints]
-    handles = [_handle(i, name) for i, name in enumerate(names)]
     figure.legend(
-        handles=handles,
+        handles=[_handle(i, name) for i, name in enumerate(names)],
         loc="outside lower center",
         ncols=min(len(names), 7),
         frameon=False,
         fontsize=9,
         handlelength=1.6,
     )
-    draw_path(space(figure, grid[:, 1]), description, samples.q)
-    return figure
 
 
 def _samples(trajectory: Trajectory) -> Samples:
@@ -137,8 +191,7 @@ def _share(label: str, joints: NDArray[np.intp], shares: Array) -> _Panel:
 def _draw(axes: Axes, panel: _Panel, times: Array) -> None:
     low, high = float(panel.values.min()), float(panel.values.max())
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
-    for k, i in enumerate(panel.joints):
-        axes.plot(times, panel.values[:, k], STYLES[i // len(CURVE_COLORS) % 3], color=_color(i), lw=1.8)
+    _curves(axes, panel, times)
     own = (panel.values.min(axis=0) - NEAR * span, panel.values.max(axis=0) + NEAR * span)
     near = [
         (float(limits[k]), i)
@@ -152,6 +205,11 @@ def _draw(axes: Axes, panel: _Panel, times: Array) -> None:
     low, high = min([low, *(limit for limit, _ in near)]), max([high, *(limit for limit, _ in near)])
     room = ROOM * max(high - low, span)
     axes.set_ylim(low - room, high + room)
+
+
+def _curves(axes: Axes, panel: _Panel, times: Array) -> None:
+    for k, i in enumerate(panel.joints):
+        axes.plot(times, panel.values[:, k], STYLES[i // len(CURVE_COLORS) % 3], color=_color(i), lw=1.8)
     axes.set_ylabel(panel.label)
     axes.grid(color=GRID_COLOR, lw=0.6)
     axes.spines[["top", "right"]].set_visible(False)
