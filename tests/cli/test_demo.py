@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dhkit import Arm, robots
+from dhkit import Arm, Trajectory, robots
 from dhkit.cli import main
+from dhkit.cli.quickest import ends, race, there_and_back
 from dhkit.cli.straight import branches, straight_line
 from dhkit.cli.tour import RATE, tour
 
+KEPT = 1e-6
+"""Share of a limit that a certified motion may exceed it by."""
 CLOSES = 1e-12
 """m: rounding of solutions found by iteration included."""
 
@@ -37,11 +40,17 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
     assert "2 shoulder" in out
     assert "8 branches of one pose close FK to" in out
     assert "proved equal to Euler and Lagrange's equation" in out
+    assert re.search(
+        r"plan +[\d.]+ s +0\.8\d+ s with torques up to 100 %, the quintic 1\.4\d+ s .*all limits kept", out
+    )
     assert sorted(path.name for path in folder.iterdir()) == [
         "equations.html",
         "equations.tex",
         "index.html",
         "meshes",
+        "plan.html",
+        "plan.npz",
+        "plan.png",
         "puma560.png",
         "puma560.urdf",
         "verification.md",
@@ -82,7 +91,8 @@ def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["ok"]
-    assert [stage["stage"] for stage in report["stages"]] == ["build", "verify", "equations", "figure", "ik", "page"]
+    stages = ["build", "verify", "equations", "figure", "ik", "plan", "page"]
+    assert [stage["stage"] for stage in report["stages"]] == stages
     assert re.fullmatch(
         r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches",
         report["stages"][4]["result"],
@@ -98,6 +108,7 @@ def test_the_demo_works_for_a_robot_of_ones_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert run("demo", "--robot", "mine.toml", "--quick") == 0
     assert (tmp_path / "out" / "mine" / "index.html").is_file()
+    assert "skipped: joint1 has no body" in capsys.readouterr().out
 
 
 def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
@@ -174,3 +185,40 @@ def test_without_a_line_the_tour_goes_through_the_configurations():
     assert np.array_equal(q[0], q[-1])
     for stop in arm.configurations.values():
         assert np.abs(q - stop).max(axis=1).min() == 0
+
+
+@pytest.mark.parametrize("name", robots())
+def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
+    arm = Arm.load(name)
+    best, quintic = race(arm, 16)
+    numbers = arm.description.numbers
+    start, goal = ends(arm)
+    assert np.abs(goal - start).min() > 0
+    assert best.report.certificate.ok
+    assert best.duration < quintic.duration
+    both = there_and_back(best, quintic)
+    assert both.duration > best.duration + quintic.duration
+    t = np.linspace(0, both.duration, 2001)
+    q = both.q(t)
+    assert np.array_equal(q[0], start)
+    assert np.abs(q[-1] - start).max() < 1e-9
+    assert np.abs(q - goal).max(axis=1).min() < 1e-9
+    assert np.all(q >= numbers.lower - 1e-9)
+    assert np.all(q <= numbers.upper + 1e-9)
+    assert np.all(np.abs(both.qd(t)) <= numbers.velocity * (1 + KEPT))
+    assert np.all(np.abs(both.tau(t)) <= numbers.effort * (1 + KEPT))
+
+
+def test_the_page_of_the_plan_plays_without_a_jump(tmp_path, chromium):
+    assert run("demo", "--robot", "planar2r", "--quick", "--output", str(tmp_path)) == 0
+    page = chromium.page()
+    try:
+        page.open(f"file://{tmp_path}/plan.html")
+        arm = Arm.load("planar2r")
+        best = Trajectory.load(tmp_path / "plan.npz", arm.description)
+        times, q = (np.array(page.evaluate(f"[...dhkit.motion.{what}]")) for what in ("times", "q"))
+        assert np.abs(np.diff(q.reshape(-1, 2), axis=0)).max() < 0.1
+        assert times[-1] > 2 * best.duration
+        assert page.errors == []
+    finally:
+        page.close()

@@ -324,6 +324,18 @@ def test_too_weak_an_arm_is_named():
 
 
 CORNER = JointPath(ARM, [0, 0.5, 1], [[[0, 0], [1, 0]], [[0.5, 0], [0, 1]]])
+W, PEAK = 1e-5, 1e5
+"""A spike of the first derivative: how wide each flank is, and how high."""
+SPIKE = JointPath(
+    ARM,
+    [0, 0.5, 0.5 + W, 0.5 + 2 * W, 1],
+    [
+        [[-1, 0], [0.5, 0], [0, 0]],
+        [[-0.75, 0], [0.5, 0], [PEAK / (2 * W), 0]],
+        [[-0.75 + W * (0.5 + PEAK / 2), 0], [0.5 + PEAK, 0], [-PEAK / (2 * W), 0]],
+        [[-0.75 + W * (1 + PEAK), 0], [0.5, 0], [0, 0]],
+    ],
+)
 LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
 
 
@@ -332,6 +344,7 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
     [
         (CORNER, {}, "corner at s = 0.5"),
         (LINGERS, {}, "stands still at s = 0:"),
+        (SPIKE, {}, "singular at s = 0.5: joint .* turns ever faster"),
         (straight(ARM, [0, 0], [9, 0]), {}, "leaves its upper limit"),
         (straight(ARM, [0, 0], [1, 0]), {"limits": Limits.of(ARM, jerk=9.0)}, "jerk is limited"),
         (straight(ARM, [0, 0], [1, 0]), {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),

@@ -110,7 +110,11 @@ def test_floor_and_itself():
 
 def test_programs_are_made_once_for_scenes_of_a_size():
     planner = Planner(library_robot("planar2r"), intervals=12)
-    balls = [Obstacle.sphere(0.05, (0.3, 0.95, 0)), Obstacle.sphere(0.05, (0.9, -0.5, 0)), Obstacle.sphere(0.02, (0, -2, 0))]
+    balls = [
+        Obstacle.sphere(0.05, (0.3, 0.95, 0)),
+        Obstacle.sphere(0.05, (0.9, -0.5, 0)),
+        Obstacle.sphere(0.02, (0, -2, 0)),
+    ]
     first = planner.solve([0, 0], [0.4, 0.3], obstacles=balls)
     again = planner.solve([0, 0], [0.4, 0.3], obstacles=[*balls, Obstacle.sphere(0.02, (0, 2, 0))])
     assert first.report.build_seconds > 0 and again.report.build_seconds == 0

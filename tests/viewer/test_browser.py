@@ -8,6 +8,7 @@ import pytest
 from dhkit.description import library_robot, world_to_tool
 from dhkit.kinematics.manipulability import velocity_ellipsoid
 from dhkit.model.shapes import link_parts
+from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
 from dhkit.viewer.drawables import part_transform
 from dhkit.viewer.page import offline_page
@@ -368,4 +369,66 @@ def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(page, signal
         view.wait()
         check_tool(page, page.screenshot(), signal_arm, STATES[2])
         assert page.evaluate("dhkit.stage.overlays.empty") is True
+        assert page.errors == []
+
+
+def test_obstacles_stand_where_they_are_and_their_sizes_are_true(page, signal_arm, tmp_path):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = np.diag([-1, -1, 1]), (0.5, -0.4, 0.2)
+    scene = [
+        Obstacle.box((0.2, 0.3, 0.4), T),
+        Obstacle.sphere(0.15, (0.5, 0.4, 0.3)),
+        Obstacle.capsule(0.1, (-0.4, 0.5, 0.3), (-0.4, 0.5, 0.6)),
+        Floor(-0.2),
+    ]
+    view = View(signal_arm)
+    open_offline(page, view, tmp_path)
+    without = page.screenshot()
+    view.obstacles(scene)
+    open_offline(page, view, tmp_path)
+    boxes = page.evaluate(
+        "dhkit.stage.overlays.layers.obstacles.group.children.map(child => {"
+        " const box = child.geometry.boundingBox.clone().applyMatrix4(child.matrix);"
+        " return [...box.min.toArray(), ...box.max.toArray()]; })"
+    )
+    expected = [
+        (0.4, -0.55, 0, 0.6, -0.25, 0.4),
+        (0.35, 0.25, 0.15, 0.65, 0.55, 0.45),
+        (-0.5, 0.4, 0.2, -0.3, 0.6, 0.7),
+    ]
+    assert np.abs(np.array(boxes[:3]) - expected).max() < FLOAT32
+    assert np.array(boxes[3])[[2, 5]] == pytest.approx([-0.2, -0.2])
+    # Violet where it was the colour of the ground, and the arm is still there.
+    x, y = projected(page, (0.5, 0.4, 0.3)).astype(int)
+    r, g, b = page.screenshot()[y, x]
+    assert b > g + 20
+    assert not np.array_equal((r, g, b), without[y, x])
+    assert shows_the_arm(page.screenshot())
+    # The floor has no end: it is not what the camera takes in.
+    reach = page.evaluate("dhkit.stage.overlays.layers.obstacles.box.max.toArray()")
+    assert np.abs(np.array(reach) - [0.65, 0.6, 0.7]).max() < FLOAT32
+    page.press("o")
+    assert page.evaluate("dhkit.stage.overlays.layers.obstacles.group.visible") is False
+    assert page.errors == []
+
+
+def test_what_lies_below_the_ground_is_seen(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    view.obstacles([Obstacle.sphere(0.12, (0.7, -0.5, -0.4))])
+    open_offline(page, view, tmp_path)
+    x, y = projected(page, (0.7, -0.5, -0.4)).astype(int)
+    r, g, b = page.screenshot()[y, x]
+    assert b > g + 20
+
+
+def test_live_obstacles_come_and_go(page, signal_arm):
+    with View(signal_arm) as view:
+        page.open(view.url)
+        view.obstacles([Obstacle.sphere(0.1, (0.5, 0.4, 0.3))])
+        view.wait()
+        assert page.evaluate("document.getElementById('overlays').hidden") is False
+        view.obstacles(None)
+        view.wait()
+        assert page.evaluate("dhkit.stage.overlays.empty") is True
+        assert page.evaluate("document.getElementById('overlays').hidden") is True
         assert page.errors == []

@@ -72,6 +72,15 @@ def test_ghosts_come_back(data, n, count):
     assert np.array_equal(ghosts.tints, tints)
 
 
+@given(st.data(), st.integers(0, 5))
+def test_obstacles_come_back(data, count):
+    T, half_edges, radii = drawn(data.draw, count, 4, 4), drawn(data.draw, count, 3), drawn(data.draw, count)
+    back = protocol.decode_obstacles(protocol.encode_obstacles(T, half_edges, radii))
+    assert np.array_equal(back.transforms, T[:, :3])
+    assert np.array_equal(back.half_edges, half_edges)
+    assert np.array_equal(back.radii, radii)
+
+
 @pytest.mark.parametrize("name", ["planar2r", "puma560"])
 def test_a_scene_comes_back(name):
     arm = library_robot(name)

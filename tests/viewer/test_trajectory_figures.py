@@ -8,7 +8,7 @@ import pytest
 from dhkit.description import from_dh, library_robot, world_to_tool
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic, trapezoidal
-from dhkit.viewer import View, plot
+from dhkit.viewer import View, plot, plot_uses
 from dhkit.viewer.protocol import decode_animation
 from dhkit.viewer.session import Slot
 
@@ -75,3 +75,31 @@ def test_a_view_plays_a_trajectory_of_its_arm_alone():
             other.play(motion)
     assert played.times[-1] == 2
     assert np.abs(played.q - motion.q(played.times)).max() < FLOAT32
+
+
+def test_motions_are_compared_over_the_same_time():
+    arm = library_robot("planar2r")
+    slow, fast = cubic(arm, [0, 0], [1.0, 0.5], 2.0), trapezoidal(arm, [0, 0], [1.0, 0.5])
+    figure = plot_uses({"slow": slow, "fast": fast})
+    figure.savefig(io.BytesIO(), format="png", dpi=40)
+    assert len(figure.axes) == 4
+    assert {axes.get_xlim() for axes in figure.axes} == {(0.0, 2.0)}
+    for k, motion in enumerate((slow, fast)):
+        rates, torques = (solid(axes) for axes in figure.axes[2 * k : 2 * k + 2])
+        assert figure.axes[2 * k].get_title("left").endswith(f": {motion.duration:.3f} s")
+        t = rates[0].get_xdata()
+        inside = ~np.isin(t, motion.breaks)
+        for i in range(2):
+            assert np.allclose(rates[i].get_ydata(), 100 * motion.qd(t)[:, i] / arm.numbers.velocity[i])
+            expected = 100 * motion.tau(t)[:, i] / arm.numbers.effort[i]
+            assert np.allclose(torques[i].get_ydata()[inside], expected[inside])
+
+
+def test_a_comparison_needs_limits_and_one_robot():
+    arm, other = library_robot("planar2r"), from_dh([(0, 0, 1, 0), (0, 0, 1, 0)])
+    with pytest.raises(ValueError, match="motions is empty"):
+        plot_uses({})
+    with pytest.raises(ValueError, match="has no speed limit"):
+        plot_uses({"one": cubic(other, [0, 0], [1, 1], 1.0)})
+    with pytest.raises(DescriptionError, match="the trajectory is one of"):
+        plot_uses({"one": cubic(arm, [0, 0], [1, 1], 1.0), "two": cubic(other, [0, 0], [1, 1], 1.0)})

@@ -7,14 +7,16 @@ import time
 import numpy as np
 import pytest
 
-from dhkit.description import from_dh, library_robot
+from dhkit.description import from_dh, library_robot, pose
 from dhkit.errors import ModelError
 from dhkit.kinematics.manipulability import force_ellipsoid, velocity_ellipsoid
+from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
 from dhkit.viewer.protocol import (
     decode_animation,
     decode_ellipsoids,
     decode_ghosts,
+    decode_obstacles,
     decode_points,
     decode_pose,
     decode_trace,
@@ -123,6 +125,31 @@ def test_ghosts_stand_where_the_kinematics_say_each_in_a_tint_of_its_own():
         for nothing in (None, q[:0]):
             view.ghosts(nothing)
             assert len(decode_ghosts(view._state[Slot.GHOSTS]).transforms) == 0
+
+
+def test_obstacles_are_drawn_as_they_stand_and_taken_away():
+    arm = library_robot("puma560")
+    T = pose(xyz=(0.5, -0.4, 0.2), euler=(0.1, 0.2, 0.5))
+    scene = [
+        Obstacle.box((0.2, 0.3, 0.4), T),
+        Obstacle.sphere(0.15, (0.5, 0.4, 0.3)),
+        Obstacle.capsule(0.07, (-0.4, 0.2, 0.1), (-0.4, 0.5, 0.6)),
+        Floor(-0.3),
+    ]
+    with View(arm) as view:
+        view.obstacles(scene)
+        drawn = decode_obstacles(view._state[Slot.OBSTACLES])
+        assert np.abs(drawn.transforms[0] - T[:3]).max() < FLOAT32
+        assert np.abs(drawn.half_edges[:2] - [[0.1, 0.15, 0.2], [0, 0, 0]]).max() < FLOAT32
+        assert np.abs(drawn.radii - [0, 0.15, 0.07, 0]).max() < FLOAT32
+        axis = drawn.half_edges[2, 2] * drawn.transforms[2, :, 2]
+        ends = drawn.transforms[2, :, 3] + np.array([[-1], [1]]) * axis
+        assert np.abs(ends - [[-0.4, 0.2, 0.1], [-0.4, 0.5, 0.6]]).max() < FLOAT32
+        assert drawn.transforms[3, 2, 3] == pytest.approx(-0.3)
+        assert drawn.half_edges[3, 0] > scene_size(arm)
+        assert drawn.half_edges[3, 2] == 0
+        view.obstacles(None)
+        assert len(decode_obstacles(view._state[Slot.OBSTACLES]).radii) == 0
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,9 @@ def objective(text: str) -> Objective:
     for term in PLUS.split(text):
         words = term.replace("*", " ").split()
         if not words or words[-1] not in NAMED:
-            raise DescriptionError(f"--objective: found {term.strip()!r}; expected {', '.join(NAMED)}, or a sum of them")
+            raise DescriptionError(
+                f"--objective: found {term.strip()!r}; expected {', '.join(NAMED)}, or a sum of them"
+            )
         factor = float(numbers(words[:-1], "--objective", [1])[0]) if words[1:] else 1.0
         if factor <= 0:
             raise DescriptionError(f"--objective: found {term.strip()!r}; expected a positive factor")

@@ -159,7 +159,9 @@ def ik(
 PLAN_WORDS: dict[str, int | None] = {
     **dict.fromkeys(("--from", "--to", "--via", "--matrix", "--like", "--objective", "--payload", "--box", "--sphere")),
     **dict.fromkeys(("--velocity", "--acceleration", "--jerk", "--torque")),
-    **{"--xyz": 3, "--euler": 3, "--floor": 1},
+    "--xyz": 3,
+    "--euler": 3,
+    "--floor": 1,
 }
 
 

@@ -43,9 +43,7 @@ def race(arm: Arm, intervals: int | None = None) -> tuple[Trajectory, Trajectory
 def ends(arm: Arm) -> tuple[Array, Array]:
     """Return a configuration inside the limits, named where there is one, and one with every joint moved from it."""
     numbers = arm.description.numbers
-    inside = {
-        name: q for name, q in arm.configurations.items() if np.all((q >= numbers.lower) & (q <= numbers.upper))
-    }
+    inside = {name: q for name, q in arm.configurations.items() if np.all((q >= numbers.lower) & (q <= numbers.upper))}
     name = next((name for name in (*PREFERRED, *inside) if name in inside), None)
     start = np.clip(np.zeros(arm.n), numbers.lower, numbers.upper) if name is None else inside[name]
     farthest = np.where(numbers.prismatic, SLIDE * arm.description.reach, TURN)
@@ -63,4 +61,4 @@ def there_and_back(there: Trajectory, back: Trajectory) -> Trajectory:
 
 
 def _rest(motion: Trajectory, q: Array) -> Trajectory:
-    return Trajectory(motion.description, [0.0, PAUSE], q[None, None])
+    return Trajectory(motion.description, np.array([0.0, PAUSE]), q[None, None])

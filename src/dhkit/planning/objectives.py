@@ -111,22 +111,28 @@ class Energy(Term):
         return self.motor_constants if isinstance(self.motor_constants, tuple) else (self.motor_constants,)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return the electrical power, W."""
+        """Return the electrical power, W, less what is the same for every motion between the same states.
+
+        The joints' work, the integral of tau qd, is what the arm's energy gains and friction takes; of the positive
+        power (P + abs P) / 2 only abs P depends on the way. Taken as it is, the optimizer would find motions along which
+        a quadrature errs.
+        """
         import casadi
 
         n, constants = point.n, self.constants
         if len(constants) not in (0, 1, n):
             raise ValueError(f"Energy: {len(constants)} motor constants; expected 1 or {n}")
-        total = casadi.SX(0)
+        if self.regenerates and not constants and point.friction is None:
+            raise ValueError(
+                "Energy: without motor constants, friction or power that is lost all motions cost the same"
+            )
+        total = point.dissipation / (1.0 if self.regenerates else 2.0)
         for i in range(n):
-            power = point.tau[i] * point.qd[i]
             if not self.regenerates:
-                soft = SOFT * point.power_scale[i]
-                power = (power + casadi.sqrt(power * power + soft * soft) - soft) / 2
-            total += power
+                power, soft = point.tau[i] * point.qd[i], SOFT * point.power_scale[i]
+                total += (casadi.sqrt(power * power + soft * soft) - soft) / 2
             if constants:
-                k = constants[i % len(constants)] * point.gear[i]
-                total += (point.tau[i] / k) ** 2
+                total += (point.tau[i] / (constants[i % len(constants)] * point.gear[i])) ** 2
         return total
 
     def measured(self, states: States) -> Array:
@@ -189,6 +195,11 @@ class Objective:
     def only_time(self) -> bool:
         """Whether nothing but the duration counts."""
         return all(isinstance(term, Time) for term in self.terms)
+
+    @property
+    def needs_calm(self) -> bool:
+        """Whether more than one motion may be best: joints that have time, or power that is given back."""
+        return self.only_time or any(isinstance(term, Energy) for term in self.terms)
 
     @property
     def needs_torque(self) -> bool:

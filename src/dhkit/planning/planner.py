@@ -35,7 +35,7 @@ from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.search import Found, Program, Search
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.states import prepare
-from dhkit.planning.task import Task, curve_for
+from dhkit.planning.task import FEW, Task, curve_for
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
@@ -123,7 +123,7 @@ class Planner:
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
         self.constraints = tuple(constraints)
-        usual = max(USUAL, NUMBERS // description.n)
+        usual = NUMBERS // description.n if description.n <= FEW else USUAL
         # Smooth motions need half as many: their accelerations are parabolas.
         self._given = intervals
         self.intervals = intervals or (usual if self.objective.has_time else usual // 2)

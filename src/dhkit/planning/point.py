@@ -33,14 +33,27 @@ class Point:
         self.qd = joint_symbols("qd", self.n)
         self.qdd = joint_symbols("qdd", self.n)
         self.load = joint_symbols("load", LOAD if payload else 0)
+        self.friction = friction
         self._functions = CasadiFunctions(description, friction=friction, payload=payload)
 
     @cached_property
     def tau(self) -> casadi.SX:
         """Joint torques, n x 1, N m and N."""
+        return self._torque(self._functions)
+
+    @cached_property
+    def dissipation(self) -> casadi.SX:
+        """The power that friction takes, W."""
+        import casadi
+
+        if self.friction is None:
+            return casadi.SX(0)
+        return casadi.dot(self.tau - self._torque(self._functions.layered(payload=bool(self.load.numel()))), self.qd)
+
+    def _torque(self, functions: CasadiFunctions) -> casadi.SX:
         load = self.load
         loads = (load[0], load[1:4], load[4:10]) if load.numel() else ()
-        return self._functions.inverse_dynamics(self.q, self.qd, self.qdd, *loads)
+        return functions.inverse_dynamics(self.q, self.qd, self.qdd, *loads)
 
     @cached_property
     def T_world_tool(self) -> casadi.SX:

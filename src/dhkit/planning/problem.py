@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["Knots", "Problem", "Rows"]
 
 CALM = 1e-4
-"""Share of the objective that accelerations have in a time-optimal motion: joints with slack then move calmly."""
+"""Share of the objective that accelerations have in least time or energy: joints with slack then move calmly."""
 TINY_TIME = 1e-4
 """s: the shortest duration of a leg."""
 
@@ -131,7 +131,8 @@ class Problem:
         A = casadi.MX.sym("qdd", n, mesh.curve.columns(K))
         p = casadi.MX.sym("p", sum(self.parameter_sizes))
         H = casadi.repmat(casadi.DM(mesh.shares).T * casadi.horzcat(*(D[int(leg)] for leg in mesh.leg)), n, 1)
-        motion = _Motion.of(mesh.curve, Q, V, A, H)
+        dense = any(constraint.moving for constraint in self.constraints)
+        motion = _Motion.of(mesh.curve, Q, V, A, H, dense=dense)
         rows: list[Rows] = []
         g: list[casadi.MX] = []
 
@@ -182,7 +183,7 @@ class Problem:
                 case _:
                     cost += term.weight * next(waiting)
         cost = scale * cost
-        if self.objective.only_time:
+        if self.objective.needs_calm:
             # By shares of time: what counts is how long joints are busy, and meshes are finer at their ends.
             squares = casadi.sum1((A * casadi.repmat(usual, 1, A.shape[1])) ** 2)
             cost += CALM / (self.n * len(self.mesh.legs)) * casadi.dot(casadi.DM(self._column_shares), squares.T)
@@ -274,7 +275,8 @@ class _Motion:
     """By which values there are integrated over time, 1 x P."""
 
     @classmethod
-    def of(cls, curve: Curve, Q: casadi.MX, V: casadi.MX, A: casadi.MX, H: casadi.MX) -> _Motion:
+    def of(cls, curve: Curve, Q: casadi.MX, V: casadi.MX, A: casadi.MX, H: casadi.MX, *, dense: bool) -> _Motion:
+        """Return a curve's pieces; ``dense``: with the midpoints among the states, where what is limited may bulge."""
         import casadi
 
         q, v, h = Q[:, :-1], V[:, :-1], H[0, :]
@@ -293,17 +295,29 @@ class _Motion:
             )
         if curve is Curve.JUMPING:
             a, c = A[:, 0::2], A[:, 1::2]
+            middle = (
+                q + H / 2 * v + H * H * (5 * a + c) / 48,
+                v + H * (3 * a + c) / 8,
+                (a + c) / 2,
+            )
+            states = [(q, Q[:, 1:]), (v, V[:, 1:]), (a, c)]
+            weights = [h / 2, h / 2]
+            if dense:
+                states, weights = (
+                    [(*pair, x) for pair, x in zip(states, middle, strict=True)],
+                    [h / 6, h / 6, 2 * h / 3],
+                )
             # Positions are cubics, velocities parabolas: both inside the hulls of their Bernstein coefficients.
             return cls(
                 q_end=q + H * v + H * H * (a / 3 + c / 6),
                 qd_end=v + H * (a + c) / 2,
                 q_inside=casadi.horzcat(q + H / 3 * v, Q[:, 1:] - H / 3 * V[:, 1:]),
                 qd_inside=v + H / 2 * a,
-                q_middle=q + H / 2 * v + H * H * (5 * a + c) / 48,
+                q_middle=middle[0],
                 jerk=(c - a) / H,
                 squared_jerk=casadi.MX(0),
-                states=(casadi.horzcat(q, Q[:, 1:]), casadi.horzcat(v, V[:, 1:]), casadi.horzcat(a, c)),
-                weights=casadi.horzcat(h / 2, h / 2),
+                states=tuple(casadi.horzcat(*values) for values in states),
+                weights=casadi.horzcat(*weights),
             )
         if curve is Curve.LINEAR:
             a, c = A[:, :-1], A[:, 1:]
@@ -319,7 +333,8 @@ class _Motion:
             q_end=q + H * v + H * H * (a / 6 + b / 3),
             qd_end=v + H * (a + 4 * b + c) / 6,
             q_inside=q_middle,
-            qd_inside=qd_middle,
+            # Velocities are parabolas or cubics, inside the hulls of their Bernstein coefficients.
+            qd_inside=v + H / 2 * a if curve is Curve.LINEAR else casadi.horzcat(v + H / 3 * a, V[:, 1:] - H / 3 * c),
             q_middle=q_middle,
             jerk=first if curve is Curve.LINEAR else casadi.horzcat(first, last),
             squared_jerk=casadi.sum2(casadi.sum1(H / 3 * (first * first + first * last + last * last))),

@@ -13,7 +13,7 @@ from dhkit.errors import PlanningError
 from dhkit.planning.assembly import assembled, knots_along
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.clear import BEYOND
-from dhkit.planning.costs import cost_of
+from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import Knots, Problem, Rows
@@ -27,8 +27,10 @@ FEASIBLE = 1e-5
 """What a solution's rows may miss at most to be taken: the certificate decides about the rest."""
 SMALL_STEP = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-3, Curve.QUADRATIC: 1e-3}
 """A solution that needs less of a slow-down is slowed down; else limits are tightened where they are exceeded."""
-WIDER = 1.1
-"""What an excess is multiplied by to be the next margin."""
+LARGER = 3.0
+"""What that limit is multiplied by with each round: some excesses wander."""
+WIDER, DOUBLE = 1.1, 2.0
+"""What an excess is multiplied by to widen a margin, and that factor with each round: some bulge between knots."""
 ROUNDS = 8
 """How often a motion is solved for anew at most, to be certified."""
 SLACK = 2e-7
@@ -140,15 +142,15 @@ class Search:
         """Return a solution as a motion that keeps its limits everywhere, solved anew where it must be."""
         task, mesh = self.task, self.program.mesh
         margins, inflation = Margins(mesh), np.zeros(len(task.surroundings.obstacles) + 1)
-        for _ in range(ROUNDS):
+        for turn in range(ROUNDS):
             trajectory = assembled(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
-            trajectory, certificate, c = self._kept(trajectory)
+            trajectory, certificate, c = self._kept(trajectory, SMALL_STEP[mesh.curve] * LARGER**turn)
             if certificate.ok:
                 cost = self._cost(trajectory)
                 return Found(trajectory, certificate, cost, c, tuple(self.tightened), self.iterations, self.solves)
             exceeded = [check.what for check in certificate.checks if check.excess > 0]
             self.tightened += [what for what in exceeded if what not in self.tightened]
-            margins = self._wider(margins, trajectory)
+            margins = self._wider(margins, trajectory, WIDER * DOUBLE**turn)
             if "clearance" in exceeded:
                 states = task.checker.states(trajectory)
                 inflation = inflation + BEYOND * task.surroundings.short(task.description, states.q)
@@ -159,27 +161,27 @@ class Search:
             f"{self._whose(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {ROUNDS} rounds"
         )
 
-    def _kept(self, trajectory: Trajectory) -> tuple[Trajectory, Certificate, float]:
-        """Return a motion, slowed down where that is all it takes, its certificate, and by what it was slowed down."""
+    def _kept(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, Certificate, float]:
+        """Return a motion, slowed down where a small step is all it takes, its certificate, and that factor."""
         task = self.task
         states, c = task.checker.states(trajectory), 1.0
         if task.rests and task.duration is None:
             c = task.checker.slow_down(states)
-            if 1 < c < 1 + SMALL_STEP[self.program.mesh.curve]:
+            if 1 < c < 1 + step:
                 c *= 1 + SLACK
                 trajectory = trajectory.slowed(c)
                 return trajectory, task.checker.check(trajectory), c
         return trajectory, task.checker.check(trajectory, states), 1.0
 
-    def _wider(self, margins: Margins, trajectory: Trajectory) -> Margins:
-        """Return margins that are wider by what a motion exceeds in each interval."""
+    def _wider(self, margins: Margins, trajectory: Trajectory, factor: float) -> Margins:
+        """Return margins that are wider by a multiple of what a motion exceeds in each interval."""
         checker = self.task.checker
         states = checker.states(trajectory)
         excesses = [(what, use - 1) for what, use in checker.measured(states) if what != "clearance"]
         for what, excess in [*excesses, ("position", checker.positions(states))]:
             worst = excess.reshape(margins.mesh.intervals, -1, excess.shape[1]).max(axis=1)
             if (worst > 0).any():
-                margins = margins.raised(what, WIDER * worst)
+                margins = margins.raised(what, factor * worst)
         return margins
 
     # Starts
@@ -276,7 +278,9 @@ class Search:
         """Return the cost of a guess, by which costs are divided."""
         if self.program.problem.objective.only_time:
             return float(guess.durations.sum())
-        return max(self._cost(assembled(self.task.arm, self.program.mesh, guess, fixed_ends=False)), SMALLEST)
+        trajectory = assembled(self.task.arm, self.program.mesh, guess, fixed_ends=False)
+        objective, task = self.program.problem.objective, self.task
+        return max(size_of(objective, trajectory, task.description, task.friction), SMALLEST)
 
 
 class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)

@@ -120,7 +120,8 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
             _curves(axes, _share(f"{what} / limit [%]", np.arange(description.n), values), samples.times)
             largest = f"up to {100 * float(np.abs(values).max()):.0f} %"
             axes.set_title(largest, fontsize=10, color=SHARED_COLOR, loc="right")
-            axes.axvline(motion.duration, color=SHARED_COLOR, lw=1.0)
+            if motion.duration < end:
+                axes.axvline(motion.duration, color=SHARED_COLOR, lw=1.0)
             for limit in (-100, 100):
                 axes.axhline(limit, color=SHARED_COLOR, **LIMIT_STYLE)
     grid[0, 0].set_xlim(0.0, end)

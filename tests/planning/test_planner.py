@@ -1,0 +1,348 @@
+"""What a planner is asked for: ways, loads, constraints, time, interruption."""
+
+import pickle
+import threading
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import dhkit
+from dhkit.description import library_robot, pose
+from dhkit.description.frames import world_to_tool
+from dhkit.dynamics import Friction, inverse_dynamics
+from dhkit.errors import PlanningError
+from dhkit.model import pinocchio_model
+from dhkit.planning import (
+    Effort,
+    Energy,
+    Jerk,
+    MotorPower,
+    Payload,
+    Planner,
+    Time,
+    ToolAcceleration,
+    ToolDirection,
+    ToolOrientation,
+    ToolSpeed,
+    TorqueSpeedLine,
+)
+from dhkit.trajectories import Limits
+from planning_reference import grids, worst_excess
+
+PUMA = library_robot("puma560")
+START = np.array([0.0, 0.8, -1.0, 0.0, 0.5, 0.0])
+GOAL = np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
+ALLOWED = 1e-6
+
+
+@pytest.fixture(scope="module")
+def planner():
+    return Planner(PUMA, intervals=24)
+
+
+def kept(arm, motion, limits, allowed=ALLOWED):
+    for what, excess in worst_excess(arm, motion, limits).items():
+        assert excess <= allowed, what
+
+
+# Ways
+
+
+def test_configurations_on_the_way_are_met(planner):
+    via = [np.array([0.5, 1.0, -0.5, 0.2, 0.0, 0.3]), np.array([0.9, 0.2, -0.9, 0.4, 0.3, 0.6])]
+    motion = planner.solve(START, GOAL, via=via)
+    kept(PUMA, motion, planner.limits)
+    legs = len(motion.breaks) // 3
+    for k, q in enumerate(via, start=1):
+        assert np.abs(motion.q(motion.breaks[legs * k]) - q).max() < 1e-9
+        assert np.abs(motion.qd(motion.breaks[legs * k])).max() > 0.1, "passed, not stopped at"
+
+
+def test_a_pose_is_reached_by_the_best_branch(planner):
+    T = world_to_tool(PUMA, GOAL)
+    motion = planner.solve(START, T)
+    assert np.abs(world_to_tool(PUMA, motion.q(motion.duration)) - T).max() < 1e-9
+    branches = motion.report.branches
+    assert sum(branch.chosen for branch in branches) == 1
+    assert all(branch.duration >= motion.duration for branch in branches)
+    assert motion.duration <= planner.solve(START, GOAL).duration * (1 + 1e-6)
+    unsolved = [branch for branch in branches if not branch.solved]
+    assert unsolved, "branches whose speeds alone take longer need not be solved"
+    # What is said of one that was not solved is a bound: the true cost is no less.
+    solutions = dhkit.Arm(PUMA).ik(T)
+    q = solutions.within_limits(near=START)[list(solutions.branches).index(unsolved[0].branch)]
+    assert planner.solve(START, q).duration >= unsolved[0].duration
+
+
+def test_poses_on_the_way(planner):
+    T = world_to_tool(PUMA, np.array([0.5, 1.0, -0.5, 0.2, 0.4, 0.3]))
+    motion = planner.solve(START, GOAL, via=[T])
+    nearest = min(np.abs(world_to_tool(PUMA, q) - T).max() for q in motion.q(motion.breaks))
+    assert nearest < 1e-9
+
+
+def test_seven_joints_reach_a_pose():
+    arm = library_robot("panda")
+    start = np.array([0, -0.4, 0, -1.8, 0, 1.4, 0.5])
+    T = world_to_tool(arm, start + [0.4, 0.2, -0.3, 0.3, 0.2, 0.2, -0.4])
+    motion = Planner(arm, intervals=12).solve(start, T, time_limit=30)
+    assert np.abs(world_to_tool(arm, motion.q(motion.duration)) - T).max() < 1e-8
+    kept(arm, motion, Limits.of(arm))
+
+
+def test_names_of_configurations(planner):
+    motion = planner.solve("nominal", "ready") if "nominal" in PUMA.numbers.configurations else None
+    if motion is not None:
+        assert np.array_equal(motion.q(0.0), PUMA.numbers.configurations["nominal"])
+
+
+def test_velocities_at_the_ends(planner):
+    v0, v1 = np.array([0.5, 0, 0, 0, 0, 0]), np.array([0, 0.3, 0, 0, 0, -1.0])
+    motion = planner.solve(START, GOAL, start_velocity=v0, goal_velocity=v1)
+    assert np.abs(motion.qd(0.0) - v0).max() < 1e-12
+    assert np.abs(motion.qd(motion.duration) - v1).max() < 1e-9
+    kept(PUMA, motion, planner.limits)
+
+
+def test_limits_of_one_motion(planner):
+    slow = planner.limits.scaled(velocity=0.5)
+    motion = planner.solve(START, GOAL, limits=slow)
+    assert motion.report.build_seconds == 0 or motion.duration > 0
+    kept(PUMA, motion, slow)
+    assert motion.duration > 1.5 * planner.solve(START, GOAL).duration
+
+
+def test_jerk_limits():
+    limits = Limits.of(PUMA, jerk=200.0, acceleration=20.0)
+    motion = Planner(PUMA, limits=limits, intervals=24).solve(START, GOAL)
+    kept(PUMA, motion, limits)
+    for side in ("left", "right"):
+        assert np.abs(motion.jerk(motion.breaks, side=side)).max() <= 200 * (1 + ALLOWED)
+    assert np.abs(motion.qdd([0.0, motion.duration])).max() < 1e-9
+
+
+# Loads
+
+
+def test_a_payload_is_carried_and_needs_no_new_program(planner):
+    planner.solve(START, GOAL, payload=Payload(1.0))
+    load = Payload(3.0, (0.01, 0, 0.05), ((0.02, 0, 0), (0, 0.02, 0), (0, 0, 0.01)))
+    motion = planner.solve(START, GOAL, payload=load)
+    assert motion.report.build_seconds == 0
+    kept(load.carried(PUMA), motion, planner.limits)
+    assert motion.duration > planner.solve(START, GOAL).duration
+
+
+def test_friction_takes_torque():
+    planner = Planner(PUMA, friction=True, intervals=24)
+    motion = planner.solve(START, GOAL)
+    q, qd, qdd = grids(motion)
+    tau = inverse_dynamics(PUMA, q, qd, qdd, friction=Friction(1e-2))
+    assert (np.abs(tau) / planner.limits.torque).max() <= 1 + ALLOWED
+
+
+# Constraints, each by a path of its own
+
+
+def tool_motion(arm, motion):
+    """Return the tool's velocity by Pinocchio and its acceleration by differences of that, 1e-5 s apart."""
+    model = pinocchio_model(arm)
+    data = model.createData()
+    frame = model.getFrameId("tool")
+
+    def velocity(t):
+        pin.forwardKinematics(model, data, motion.q(t), motion.qd(t))
+        return pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear.copy()
+
+    h = 1e-5
+    inside = (motion.breaks[:-1, None] + np.diff(motion.breaks)[:, None] * np.linspace(0.05, 0.95, 7)).ravel()
+    v = np.array([velocity(t) for t in inside])
+    a = np.array([(velocity(t + h) - velocity(t - h)) / (2 * h) for t in inside])
+    return v, a
+
+
+def test_the_tools_speed():
+    motion = Planner(PUMA, constraints=[ToolSpeed(0.5)], intervals=24).solve(START, GOAL)
+    speed = np.linalg.norm(tool_motion(PUMA, motion)[0], axis=1)
+    assert speed.max() <= 0.5 * (1 + ALLOWED)
+    assert speed.max() > 0.499
+
+
+def test_the_tools_acceleration():
+    motion = Planner(PUMA, constraints=[ToolAcceleration(3.0)], intervals=24).solve(START, GOAL)
+    a = np.linalg.norm(tool_motion(PUMA, motion)[1], axis=1)
+    assert a.max() <= 3.0 * (1 + 1e-5)
+    assert a.max() > 2.9
+
+
+def test_motors():
+    effort, speed = PUMA.numbers.effort, PUMA.numbers.velocity
+    motion = Planner(PUMA, constraints=[MotorPower(60.0)], intervals=24).solve(START, GOAL)
+    q, qd, qdd = grids(motion)
+    assert np.abs(inverse_dynamics(PUMA, q, qd, qdd) * qd).max() <= 60 * (1 + ALLOWED)
+    line = TorqueSpeedLine(tuple(effort), tuple(1.2 * speed))
+    motion = Planner(PUMA, constraints=[line], intervals=24).solve(START, GOAL)
+    q, qd, qdd = grids(motion)
+    assert np.abs(inverse_dynamics(PUMA, q, qd, qdd) / effort + qd / (1.2 * speed)).max() <= 1 + ALLOWED
+
+
+def test_the_tools_orientation():
+    arm = library_robot("ur5")
+    start = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0])
+    T = world_to_tool(arm, start)
+    there = pose(T[:3, 3] + [-0.15, 0.25, 0.1]) @ np.block([[T[:3, :3], np.zeros((3, 1))], [np.zeros((1, 3)), 1]])
+    tolerance = np.radians(2)
+    for constraint in (ToolOrientation(tolerance), ToolDirection((0, 0, 1), None, tolerance)):
+        motion = Planner(arm, constraints=[constraint], intervals=24).solve(start, there, time_limit=60)
+        seen = np.array([world_to_tool(arm, q)[:3, :3] for q in motion.q(np.linspace(0, motion.duration, 800))])
+        if isinstance(constraint, ToolOrientation):
+            cosine = (np.einsum("kij,ij->k", seen, T[:3, :3]) - 1) / 2
+        else:
+            cosine = seen[:, :, 2] @ T[:3, 2]
+        assert np.arccos(np.clip(cosine, -1, 1)).max() <= tolerance * (1 + 1e-5)
+
+
+# Objectives
+
+
+def test_each_objective_is_best_at_what_it_asks_for():
+    options = {"duration": 1.5}
+    objectives = {"effort": Effort(), "jerk": Jerk(), "energy": Energy(regenerates=True, motor_constants=(2.0,))}
+    motions = {
+        name: Planner(PUMA, term, intervals=16).solve(START, GOAL, **options) for name, term in objectives.items()
+    }
+    for name, term in objectives.items():
+        costs = {other: own_cost(term, motion) for other, motion in motions.items()}
+        assert costs[name] == pytest.approx(motions[name].report.cost, rel=1e-3)
+        best = min(costs.values())
+        assert costs[name] <= best + 1e-3 * abs(best), (name, costs)
+
+
+def own_cost(term, motion):
+    t = np.linspace(0, motion.duration, 4001)
+    q, qd, qdd = motion.q(t), motion.qd(t), motion.qdd(t)
+    tau = inverse_dynamics(PUMA, q, qd, qdd)
+    if isinstance(term, Effort):
+        rate = np.sum(tau**2, axis=1)
+    elif isinstance(term, Jerk):
+        rate = np.sum(motion.jerk(t) ** 2, axis=1)
+    else:
+        gear = np.array([float(joint.drive.gear) for joint in PUMA.joints])
+        rate = np.sum(tau * qd + (tau / (2.0 * gear)) ** 2, axis=1)
+    return np.trapezoid(rate, t)
+
+
+def test_terms_add():
+    objective = Time() + 0.5 * Effort(2.0) + 2 * (Jerk() + Time())
+    assert [(type(term).__name__, term.weight) for term in objective.terms] == [
+        ("Time", 1.0),
+        ("Effort", 1.0),
+        ("Jerk", 2.0),
+        ("Time", 2.0),
+    ]
+    assert str(Time() + 0.5 * Effort()) == "1 time + 0.5 effort"
+
+
+def test_effort_trades_for_time(planner):
+    fast = planner.solve(START, GOAL)
+    calm = Planner(PUMA, Time() + 1e-4 * Effort(), intervals=24).solve(START, GOAL)
+    assert calm.duration > fast.duration
+    assert own_cost(Effort(), calm) < own_cost(Effort(), fast)
+
+
+def test_without_a_duration_smooth_motions_take_twice_the_fastest_cubic():
+    motion = Planner(PUMA, "jerk", intervals=16).solve(START, GOAL)
+    cubic = dhkit.Arm(PUMA).cubic(START, GOAL)
+    assert motion.duration == pytest.approx(2 * cubic.duration, rel=0.1)
+
+
+# Solving
+
+
+def test_one_optimum_from_many_starts(planner):
+    best = planner.solve(START, GOAL).duration
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        via = (START + GOAL) / 2 + rng.normal(0, 0.2, 6)
+        warm = dhkit.Arm(PUMA).spline(np.array([START, via, GOAL]), [0, 1, 2])
+        assert planner.solve(START, GOAL, warm=warm).duration == pytest.approx(best, rel=5e-4)
+
+
+def test_progress_is_told_and_can_interrupt(planner):
+    seen = []
+    planner.solve(START, GOAL, progress=seen.append)
+    assert [step.iteration for step in seen] == list(range(len(seen))) and len(seen) > 5
+    assert seen[-1].infeasibility < 1e-4 < seen[0].infeasibility or seen[-1].infeasibility < 1e-4
+
+    class Enough(Exception):
+        pass
+
+    def enough(step):
+        if step.iteration == 3:
+            raise Enough
+
+    with pytest.raises(Enough):
+        planner.solve(START, GOAL, progress=enough)
+    with pytest.raises(KeyboardInterrupt):
+        planner.solve(START, GOAL, progress=lambda step: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert planner.solve(START, GOAL).report.certificate.ok
+
+
+def test_threads_take_turns(planner):
+    goals = [GOAL + 0.05 * k * np.array([0, 1, 0, 1, 0, 1]) for k in range(4)]
+    expected = [planner.solve(START, goal).duration for goal in goals]
+    found = [None] * 4
+
+    def work(k):
+        found[k] = planner.solve(START, goals[k]).duration
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == expected
+
+
+def test_the_report(planner):
+    motion = planner.solve(START, GOAL, compare=True)
+    report = motion.report
+    assert pickle.loads(pickle.dumps(motion)) == motion
+    assert report.certificate.reference == "Pinocchio"
+    assert report.certificate.states >= 20 * report.intervals
+    assert 0.9 < report.certificate.any_active <= 1
+    names = dict(report.classical)
+    assert names["quintic"] > names["best trapezoid"] > motion.duration
+    assert report.sensitivity is not None and -1e-4 < report.sensitivity < 0.02
+    assert report.active_limits()[0][1] > 0.5
+    text = str(report)
+    for word in ("certified by Pinocchio", "quintic", "some limit is active", "intervals"):
+        assert word in text
+    assert report.as_dict()["certified"] is True
+
+
+def test_an_arm_keeps_its_planners():
+    arm = dhkit.Arm.load("planar2r")
+    first = arm.plan([0, 0], [1, 0.5], intervals=12, compare=False)
+    again = arm.plan([0, 0], [1, 0.4], intervals=12, compare=False)
+    assert first.report.build_seconds > 0 and again.report.build_seconds == 0
+    assert arm == dhkit.Arm.load("planar2r") and pickle.loads(pickle.dumps(arm)) == arm
+
+
+def test_without_pinocchio_our_own_dynamics_certify(monkeypatch):
+    from dhkit.planning import states
+
+    monkeypatch.setattr(states, "_model", lambda description: None)
+    arm = library_robot("planar2r")
+    motion = Planner(arm, intervals=12, constraints=[ToolSpeed(1.0)]).solve([0, 0], [1, 0.5])
+    assert motion.report.certificate.reference == "dhkit"
+    monkeypatch.undo()
+    kept(arm, motion, Limits.of(arm))
+
+
+def test_nothing_is_printed(planner, capfd):
+    planner.solve(START, GOAL)
+    with pytest.raises(PlanningError):
+        planner.solve(START, GOAL, time_limit=1e-4)
+    assert capfd.readouterr() == ("", "")
