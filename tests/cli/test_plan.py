@@ -306,3 +306,21 @@ def test_the_page_plays_the_motion_that_is_written(monkeypatch, plan, tmp_path):
     motion = Trajectory.load(files[0], Arm.load("planar2r").description)
     played = decode_animation(shown[0])
     assert np.abs(played.q - motion.q(played.times)).max() < FLOAT32
+
+
+def test_a_search_that_takes_long_says_how_far_it_is(monkeypatch, plan):
+    monkeypatch.setattr("dhkit.cli.plan.PATIENCE", 0.0)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    status, _, err = plan("planar2r", "--to", "1", "0.5", "--intervals", "48")
+    assert status == 0
+    assert "making the program" in err
+
+
+def test_links_keep_away_from_each_other_and_from_the_floor(facts):
+    where = ("planar3r", "--from", "0", "0.3", "0.3", "--to", "0.5", "1", "1")
+    _, free = facts(*where)
+    status, kept = facts(*where, "--self-collision", "--floor", "-0.5")
+    assert (status, kept["certified"]) == (0, True)
+    assert "clearance" in [limit["what"] for limit in kept["limits"]]
+    assert kept["duration"] == pytest.approx(free["duration"], rel=0.01)  # nothing is in the way

@@ -417,7 +417,7 @@ def test_what_lies_below_the_ground_is_seen(page, signal_arm, tmp_path):
     view.obstacles([Obstacle.sphere(0.12, (0.7, -0.5, -0.4))])
     open_offline(page, view, tmp_path)
     x, y = projected(page, (0.7, -0.5, -0.4)).astype(int)
-    r, g, b = page.screenshot()[y, x]
+    _, g, b = page.screenshot()[y, x]
     assert b > g + 20
 
 

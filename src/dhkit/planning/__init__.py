@@ -1,21 +1,14 @@
 """Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
 
 from dhkit.planning.along_path import along_path
-from dhkit.planning.constraints import (
-    Constraint,
-    MotorPower,
-    ToolAcceleration,
-    ToolDirection,
-    ToolOrientation,
-    ToolSpeed,
-    TorqueSpeedLine,
-)
+from dhkit.planning.constraints import Constraint, MotorPower, TorqueSpeedLine
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
 from dhkit.planning.payload import Payload
 from dhkit.planning.planner import Planner
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.solver import Progress
+from dhkit.planning.tool_constraints import ToolAcceleration, ToolDirection, ToolOrientation, ToolSpeed
 
 __all__ = [
     "BranchReport",

@@ -12,7 +12,7 @@ from dhkit.description import Array, Description, world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.planning.certificate import Certificate, Checker
-from dhkit.planning.constraints import Constraint, ToolAcceleration, ToolSpeed
+from dhkit.planning.constraints import Constraint
 from dhkit.planning.costs import cost_of
 from dhkit.planning.feasibility import require_holdable, unit_of
 from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
@@ -28,6 +28,7 @@ from dhkit.planning.timing_program import (
     speed_bounds,
     timing_program,
 )
+from dhkit.planning.tool_constraints import ToolAcceleration, ToolSpeed
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 

@@ -114,8 +114,8 @@ class Energy(Term):
         """Return the electrical power, W, less what is the same for every motion between the same states.
 
         The joints' work, the integral of tau qd, is what the arm's energy gains and friction takes; of the positive
-        power (P + abs P) / 2 only abs P depends on the way. Taken as it is, the optimizer would find motions along which
-        a quadrature errs.
+        power (P + abs P) / 2 only abs P depends on the way. With all of it, the optimizer would find motions along
+        which a quadrature errs.
         """
         import casadi
 

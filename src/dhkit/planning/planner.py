@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description
+from dhkit.description.frames import world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
 from dhkit.planning.clear import Clear, Surroundings
@@ -36,6 +37,7 @@ from dhkit.planning.search import Found, Program, Search
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.states import prepare
 from dhkit.planning.task import FEW, Task, curve_for
+from dhkit.planning.wish import Wish, checked_limits, end_velocity, positive_seconds
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
@@ -54,18 +56,6 @@ LEISURELY = 2.0
 """Where a duration is needed and none is given: times that of the fastest cubics."""
 SMOOTHED = Friction(width=1e-2)
 """What a step of friction is taken as: rad/s or m/s."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Wish:
-    """What a motion is to be like, whatever its way."""
-
-    limits: Limits
-    duration: float | None
-    start_velocity: Array
-    goal_velocity: Array
-    payload: Payload | None
-    surroundings: Surroundings
 
 
 class Planner:
@@ -201,10 +191,10 @@ class Planner:
         places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
         if places[0].q is None:
             raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
-        wish = _Wish(
+        wish = Wish(
             checked_limits(description, self.limits if limits is None else limits),
-            _positive("duration", duration),
-            *(_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
+            positive_seconds("duration", duration),
+            *(end_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
             payload,
             Surroundings.of(obstacles, clearance, self_collision),
         )
@@ -274,36 +264,35 @@ class Planner:
 
     # One motion
 
-    def _require(self, wish: _Wish, places: Sequence[Place], ways: Sequence[Route]) -> None:
+    def _require(self, wish: Wish, places: Sequence[Place], ways: Sequence[Route]) -> None:
         """Refuse what no solver could find, of places that leave no choice."""
         description, limits = self.description, wish.limits
-        loaded = wish.payload.carried(description) if wish.payload else description
+        loaded = wish.loaded(description)
         require_speed(description, limits, wish.start_velocity, "start")
         require_speed(description, limits, wish.goal_velocity, "goal")
-        at_rest = {"start": not wish.start_velocity.any(), "goal": not wish.goal_velocity.any()}
         for spot in places:
             if spot.q is None:
                 continue
-            if at_rest.get(spot.name, False):
+            if wish.rests_at(spot.name):
                 require_holdable(loaded, limits, spot.q, spot.name)
             if wish.surroundings:
                 wish.surroundings.require(description, spot.q, spot.name)
         resting = [constraint for constraint in self.constraints if not constraint.moving]
-        T_start = _tool(description, ways[0].points[0])
+        T_start = world_to_tool(description, ways[0].points[0])
         for spot in places:
             require_kept(description, resting, T_start, spot)
         if wish.duration is not None and wish.duration < ways[0].bound:
             least = f"the speed limits alone ask for {ways[0].bound:.6g} s"
             raise PlanningError(f"a duration of {wish.duration:.6g} s is too short: {least}")
         moves = np.max([np.ptp(way.points, axis=0) for way in ways], axis=0) > 0
-        if not moves.any() and all(at_rest.values()):
+        if not moves.any() and wish.rests_at("start") and wish.rests_at("goal"):
             raise PlanningError("start and goal are the same configuration")
         require_bounded(description, limits, self.objective, moves)
 
-    def _task(self, wish: _Wish, points: Array) -> Task:
+    def _task(self, wish: Wish, points: Array) -> Task:
         description, limits = self.description, wish.limits
-        loaded = wish.payload.carried(description) if wish.payload else description
-        T_start = _tool(description, points[0])
+        loaded = wish.loaded(description)
+        T_start = world_to_tool(description, points[0])
         parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
         duration = wish.duration
         if duration is None and not self.objective.has_time:
@@ -326,7 +315,7 @@ class Planner:
 
     def _best(
         self,
-        wish: _Wish,
+        wish: Wish,
         ways: Sequence[Route],
         warm: Trajectory | None,
         deadline: float,
@@ -368,52 +357,10 @@ class Planner:
         told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
         return best, told, seconds, (iterations, solves)
 
-    def _require_ends(self, wish: _Wish, points: Array) -> None:
-        loaded = wish.payload.carried(self.description) if wish.payload else self.description
-        if not wish.goal_velocity.any():
+    def _require_ends(self, wish: Wish, points: Array) -> None:
+        loaded = wish.loaded(self.description)
+        if wish.rests_at("goal"):
             require_holdable(loaded, wish.limits, points[-1], "goal")
         if wish.surroundings:
             for k, point in enumerate(points[1:], start=1):
                 wish.surroundings.require(self.description, point, "goal" if k == len(points) - 1 else f"via {k}")
-
-
-def checked_limits(description: Description, limits: Limits | None) -> Limits:
-    """Return limits, a robot's own where none are given.
-
-    Raises
-    ------
-    ValueError
-        Limits of another number of joints.
-    TypeError
-        Something else.
-    """
-    if limits is None:
-        return Limits.of(description)
-    if not isinstance(limits, Limits):
-        raise TypeError(f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like")
-    if len(limits.lower) != description.n:
-        raise ValueError(f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}")
-    return limits
-
-
-def _tool(description: Description, q: Array) -> Array:
-    from dhkit.description.frames import world_to_tool
-
-    return world_to_tool(description, q)
-
-
-def _positive(name: str, value: float | None) -> float | None:
-    if value is None:
-        return None
-    if not isinstance(value, Real) or not np.isfinite(float(value)) or not value > 0:
-        raise ValueError(f"{name} is {value!r}; expected a positive number, s")
-    return float(value)
-
-
-def _velocity(description: Description, value: ArrayLike | None, name: str) -> Array:
-    if value is None:
-        return np.zeros(description.n)
-    qd = joint_array(description, value, f"{name}_velocity")
-    if qd.shape != (description.n,) or not np.isfinite(qd).all():
-        raise ValueError(f"{name}_velocity: expected finite numbers, shape ({description.n},)")
-    return qd

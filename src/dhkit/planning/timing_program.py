@@ -15,10 +15,11 @@ import numpy as np
 
 from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description
-from dhkit.planning.constraints import Constraint, ToolSpeed
+from dhkit.planning.constraints import Constraint
 from dhkit.planning.objectives import Objective, Time
 from dhkit.planning.point import LOAD, Point
 from dhkit.planning.solver import Solver
+from dhkit.planning.tool_constraints import ToolSpeed
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.pieces import Side
 

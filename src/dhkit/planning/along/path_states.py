@@ -1,0 +1,71 @@
+"""A path and its arm's mechanics on a grid: torques along it are tau = m sdd + c sd^2 + g.
+
+Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit import dynamics, kinematics
+from dhkit.description import Array, Description
+from dhkit.trajectories import JointPath
+from dhkit.trajectories.pieces import Side
+
+__all__ = ["PathStates"]
+
+
+@dataclass(frozen=True, eq=False)
+class PathStates:
+    """A path and its arm's mechanics at both ends of K intervals: shapes (2, K, ...), left ends first."""
+
+    s: Array
+    """Shape (2, K)."""
+    q: Array
+    """Shape (2, K, n), rad and m."""
+    qs: Array
+    """Their derivatives by s."""
+    qss: Array
+    m: Array
+    """Torque for each sdd, shape (2, K, n); zeros without bodies."""
+    c: Array
+    """Torque for each sd^2."""
+    g: Array
+    """Torque that holds the arm."""
+    ps: Array
+    """The tool's derivatives by s, shape (2, K, 3), m; zeros where they are not asked for."""
+    pss: Array
+
+    @classmethod
+    def of(cls, description: Description, path: JointPath, knots: Array, *, torque: bool, tool: bool) -> PathStates:
+        """Work a path out on a grid; where it bends suddenly, each interval has its own side."""
+        first, second = path.pieces.derivative, path.pieces.derivative.derivative
+        ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
+        q, qs, qss = (np.stack([piece(s, side) for s, side in ends]) for piece in (path.pieces, first, second))
+        still = np.zeros_like(q)
+        m = c = g = still
+        if torque:
+            g = dynamics.inverse_dynamics(description, q, still, still)
+            m = dynamics.inverse_dynamics(description, q, still, qs) - g
+            c = dynamics.inverse_dynamics(description, q, qs, qss) - g
+        ps = pss = np.zeros((*q.shape[:2], 3))
+        if tool:
+            J, Jd = kinematics.jacobian(description, q), kinematics.jacobian_dot(description, q, qs)
+            ps = np.einsum("...ij,...j->...i", J[..., :3, :], qs)
+            pss = np.einsum("...ij,...j->...i", J[..., :3, :], qss) + np.einsum("...ij,...j->...i", Jd[..., :3, :], qs)
+        return cls(np.stack([knots[:-1], knots[1:]]), q, qs, qss, m, c, g, ps, pss)
+
+    @property
+    def steps(self) -> Array:
+        """The intervals' lengths, shape (K,)."""
+        steps: Array = self.s[1] - self.s[0]
+        return steps
+
+    @property
+    def coefficients(self) -> Array:
+        """What :class:`PathPoint` takes, a column for each end, shape (6 n + 6, 2 K)."""
+        parts = (self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss)
+        both = np.concatenate(parts, axis=-1)
+        return both.reshape(-1, both.shape[-1]).T

@@ -1,0 +1,160 @@
+"""What a motion along a path must keep, on a grid: bounds of the program's numbers and rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dhkit.description import Array, Description, world_to_tool
+from dhkit.planning.along.grid import even_speeds, knots_of
+from dhkit.planning.along.path_states import PathStates
+from dhkit.planning.along.program import SMALLEST, TimingProgram, timing_program
+from dhkit.planning.along.rows import TimingRows, speed_bounds, timing_rows, tool_speeds
+from dhkit.planning.along.terms import Terms
+from dhkit.planning.certificate import Checker
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.objectives import Objective
+from dhkit.planning.states import States
+from dhkit.planning.tool_constraints import ToolAcceleration, ToolSpeed
+from dhkit.trajectories import JointPath, Limits, Trajectory
+
+__all__ = ["TimingTask"]
+
+QUICKEST = Objective.of("time")
+ROOM = 0.5
+"""Share of the greatest speed at which a guess goes along its path."""
+
+
+@dataclass(frozen=True, eq=False)
+class TimingTask:
+    """A path, what its motion must keep, and both on a grid."""
+
+    description: Description
+    path: JointPath
+    objective: Objective
+    duration: float | None
+    limits: Limits
+    checker: Checker
+    needs: dict[str, bool]
+    """What is asked of :class:`PathStates`."""
+    states: PathStates
+    rows: list[TimingRows]
+    terms: Terms | None
+    quickest_terms: Terms | None
+    """Those of the constraints alone."""
+
+    @classmethod
+    def of(
+        cls,
+        description: Description,
+        path: JointPath,
+        objective: Objective,
+        duration: float | None,
+        limits: Limits,
+        constraints: tuple[Constraint, ...],
+        intervals: int,
+    ) -> TimingTask:
+        """Work a path out on a grid; there must be a motion along it, see :func:`require_path`."""
+        needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
+        torque = any((*needed, *np.isfinite(limits.torque)))
+        tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
+        needs = {"torque": torque, "tool": tool}
+        rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
+        states = PathStates.of(description, path, rough, **needs)
+        knots = knots_of(path, intervals, rough, even_speeds(states, limits, constraints))
+        states = PathStates.of(description, path, knots, **needs)
+        rows = timing_rows(states, limits)
+        T_start = world_to_tool(description, path.q(0.0)) if constraints else np.eye(4)
+        parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
+        others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
+        checker = Checker(description, limits, constraints, parameters)
+        terms, quickest = (Terms.of(description, wanted, others, limits) for wanted in (objective, QUICKEST))
+        return cls(description, path, objective, duration, limits, checker, needs, states, rows, terms, quickest)
+
+    @property
+    def intervals(self) -> int:
+        """Of the grid."""
+        return len(self.states.steps)
+
+    @property
+    def knots(self) -> Array:
+        """Where the grid's intervals end, shape (K+1,)."""
+        return np.append(self.states.s[0], 1.0)
+
+    @property
+    def still(self) -> States:
+        """The arm at rest at the grid's ends of intervals."""
+        q = self.states.q.reshape(-1, self.description.n)
+        return States(self.description, self.states.s.ravel(), q, 0 * q, 0 * q)
+
+    def shares(self, reserved: dict[str, Array], what: str, count: int) -> Array:
+        """Return what is kept in reserve of a limit in each interval, shape (K, count)."""
+        return reserved.get(what, np.zeros((self.intervals, count)))
+
+    def largest_b(self, reserved: dict[str, Array]) -> Array:
+        """Return the bounds of b by limits of speed, shape (K+1,)."""
+        tools = [(tool, self.shares(reserved, tool.what, 1)) for tool in tool_speeds(self.checker.constraints)]
+        return speed_bounds(self.states, self.limits, self.shares(reserved, "velocity", self.description.n), tools)
+
+    @property
+    def program(self) -> TimingProgram:
+        """The program that it asks for; made once."""
+        return timing_program(self.intervals, sum(int(row.limited.sum()) for row in self.rows), self.terms)
+
+    def halved(self, which: Array) -> TimingTask:
+        """Return the task on a grid some of whose intervals (K,) are halved."""
+        middles = (self.knots[1:] + self.knots[:-1])[which] / 2
+        knots = np.sort(np.concatenate([self.knots, middles]))
+        states = PathStates.of(self.description, self.path, knots, **self.needs)
+        return replace(self, states=states, rows=timing_rows(states, self.limits))
+
+    @property
+    def steps(self) -> list[TimingTask]:
+        """The tasks that are solved one after another: the quickest motion is where others start from."""
+        if self.objective.only_time and self.duration is None:
+            return [self]
+        return [replace(self, objective=QUICKEST, duration=None, terms=self.quickest_terms), self]
+
+    def usual_duration(self) -> float:
+        """Return about how long the motion takes, s: that of b = beta 4 s (1 - s), pi / (2 sqrt beta)."""
+        shape = 4 * self.knots * (1 - self.knots)
+        with np.errstate(divide="ignore"):
+            beta = min(float(np.min(self.largest_b({}) / shape)), *(row.largest(shape) for row in self.rows))
+        return float(np.pi / (2 * np.sqrt(ROOM * beta)))
+
+    def b_bounds(self, reserved: dict[str, Array], unit: float) -> tuple[Array, Array]:
+        """Return the bounds of b at the knots inside, in units of a time, shape (K-1,)."""
+        high = np.maximum(self.largest_b(reserved)[1:-1] * unit**2, 2 * SMALLEST)
+        return np.full_like(high, SMALLEST), high
+
+    def g_bounds(self, reserved: dict[str, Array]) -> tuple[Array, Array]:
+        """Return the bounds of the program's rows."""
+        n = self.description.n
+        linear = [row.bounds(self.shares(reserved, row.what, n)) for row in self.rows]
+        parts = [[np.concatenate(side, axis=-1).ravel() for side in zip(*linear, strict=True)]]
+        if self.terms is not None:
+            low: list[Array] = []
+            high: list[Array] = []
+            for constraint, count in zip(self.terms.constraints, self.terms.counts, strict=True):
+                most = np.tile(1 - self.shares(reserved, constraint.what, count), (2, 1, 1))
+                high.append(most)
+                low.append(-most if constraint.low == -1 else np.full_like(most, constraint.low))
+            if high:
+                parts.append([np.concatenate(side, axis=-1).ravel() for side in (low, high)])
+        # In least time the intervals may as well take less than the duration, which keeps the program convex.
+        parts.append([np.array([-np.inf if self.objective.only_time else 0.0]), np.zeros(1)])
+        bounds = [np.concatenate(side) for side in zip(*parts, strict=True)]
+        return bounds[0], bounds[1]
+
+    def motion(self, b: Array) -> tuple[Trajectory, Array]:
+        """Return the motion with b at all knots, shape (K+1,), 1/s^2, and when its intervals end, likewise, s."""
+        speed, steps = np.sqrt(b), self.states.steps
+        sdd = (speed[1:] - speed[:-1]) * (speed[1:] + speed[:-1]) / (2 * steps)
+        ends = np.concatenate([[0.0], np.cumsum(2 * steps / (speed[1:] + speed[:-1]))])
+        law = np.stack([self.knots[:-1], speed[:-1], sdd / 2], axis=1)
+        trajectory = self.path.timed(ends, law)
+        if self.duration is not None:
+            c = self.duration / ends[-1]
+            return trajectory.slowed(c), ends * c
+        return trajectory, ends
