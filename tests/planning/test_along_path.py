@@ -17,8 +17,8 @@ from dhkit.planning import (
     ToolOrientation,
     ToolSpeed,
     TorqueSpeedLine,
+    along_path,
 )
-from dhkit.planning.along_path import along_path
 from dhkit.trajectories import JointPath, Limits, joint_path, tool_line
 from trajectories_reference import reference_torques
 
@@ -41,18 +41,14 @@ WRIST = np.array([[-0.325, 2.415, 0.449, 1.812, -0.376, -0.035], [-0.149, 1.976,
 STRONG = Limits.of(COBRA, velocity=np.inf, torque=2e3)
 
 
-def straight(description, q0, q1):
-    q0, q1 = np.asarray(q0, dtype=float), np.asarray(q1, dtype=float)
-    return JointPath(description, [0, 1], [[q0, q1 - q0]])
-
-
 def slide(d):
-    return straight(COBRA, HOME, HOME + d * np.eye(4)[SLIDE])
+    return JointPath.straight(COBRA, HOME, HOME + d * np.eye(4)[SLIDE])
 
 
 def random_straight(description, seed):
     limits = Limits.of(description)
-    return straight(description, *np.random.default_rng(seed).uniform(limits.lower, limits.upper, (2, description.n)))
+    ends = np.random.default_rng(seed).uniform(limits.lower, limits.upper, (2, description.n))
+    return JointPath.straight(description, *ends)
 
 
 def line_of(name):
@@ -314,13 +310,13 @@ def test_an_exception_in_progress_ends_it(tool_motion):
 
 def test_too_weak_an_arm_is_named():
     # From hanging down past the horizontal, with half of what holds it there.
-    path = straight(ARM, [-np.pi / 2, 0.0], [np.pi / 2, 0.0])
+    path = JointPath.straight(ARM, [-np.pi / 2, 0.0], [np.pi / 2, 0.0])
     most = np.abs(gravity_torque(ARM, [0.0, 0.0]))
     limits = Limits.of(ARM, torque=most / 2, velocity=np.inf)
-    with pytest.raises(PlanningError, match=rf"^joint {ARM.joints[0].name} cannot hold the arm at s = 0\.5: it takes"):
+    with pytest.raises(PlanningError, match=rf"at s = 0\.5: joint {ARM.joints[0].name} cannot hold the arm there"):
         along_path(ARM, path, limits=limits)
     with pytest.raises(PlanningError, match=r"the path's end: joint .* cannot hold the arm"):
-        along_path(ARM, straight(ARM, [-np.pi / 2, 0.0], [0.0, 0.0]), limits=limits)
+        along_path(ARM, JointPath.straight(ARM, [-np.pi / 2, 0.0], [0.0, 0.0]), limits=limits)
 
 
 CORNER = JointPath(ARM, [0, 0.5, 1], [[[0, 0], [1, 0]], [[0.5, 0], [0, 1]]])
@@ -336,6 +332,7 @@ SPIKE = JointPath(
         [[-0.75 + W * (1 + PEAK), 0], [0.5, 0], [0, 0]],
     ],
 )
+SHORT = JointPath.straight(ARM, [0, 0], [1, 0])
 LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
 
 
@@ -345,12 +342,12 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
         (CORNER, {}, "corner at s = 0.5"),
         (LINGERS, {}, "stands still at s = 0:"),
         (SPIKE, {}, "singular at s = 0.5: joint .* turns ever faster"),
-        (straight(ARM, [0, 0], [9, 0]), {}, "leaves its upper limit"),
-        (straight(ARM, [0, 0], [1, 0]), {"limits": Limits.of(ARM, jerk=9.0)}, "jerk is limited"),
-        (straight(ARM, [0, 0], [1, 0]), {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
-        (straight(ARM, [0, 0], [1, 0]), {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
-        (straight(ARM, [0, 0], [1, 0]), {"time_limit": 0.0}, "time limit"),
-        (straight(ARM, [0, 0], [1, 0]), {"constraints": [ToolOrientation(0.1)]}, "tool orientation is exceeded"),
+        (JointPath.straight(ARM, [0, 0], [9, 0]), {}, "the path at s = 1: joint .* above its upper limit"),
+        (SHORT, {"limits": Limits.of(ARM, jerk=9.0)}, "jerk is limited"),
+        (SHORT, {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
+        (SHORT, {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
+        (SHORT, {"time_limit": 0.0}, "time limit"),
+        (SHORT, {"constraints": [ToolOrientation(0.1)]}, "tool orientation is exceeded"),
     ],
 )
 def test_what_is_in_the_way_is_said(path, options, words):
@@ -370,12 +367,12 @@ def test_what_is_in_the_way_is_said(path, options, words):
 )
 def test_senseless_wishes_are_refused(options, words):
     with pytest.raises(ValueError, match=words):
-        along_path(ARM, straight(ARM, [0, 0], [1, 0]), **options)
+        along_path(ARM, SHORT, **options)
 
 
 def test_another_arm_is_refused():
     with pytest.raises(ValueError, match="2 joints; expected 6"):
-        along_path(PUMA, straight(ARM, [0, 0], [1, 0]))
+        along_path(PUMA, SHORT)
 
 
 def test_a_kept_direction_is_no_hindrance():

@@ -1,6 +1,6 @@
 """Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
 
-from dhkit.planning.along_path import along_path
+from dhkit.planning.along import along_path
 from dhkit.planning.constraints import Constraint, MotorPower, TorqueSpeedLine
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance

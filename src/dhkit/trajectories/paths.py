@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
 from dhkit.trajectories.pieces import Pieces, shifted
+from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
 
 __all__ = ["JointPath", "quintic_law"]
@@ -54,6 +55,26 @@ class JointPath:
             raise ValueError(f"breaks end with {pieces.end:g}; expected 1")
         for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def straight(cls, description: Description, q0: ArrayLike, q1: ArrayLike) -> JointPath:
+        """Return the straight line between two configurations, shape (n,), rad and m.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, or values that are not finite.
+        TypeError
+            Not numbers.
+
+        Examples
+        --------
+        >>> from dhkit.description import library_robot
+        >>> JointPath.straight(library_robot("planar2r"), [0, 1], [1, 3]).q(0.5)
+        array([0.5, 2. ])
+        """
+        start, goal = configuration(description, q0, "q0"), configuration(description, q1, "q1")
+        return cls(description, np.array([0.0, 1.0]), np.stack([start, goal - start])[None])
 
     def q(self, s: ArrayLike) -> Array:
         """Return joint values, shape (..., n), rad and m, for s of shape (...)."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NoReturn
+
 import numpy as np
 
 from dhkit.description import Array, Description
@@ -14,25 +16,44 @@ from dhkit.planning.search import FEASIBLE
 from dhkit.planning.solver import Solution
 from dhkit.trajectories import JointPath, Limits
 
-__all__ = ["not_converged", "require_kept", "require_path"]
+__all__ = ["refuse", "require_kept", "require_path"]
 
 STANDS_STILL, TOO_STEEP = 1e-6, 1e4
 """Of the path's mean derivative: below the one the path stands still, above the other it is singular."""
 
 
 def require_path(description: Description, path: JointPath, limits: Limits) -> None:
-    """Refuse a path that no motion can follow from rest to rest without stopping."""
-    names = [joint.name for joint in description.joints]
+    """Refuse a path that no motion can follow from rest to rest without stopping.
+
+    Raises
+    ------
+    PlanningError
+        Jerk is limited, the path leaves the joint limits, has a corner, stands still or is singular, or the arm cannot
+        hold itself at one of its ends.
+    """
     if np.isfinite(limits.jerk).any():
         raise PlanningError("jerk is limited: along a path accelerations jump; give limits without those of jerk")
-    _require_inside(path, limits)
-    jumps = np.abs(_jumps(path, 1))
-    if jumps.size and jumps.max() > CORNER * np.abs(path.qs(path.breaks)).max():
-        k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
+    s, q = (array.reshape(-1, description.n) for array in path.pieces.turning())
+    k, i = np.unravel_index(int(np.argmax(np.maximum(limits.lower - q, q - limits.upper))), q.shape)
+    require_inside_limits(description, limits, q[k], f"the path at s = {s[k, i]:.4g}")
+    _require_no_corner(path)
+    _require_regular(path)
+    for where, end in (("the path's beginning", 0.0), ("the path's end", 1.0)):
+        require_holdable(description, limits, path.q(end), where)
+
+
+def _require_no_corner(path: JointPath) -> None:
+    steps = np.abs(jumps(path, 1))
+    if steps.size and steps.max() > CORNER * np.abs(path.qs(path.breaks)).max():
+        k, i = np.unravel_index(int(np.argmax(steps)), steps.shape)
         raise PlanningError(
-            f"the path has a corner at s = {path.breaks[k + 1]:.4g}, where joint {names[i]} turns suddenly: "
-            "plan to it and on from it"
+            f"the path has a corner at s = {path.breaks[k + 1]:.4g}, where joint {path.description.joints[i].name} "
+            "turns suddenly: plan to it and on from it"
         )
+
+
+def _require_regular(path: JointPath) -> None:
+    """Refuse a path whose derivative by s vanishes somewhere, or is huge."""
     s, slopes = path.pieces.derivative.inside(POINTS)
     steepness = np.abs(slopes).max(axis=2)
     mean = float(np.sum(steepness.mean(axis=1) * np.diff(path.breaks)))
@@ -42,30 +63,21 @@ def require_path(description: Description, path: JointPath, limits: Limits) -> N
         )
     if steepness.max() > TOO_STEEP * mean:
         k, j, i = np.unravel_index(int(np.argmax(np.abs(slopes))), slopes.shape)
-        raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {names[i]} turns ever faster there")
-    for where, q in (("the path's beginning", path.q(0.0)), ("the path's end", path.q(1.0))):
-        require_holdable(description, limits, q, where)
-
-
-def _require_inside(path: JointPath, limits: Limits) -> None:
-    """Refuse a path that leaves the joint limits."""
-    s, q = (array.reshape(-1, path.description.n) for array in path.pieces.turning())
-    excess = np.maximum(limits.lower - q, q - limits.upper)
-    if excess.max() <= OUTSIDE:
-        return
-    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    side, limit = ("lower", limits.lower[i]) if q[k, i] < limits.lower[i] else ("upper", limits.upper[i])
-    raise PlanningError(
-        f"{path.description.joints[i].name} leaves its {side} limit, {limit:.6g} {unit_of(path.description, int(i))}, "
-        f"along the path: it comes to {q[k, i]:.6g} at s = {s[k, i]:.4g}"
-    )
+        name = path.description.joints[i].name
+        raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there")
 
 
 def require_kept(task: TimingTask) -> None:
-    """Refuse a path that breaks a constraint at any speed, and one that nothing keeps from being jumped along."""
+    """Refuse a path that breaks a constraint at any speed, and one that nothing keeps from being jumped along.
+
+    Raises
+    ------
+    PlanningError
+        Names the constraint and the place.
+    """
     resting = {constraint.what for constraint in task.checker.constraints if not constraint.moving}
     for what, use in task.checker.measured(task.still) if resting else []:
-        if what in resting and use.max() > 1 + CORNER:
+        if what in resting and use.max() > 1 + BARELY:
             s = task.states.s.flat[int(np.argmax(use.max(axis=1)))]
             raise PlanningError(f"{what} is exceeded by {100 * (use.max() - 1):.2g} % at s = {s:.4g}, at any speed")
     moves = np.abs(task.states.qs).max(axis=(0, 1)) > 0
@@ -76,17 +88,18 @@ def require_kept(task: TimingTask) -> None:
         )
 
 
-def not_converged(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) -> PlanningError:
-    """Say what stands in the way: a joint that cannot hold the arm, or else the row that misses its bounds most."""
-    names = [joint.name for joint in task.description.joints]
-    use = np.abs(task.states.g) / task.limits.torque
-    if use.max() > 1:
-        end, k, i = np.unravel_index(int(np.argmax(use)), use.shape)
-        unit = "N" if task.description.numbers.prismatic[i] else "N m"
-        return PlanningError(
-            f"joint {names[i]} cannot hold the arm at s = {task.states.s[end, k]:.4g}: it takes "
-            f"{abs(task.states.g[end, k, i]):.5g} {unit}, its limit is {task.limits.torque[i]:.5g} {unit}"
-        )
+def refuse(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) -> NoReturn:
+    """Say what stands in the way: a joint that cannot hold the arm, or else the row that misses its bounds most.
+
+    Raises
+    ------
+    PlanningError
+        Always.
+    """
+    states, names = task.states, [joint.name for joint in task.description.joints]
+    use = np.abs(states.g) / task.limits.torque
+    end, k, _ = np.unravel_index(int(np.argmax(use)), use.shape)
+    require_holdable(task.description, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")
     rows = [(row.what, names[i]) for row in task.rows for i in np.flatnonzero(row.limited)]
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)[: 2 * task.intervals * len(rows)]
@@ -94,5 +107,5 @@ def not_converged(task: TimingTask, solution: Solution, bounds: tuple[Array, Arr
     if misses.size and misses.max() > FEASIBLE:
         end, k, i = np.unravel_index(int(np.argmax(misses)), (2, task.intervals, len(rows)))
         what, joint = rows[i]
-        where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {task.states.s[end, k]:.4g}"
-    return PlanningError(f"not converged ({solution.status} after {solution.iterations} iterations){where}")
+        where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {states.s[end, k]:.4g}"
+    raise PlanningError(f"not converged ({solution.status} after {solution.iterations} iterations){where}")

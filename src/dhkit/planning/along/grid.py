@@ -21,8 +21,8 @@ EVENLY, TINY = 0.3, 1e-12
 def jumps(path: JointPath, order: int) -> Array:
     """Return by how much a derivative jumps at each inner break, shape (K-1, n)."""
     pieces, inside = path.pieces.differentiated(order), path.breaks[1:-1]
-    jumps: Array = pieces(inside) - pieces(inside, "left")
-    return jumps
+    steps: Array = pieces(inside) - pieces(inside, "left")
+    return steps
 
 
 def even_speeds(states: PathStates, limits: Limits, constraints: tuple[Constraint, ...]) -> Array:

@@ -82,7 +82,7 @@ def along_path(
     --------
     >>> from dhkit.description import library_robot
     >>> arm = library_robot("planar2r")
-    >>> path = JointPath(arm, [0, 1], [[[0.2, 1.2], [0.5, -1.0]]])
+    >>> path = JointPath.straight(arm, [0.2, 1.2], [0.7, 0.2])
     >>> motion = along_path(arm, path, intervals=50)
     >>> motion.report.certificate.ok
     True
@@ -100,7 +100,8 @@ def along_path(
         )
     wanted = Objective.of(objective)
     _require_objective(wanted, duration)
-    limits = limits or default_limits(description)
+    limits = checked_limits(description, limits or default_limits(description))
+    require_path(description, path, limits)
     task = TimingTask.of(description, path, wanted, duration, limits, tuple(constraints), intervals)
     require_kept(task)
     building = time.perf_counter()
@@ -127,7 +128,7 @@ def along_path(
 
 
 def _require_objective(objective: Objective, duration: float | None) -> None:
-    check_duration(duration)
+    positive_seconds("duration", duration)
     if not all(isinstance(term, Time | Effort) for term in objective.terms):
         raise ValueError(f"objective is {objective}; expected time and effort along a path")
     if not objective.has_time and duration is None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import PlanningError
-from dhkit.planning.along.checks import not_converged
+from dhkit.planning.along.checks import refuse
 from dhkit.planning.along.excesses import POINTS, excesses, peaks
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.certificate import Certificate
@@ -118,7 +118,7 @@ def _solution(
     except Stopped:
         raise PlanningError("no motion along the path was found within the time limit") from None
     if not solution.converged or solution.infeasibility > FEASIBLE:
-        raise not_converged(task, solution, rows)
+        refuse(task, solution, rows)
     return solution
 
 
@@ -141,7 +141,9 @@ def _made_good(task: TimingTask, trajectory: Trajectory, most: float) -> tuple[T
     return None
 
 
-def _wider(task: TimingTask, reserved: dict[str, Array], excess: dict[str, Array]) -> tuple[TimingTask, dict[str, Array]]:
+def _wider(
+    task: TimingTask, reserved: dict[str, Array], excess: dict[str, Array]
+) -> tuple[TimingTask, dict[str, Array]]:
     """Return a task with intervals halved where limits are exceeded much, and what to keep in reserve elsewhere."""
     much = np.any([(share > SMALL_STEP).any(axis=1) for share in excess.values()], axis=0)
     if task.intervals + much.sum() > 2 * MOST:

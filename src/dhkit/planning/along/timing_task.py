@@ -55,7 +55,7 @@ class TimingTask:
         constraints: tuple[Constraint, ...],
         intervals: int,
     ) -> TimingTask:
-        """Work a path out on a grid; there must be a motion along it, see :func:`require_path`."""
+        """Work a path out on a grid; there must be a motion along it, see ``checks.py``."""
         needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
         torque = any((*needed, *np.isfinite(limits.torque)))
         tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
