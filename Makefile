@@ -34,6 +34,7 @@ accept: $(READY)  ## the laws at full size; writes benchmarks/results/acceptance
 bench: $(BENCH_READY)  ## kinematics and dynamics beside their peers; writes benchmarks/results/
 	$(BIN)/python benchmarks/kinematics.py $(ARGS)
 	$(BIN)/python benchmarks/dynamics.py $(ARGS)
+	$(BIN)/python benchmarks/planning.py
 
 $(BENCH_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'

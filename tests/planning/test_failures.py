@@ -32,11 +32,11 @@ def refused(message, call, kind=PlanningError):
 
 
 def test_a_start_or_goal_outside_the_limits(planner):
-    outside = GOAL + [3.0, 0, 0, 0, 0, 0]
+    outside = np.add(GOAL, [3.0, 0, 0, 0, 0, 0])
     refused(
         r"^goal: joint waist is at 4.2 rad, above its upper limit, 2.79253 rad$", lambda: planner.solve(START, outside)
     )
-    low = START - [0, 2.0, 0, 0, 0, 0]
+    low = np.subtract(START, [0, 2.0, 0, 0, 0, 0])
     refused(
         r"^start: joint shoulder is at -1.2 rad, below its lower limit, -0.785398 rad$",
         lambda: planner.solve(low, GOAL),

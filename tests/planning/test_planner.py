@@ -85,7 +85,7 @@ def test_poses_on_the_way(planner):
 def test_seven_joints_reach_a_pose():
     arm = library_robot("panda")
     start = np.array([0, -0.4, 0, -1.8, 0, 1.4, 0.5])
-    T = world_to_tool(arm, start + [0.4, 0.2, -0.3, 0.3, 0.2, 0.2, -0.4])
+    T = world_to_tool(arm, np.add(start, [0.4, 0.2, -0.3, 0.3, 0.2, 0.2, -0.4]))
     motion = Planner(arm, intervals=12).solve(start, T, time_limit=30)
     assert np.abs(world_to_tool(arm, motion.q(motion.duration)) - T).max() < 1e-8
     kept(arm, motion, Limits.of(arm))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Knots", "Problem", "Rows"]
 
-CALM = 1e-4
+CALM = 1e-3
 """Share of the objective that accelerations have in least time or energy: joints with slack then move calmly."""
 TINY_TIME = 1e-4
 """s: the shortest duration of a leg."""

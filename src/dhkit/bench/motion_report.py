@@ -1,0 +1,135 @@
+"""What the benchmark of motions found, for people (text, Markdown) and machines (JSON)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+from dhkit.bench.machine import Machine
+from dhkit.bench.report import Missing, Table, _listed, _markdown_table, _text_table, duration
+
+__all__ = ["MeshBuild", "MotionReport", "MotionRow"]
+
+MEANING = (
+    "Over fine: the motion's duration over that of the planner's on the fine mesh, between the same configurations. "
+    "Time: of one call that finds it, everything included; the programs are made before, once for an arm, as Programs "
+    "says. The fine mesh starts from the usual one's motion. Excess: by what share of a limit of speed or torque a "
+    "motion exceeds it at worst, at 1 kHz by Pinocchio."
+)
+
+
+@dataclass(frozen=True)
+class MotionRow:
+    """One contender's figures at one speed."""
+
+    COLUMNS: ClassVar[tuple[str, ...]] = ("motion", "found", "over fine, mean", "max", "excess", "time, median", "95 %")
+    speed: float
+    """Times the robot's speed limits."""
+    contender: str
+    pairs: int
+    found: int
+    """Pairs between which it found a motion."""
+    mean: float
+    """Of its durations over the fine mesh's."""
+    most: float
+    """The largest of those."""
+    excess: float
+    """By what share of a limit its motions exceed it at worst; negative: what is left."""
+    seconds: float
+    """The median time to find one."""
+    late: float
+    """Within which 95 % are found, s."""
+
+    @property
+    def cells(self) -> list[str]:
+        """A line of a table under :attr:`COLUMNS`."""
+        return [
+            self.contender,
+            f"{self.found} of {self.pairs}",
+            f"{self.mean:.4f}",
+            f"{self.most:.4f}",
+            f"{max(self.excess, 0.0):.0e}",
+            duration(self.seconds),
+            duration(self.late),
+        ]
+
+
+@dataclass(frozen=True)
+class MeshBuild:
+    """How long a planner's program takes to make."""
+
+    COLUMNS: ClassVar[tuple[str, ...]] = ("intervals", "time to make")
+    intervals: int
+    seconds: float
+
+    @property
+    def cells(self) -> list[str]:
+        """A line of a table under :attr:`COLUMNS`."""
+        return [str(self.intervals), duration(self.seconds)]
+
+
+@dataclass(frozen=True)
+class MotionReport:
+    """Motions in least time beside others; one robot, one process, one core."""
+
+    robot: str
+    pairs: int
+    """Starts and goals at each speed."""
+    seed: int
+    """Of those."""
+    rows: tuple[MotionRow, ...]
+    builds: tuple[MeshBuild, ...]
+    missing: tuple[Missing, ...]
+    machine: Machine
+    interrupted: bool = False
+
+    def json(self) -> dict[str, Any]:
+        """Return everything as what JSON knows."""
+        listed: dict[str, Any] = _listed(asdict(self))
+        return listed
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+        parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
+        for heading, columns, cells in self._tables:
+            parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
+        return "\n".join([*parts, MEANING, ""])
+
+    def __str__(self) -> str:
+        parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
+        for heading, columns, cells in self._tables:
+            parts += [heading, *_text_table(columns, cells), ""]
+        return "\n".join([*parts, MEANING])
+
+    @property
+    def _title(self) -> str:
+        ending = " (interrupted)" if self.interrupted else ""
+        return f"{self.robot}: motions in least time beside others, {self.pairs} random pairs, one core{ending}"
+
+    @property
+    def _facts(self) -> list[str]:
+        machine = self.machine
+        return [
+            f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
+            f"{machine.system}, {machine.python}, kernels {'on' if machine.kernels else 'off'}",
+            ", ".join(f"{name} {version}" for name, version in machine.packages.items()),
+        ]
+
+    @property
+    def _tables(self) -> list[Table]:
+        """Headings, columns and cells of the tables that have something to show."""
+        columns: Sequence[str] = MotionRow.COLUMNS
+        tables: list[Table] = [
+            (_heading(speed), columns, [row.cells for row in self.rows if row.speed == speed])
+            for speed in dict.fromkeys(row.speed for row in self.rows)
+        ]
+        tables += [
+            ("Programs", MeshBuild.COLUMNS, [build.cells for build in self.builds]),
+            ("Did not take part", ("who", "why"), [[gap.name, gap.reason] for gap in self.missing]),
+        ]
+        return [table for table in tables if table[2]]
+
+
+def _heading(speed: float) -> str:
+    return "The robot's own limits" if speed == 1 else f"{speed:g} times its speed limits"
