@@ -12,7 +12,7 @@ from dhkit.description import library_robot
 from dhkit.dynamics import gravity_torque
 
 PUMA = library_robot("puma560")
-KEPT = 1e-5
+KEPT = 1e-4
 """By what share of a limit toppra's motions may exceed it between points."""
 
 

@@ -15,7 +15,7 @@ MEANING = (
     "Over fine: the motion's duration over that of the planner's on the fine mesh, between the same configurations. "
     "Time: of one call that finds it, everything included; the programs are made before, once for an arm, as Programs "
     "says. The fine mesh starts from the usual one's motion. Excess: by what share of a limit of speed or torque a "
-    "motion exceeds it at worst, at 1 kHz by Pinocchio."
+    "motion exceeds it at worst, at 10 kHz by Pinocchio."
 )
 
 

@@ -38,7 +38,7 @@ FINE_SECONDS = 120.0
 """s a motion on the fine mesh may take."""
 HELD = 0.95
 """Of their limits that torques may need to hold an arm."""
-RATE = 1000.0
+RATE = 1e4
 """Hz: where motions are held against their limits."""
 BUILDS = 3
 PEERS = ("casadi", "toppra")

@@ -79,15 +79,17 @@ class Checker:
     parameters: tuple[Array, ...] = ()
     friction: Friction | None = None
     surroundings: Surroundings = NOTHING
+    points: int = POINTS
+    """States an interval, both its ends included."""
 
-    def states(self, trajectory: Trajectory, points: int = POINTS) -> States:
-        """Return a motion's states on a grid of so many times an interval, both sides of each break."""
-        s = np.linspace(0.0, 1.0, points)
+    def states(self, trajectory: Trajectory) -> States:
+        """Return a motion's states on the grid, both sides of each break."""
+        s = np.linspace(0.0, 1.0, self.points)
         breaks = trajectory.breaks
         t = breaks[:-1, None] + np.diff(breaks)[:, None] * s
         # A break belongs to both its intervals: the last state of each comes from the left.
         inside = States.of(self.description, trajectory, t[:, :-1], self.friction, "right")
-        return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), points)
+        return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), self.points)
 
     def measured(self, states: States) -> list[tuple[str, Array]]:
         """Return every kind of limit with its use, shape (N, k): 1 where the limit is reached."""
@@ -108,6 +110,13 @@ class Checker:
             found.append(("clearance", 1 + short[:, None] / max(self.description.reach, TINY)))
         return found
 
+    def peaks(self, states: States) -> list[tuple[str, Array]]:
+        """Return the same of a grid's states, raised by what is missed between them.
+
+        Between states of an interval a use is as high as the parabola through three of them.
+        """
+        return [(what, use + _rises(use, self.points)) for what, use in self.measured(states)]
+
     def positions(self, states: States) -> Array:
         """Return by what share of its range each joint leaves it, shape (N, n); negative inside."""
         lower, upper = self.limits.lower, self.limits.upper
@@ -127,7 +136,7 @@ class Checker:
             jerk = np.abs(_jerks(trajectory)) / self.limits.jerk
             k, i = np.unravel_index(int(np.argmax(jerk)), jerk.shape)
             checks.append(Check("jerk", float(jerk[k, i] - 1), int(i), float(trajectory.breaks[k // 2])))
-        for what, use in self.measured(states):
+        for what, use in self.peaks(states):
             checks.append(_check(what, use - 1, states.times))
             reached = use >= ACTIVE
             anywhere |= reached.any(axis=1)
@@ -161,7 +170,16 @@ class Checker:
     def _moving(self, states: States) -> list[tuple[str, Array]]:
         resting = {constraint.what for constraint in self.constraints if not constraint.moving}
         moving = replace(self, surroundings=NOTHING)
-        return [(what, use) for what, use in moving.measured(states) if what not in resting]
+        return [(what, use) for what, use in moving.peaks(states) if what not in resting]
+
+
+def _rises(use: Array, points: int) -> Array:
+    """Return how much higher than each value, (N, k), the vertex of the parabola through it and its neighbours is."""
+    values = use.reshape(-1, points, use.shape[1])
+    slope, bend = (values[:, 2:] - values[:, :-2]) / 2, np.diff(values, 2, axis=1)
+    inside = (bend < 0) & (np.abs(slope) < np.abs(bend))
+    rises = np.divide(slope**2, -2 * bend, out=np.zeros_like(bend), where=inside)
+    return np.pad(rises, ((0, 0), (1, 1), (0, 0))).reshape(use.shape)
 
 
 def _check(what: str, excess: Array, times: Array) -> Check:

@@ -177,7 +177,7 @@ class Search:
         """Return margins that are wider by a multiple of what a motion exceeds in each interval."""
         checker = self.task.checker
         states = checker.states(trajectory)
-        excesses = [(what, use - 1) for what, use in checker.measured(states) if what != "clearance"]
+        excesses = [(what, use - 1) for what, use in checker.peaks(states) if what != "clearance"]
         for what, excess in [*excesses, ("position", checker.positions(states))]:
             worst = excess.reshape(margins.mesh.intervals, -1, excess.shape[1]).max(axis=1)
             if (worst > 0).any():

@@ -8,9 +8,8 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
-from dhkit.planning.along.excesses import POINTS
 from dhkit.planning.along.grid import CORNER, jumps
-from dhkit.planning.along.timing_task import TimingTask
+from dhkit.planning.along.timing_task import POINTS, TimingTask
 from dhkit.planning.feasibility import BARELY, require_holdable, require_inside_limits
 from dhkit.planning.search import FEASIBLE
 from dhkit.planning.solver import Solution

@@ -9,7 +9,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.along.checks import refuse
-from dhkit.planning.along.excesses import POINTS, excesses, peaks
+from dhkit.planning.along.excesses import excesses
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.costs import cost_of
@@ -87,7 +87,7 @@ def _certified(task: TimingTask, quickest: Found | None, deadline: float, progre
         if made is not None:
             slower, certificate, c = made
             return Found(slower, task.knots, b / c**2, certificate, c, tuple(tightened), iterations, solves)
-        states = task.checker.states(trajectory, POINTS)
+        states = task.checker.states(trajectory)
         excess = excesses(task, states, trajectory.breaks, ends)
         tightened += [what for what, share in excess.items() if (share > 0).any() and what not in tightened]
         knots = task.knots
@@ -127,8 +127,8 @@ def _made_good(task: TimingTask, trajectory: Trajectory, most: float) -> tuple[T
     c = 1.0
     for _ in range(TRIES):
         slower = trajectory if c == 1.0 else trajectory.slowed(c)
-        states = task.checker.states(slower, POINTS)
-        over = max((float(peak.max()) for _, peak in peaks(task.checker, states)), default=0.0)
+        states = task.checker.states(slower)
+        over = max((float(use.max()) - 1 for _, use in task.checker.peaks(states)), default=0.0)
         if over <= SLACK:
             certificate = task.checker.check(slower, states)
             return (slower, certificate, c) if certificate.ok else None

@@ -19,9 +19,11 @@ from dhkit.planning.states import States
 from dhkit.planning.tool_constraints import ToolAcceleration, ToolSpeed
 from dhkit.trajectories import JointPath, Limits, Trajectory
 
-__all__ = ["TimingTask"]
+__all__ = ["POINTS", "TimingTask"]
 
 QUICKEST = Objective.of("time")
+POINTS = 8
+"""States an interval by which a motion is certified: intervals are many."""
 ROOM = 0.5
 """Share of the greatest speed at which a guess goes along its path."""
 
@@ -68,7 +70,7 @@ class TimingTask:
         T_start = world_to_tool(description, path.q(0.0)) if constraints else np.eye(4)
         parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
         others = tuple(c for c in constraints if c.moving and not isinstance(c, ToolSpeed))
-        checker = Checker(description, limits, constraints, parameters)
+        checker = Checker(description, limits, constraints, parameters, points=POINTS)
         terms, quickest = (Terms.of(description, wanted, others, limits) for wanted in (objective, QUICKEST))
         return cls(description, path, objective, duration, limits, checker, needs, states, rows, terms, quickest)
 
