@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from dhkit.planning.search import Search
 from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.trajectories import Trajectory, quintic, trapezoidal
-
-if TYPE_CHECKING:
-    from dhkit.planning.planner import Planner
 
 __all__ = ["classical", "coarser"]
 
@@ -47,15 +43,12 @@ def classical(task: Task) -> tuple[tuple[str, float], ...]:
     return tuple(found)
 
 
-def coarser(planner: Planner, task: Task, motion: Trajectory, deadline: float) -> tuple[int, float] | None:
-    """Return a mesh of half as many intervals and the cost on it; nothing where the time is over."""
-    usual = planner.intervals_for(task)
-    intervals = max(6, usual // 2)
-    if time.perf_counter() > deadline or intervals == usual:
+def coarser(search: Search, motion: Trajectory) -> tuple[int, float] | None:
+    """Return the intervals of a coarser program and a motion's cost on it; nothing where the time is over."""
+    if time.perf_counter() > search.deadline:
         return None
     try:
-        program, made = planner.program(task, intervals)
-        found = Search(task, program, deadline + made)(motion)
+        found = search(motion)
     except PlanningError:
         return None
     return len(found.trajectory.breaks) - 1, found.cost

@@ -49,7 +49,7 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 """Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
 USUAL = 48
 """Intervals of arms of six joints; of fewer joints more, as they cost less."""
-LEAST_USUAL = 24
+LEAST, MOST, LEAST_USUAL = 6, 2000, 24
 NUMBERS = 384
 """Joints times intervals: what arms of few joints get."""
 LEISURELY = 2.0
@@ -104,8 +104,8 @@ class Planner:
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> None:
-        if intervals is not None and (type(intervals) is not int or not 6 <= intervals <= 2000):
-            raise ValueError(f"intervals is {intervals!r}; expected a whole number from 6 to 2000")
+        if intervals is not None and (type(intervals) is not int or not LEAST <= intervals <= MOST):
+            raise ValueError(f"intervals is {intervals!r}; expected a whole number from {LEAST} to {MOST}")
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
@@ -222,8 +222,7 @@ class Planner:
             branches=branches,
         )
         if compare:
-            coarse = coarser(self, task, best.trajectory, deadline)
-            report = replace(report, classical=classical(task), coarse=coarse)
+            report = replace(report, classical=classical(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report)
 
     # Programs
@@ -356,6 +355,13 @@ class Planner:
             raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}")
         told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
         return best, told, seconds, (iterations, solves)
+
+    def _coarse(self, task: Task, best: Found, deadline: float) -> tuple[int, float] | None:
+        half = max(LEAST, self.intervals_for(task) // 2)
+        if half == self.intervals_for(task):
+            return None
+        program, made = self.program(task, half)
+        return coarser(Search(task, program, deadline + made), best.trajectory)
 
     def _require_ends(self, wish: Wish, points: Array) -> None:
         loaded = wish.loaded(self.description)
