@@ -116,11 +116,13 @@ def test_no_way_around_an_obstacle(seconds):
     assert time.perf_counter() - began < seconds + 5
 
 
-def test_not_converged(planner):
-    """Too little time for what the torques give, though not for the speeds."""
+def test_not_converged():
+    """Too fast to stop before the wall."""
+    arm = slide()
+    limits = Limits.of(arm, acceleration=1.0, upper=2.0, lower=-2.0)
     refused(
-        r"^not converged \(.*, \d+ iterations\): [\w ]+ misses its bound by [\d.e+-]+ at \d+ % of the way$",
-        lambda: Planner(PUMA, "effort", intervals=8).solve(START, GOAL, duration=0.842, time_limit=60),
+        r"^not converged \(.*, \d+ iterations\): [\w ]+ of joint joint1 misses its bound by [\d.e+-]+ at \d+ % of the way$",
+        lambda: Planner(arm, limits=limits, intervals=24).solve([0.0], [1.0], start_velocity=[10.0]),
     )
 
 
@@ -128,6 +130,21 @@ def test_a_duration_below_what_speeds_allow():
     refused(
         r"^a duration of 0.5 s is too short: the speed limits alone ask for 0.838475 s$",
         lambda: Planner(PUMA, "effort").solve(START, GOAL, duration=0.5),
+    )
+
+
+def test_a_duration_below_what_limits_allow():
+    limits = Limits.of(PUMA, acceleration=5.0)
+    refused(
+        r"^a duration of 0.95 s is too short: the fastest motion found takes 1.1\d+ s$",
+        lambda: Planner(PUMA, "effort", limits=limits, intervals=16).solve(START, GOAL, duration=0.95),
+    )
+
+
+def test_nothing_that_limits_a_smooth_motion():
+    refused(
+        "^nothing limits how fast jerk may be: give a duration, or limits$",
+        lambda: Planner(bare(1), "jerk").solve([0.0], [1.0]),
     )
 
 
@@ -197,3 +214,15 @@ def test_what_is_no_planner(make, kind, message):
 )
 def test_what_is_no_wish(planner, options, message):
     refused(re.escape(message), lambda: planner.solve(START, GOAL, **options), ValueError)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"payload": 2.0}, "payload is 2.0; expected Payload(mass, com, inertia)"),
+        ({"warm": "x"}, "warm is str; expected a Trajectory"),
+        ({"progress": "x"}, "progress is 'x'; expected a function"),
+    ],
+)
+def test_what_is_of_another_type(planner, options, message):
+    refused(re.escape(message), lambda: planner.solve(START, GOAL, **options), TypeError)

@@ -233,6 +233,34 @@ def own_cost(term, motion):
     return np.trapezoid(rate, t)
 
 
+@pytest.mark.parametrize("objective", ["effort", "jerk", "energy"])
+@pytest.mark.parametrize("duration", [1.5, 3.0])
+def test_smooth_motions_keep_limits_of_acceleration(objective, duration):
+    limits = Limits.of(PUMA, acceleration=5.0)
+    motion = Planner(PUMA, objective, limits=limits).solve(START, GOAL, duration=duration)
+    kept(PUMA, motion, limits)
+
+
+def test_positions_are_kept_between_the_certificates_states():
+    """Joint 5 of this motion touches its limit for a millisecond, between two states of the grid."""
+    arm = library_robot("puma560_cao_printed")
+    start = [-0.2942808, 1.63715262, -1.50380625, -0.46176704, -0.65634352, -1.0132854]
+    goal = [1.25518414, 1.33496595, -3.31011531, 0.33676141, -0.83395294, -3.62185984]
+    speeds = [0.70216542, 0.63366148, 1.04468514, 1.95236238, 2.06368129, 1.95236238]
+    limits = Limits.of(arm, velocity=speeds)
+    motion = Planner(arm, "energy", limits=limits).solve(start, goal, duration=3.085088552547613)
+    q = motion.q(np.linspace(0, motion.duration, 200_001))
+    assert np.maximum(limits.lower - q, q - limits.upper).max() < 1e-6
+
+
+def test_a_pose_by_iteration_where_there_is_no_closed_form():
+    arm = dhkit.Arm.from_dh([(0, 0, 0.5, 0)])
+    limits = Limits.of(arm.description, velocity=1.0, acceleration=2.0, torque=np.inf)
+    motion = Planner(arm.description, limits=limits).solve([0.1], arm.fk([0.5]))
+    assert motion.q(motion.duration) == pytest.approx(0.5)
+    assert motion.duration == pytest.approx(2 * np.sqrt(0.4 / 2), rel=1e-4)
+
+
 def test_terms_add():
     objective = Time() + 0.5 * Effort(2.0) + 2 * (Jerk() + Time())
     assert [(type(term).__name__, term.weight) for term in objective.terms] == [

@@ -176,3 +176,11 @@ def test_what_is_wrong_with_a_message_is_named(old, new, complaint, tmp_path):
 def test_archives_are_not_read_as_samples(tmp_path):
     with pytest.raises(DescriptionError, match=r"found suffix '.npz'; expected one of .csv, .yaml, .yml"):
         Trajectory.read(tmp_path / "x.npz", ARM)
+
+
+def test_a_file_of_ours_is_one_of_its_robot(tmp_path):
+    puma, ur5 = library_robot("puma560"), library_robot("ur5")
+    path = Trajectory.from_samples(puma, [0, 1], [[0.0] * 6, [0.1] * 6]).save(tmp_path / "puma.csv", rate=10)
+    assert Trajectory.read(path, puma).n == 6
+    with pytest.raises(DescriptionError, match=r"a trajectory of puma560 .*; expected one of ur5"):
+        Trajectory.read(path, ur5)

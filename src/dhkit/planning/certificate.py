@@ -118,11 +118,20 @@ class Checker:
         return [(what, use + _rises(use, self.points)) for what, use in self.measured(states)]
 
     def positions(self, states: States) -> Array:
-        """Return by what share of its range each joint leaves it, shape (N, n); negative inside."""
+        """Return by what share of its range each joint leaves it at a grid's states, shape (N, n); negative inside.
+
+        Raised as in :meth:`peaks`.
+        """
         lower, upper = self.limits.lower, self.limits.upper
         size = np.where(np.isfinite(upper - lower), np.maximum(np.abs(lower), np.abs(upper)), 1.0)
+        size = np.where(size > 0, size, 1.0)
+        if not np.isfinite(upper - lower).any():
+            return np.full(states.q.shape, -np.inf)
         with np.errstate(invalid="ignore"):
-            return np.maximum(lower - states.q, states.q - upper) / np.where(size > 0, size, 1.0)
+            excess = np.stack([(lower - states.q) / size, (states.q - upper) / size])
+            raised = [np.where(np.isfinite(side), side + _rises(side, self.points), side) for side in excess]
+        worst: Array = np.maximum(*raised)
+        return worst
 
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Check a motion; ``states``: those of it, where they are known."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -81,8 +82,8 @@ class Surroundings:
     @property
     def names(self) -> str:
         """What is there, in words."""
-        named = [item.name for item in self.obstacles] + ["itself"] * self.self_collision
-        return ", ".join(named)
+        counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
+        return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
 
     def gaps(self, description: Description, q: Array) -> Array:
         """Return the exact distance of states (N, n) from the nearest thing, shape (N,), m."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, check_pose, joint_array
-from dhkit.errors import DescriptionError, PlanningError, UnreachableError
+from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
 from dhkit.kinematics import inverse_kinematics, solve_numerically
 from dhkit.trajectories import Limits
 
@@ -117,7 +117,7 @@ def _configurations(
         found = inverse_kinematics(description, T)
         every, labels = found.q, [str(label) for label in found.branches]
         angles = found.within_limits(near)
-    except DescriptionError:
+    except (DescriptionError, ModelError):
         every, labels = _iterated(description, T, near)
         angles = every
     if not np.isfinite(every).all(axis=-1).any():

@@ -20,8 +20,6 @@ SAMPLES = 17
 """States by which a leg's duration is guessed."""
 ROOM = 0.05
 """Share of a torque that is at least counted on, where gravity takes nearly all."""
-SHORTEST = 1e-3
-"""s."""
 ASIDE = 0.7
 """How far a detour leads at most, of half a joint's range."""
 LONGER = 2.0
@@ -31,7 +29,7 @@ LONGER = 2.0
 def leg_durations(description: Description, limits: Limits, points: Array) -> Array:
     """Return about how long legs between configurations take from rest to rest, shape (legs,), s.
 
-    Each is the least duration of a cubic, of torques those that gravity leaves at each state.
+    Each is the least duration of a cubic, with the torques that gravity leaves at each state; 0 without limits.
     """
     return np.array([_leg(description, limits, a, b) for a, b in pairwise(points)])
 
@@ -46,7 +44,7 @@ def _leg(description: Description, limits: Limits, start: Array, goal: Array) ->
         states = States(description, x[:, 0], q, qd, qdd)
         room = np.maximum(limits.torque - np.abs(states.gravity_torque), ROOM * limits.torque)
         found.append(np.sqrt(np.max(np.abs(states.tau - states.gravity_torque) / room)))
-    return float(max(*found, SHORTEST))
+    return float(max(found))
 
 
 def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:

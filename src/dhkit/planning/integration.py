@@ -24,6 +24,8 @@ class MotionPieces:
     """What bounds positions inside intervals, n x many."""
     qd_inside: casadi.MX | None
     """What bounds velocities inside; None where knots do."""
+    qdd_inside: casadi.MX | None
+    """What bounds accelerations inside; None where knots and midpoints do."""
     q_middle: casadi.MX
     """At the midpoints, n x K."""
     jerk: casadi.MX
@@ -48,6 +50,7 @@ class MotionPieces:
                 qd_end=v + H * A,
                 q_inside=q + H / 2 * v,
                 qd_inside=None,
+                qdd_inside=None,
                 q_middle=q + H / 2 * v + H * H / 8 * A,
                 jerk=casadi.MX(Q.shape[0], 0),
                 squared_jerk=casadi.MX(0),
@@ -70,6 +73,7 @@ class MotionPieces:
                 qd_end=v + H * (a + c) / 2,
                 q_inside=casadi.horzcat(q + H / 3 * v, Q[:, 1:] - H / 3 * V[:, 1:]),
                 qd_inside=v + H / 2 * a,
+                qdd_inside=None,
                 q_middle=middle[0],
                 jerk=(c - a) / H,
                 squared_jerk=casadi.MX(0),
@@ -92,6 +96,7 @@ class MotionPieces:
             q_inside=q_middle,
             # Velocities are parabolas or cubics, inside the hulls of their Bernstein coefficients.
             qd_inside=v + H / 2 * a if curve is Curve.LINEAR else casadi.horzcat(v + H / 3 * a, V[:, 1:] - H / 3 * c),
+            qdd_inside=None if curve is Curve.LINEAR else 2 * b - (a + c) / 2,
             q_middle=q_middle,
             jerk=first if curve is Curve.LINEAR else casadi.horzcat(first, last),
             squared_jerk=casadi.sum2(casadi.sum1(H / 3 * (first * first + first * last + last * last))),

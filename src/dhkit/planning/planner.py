@@ -52,6 +52,8 @@ USUAL = 48
 LEAST, MOST, LEAST_USUAL = 6, 2000, 24
 NUMBERS = 384
 """Joints times intervals: what arms of few joints get."""
+EXPLAINING, NEARLY = 5.0, 1e-3
+"""s that may be spent to tell that a duration is too short; by what share the fastest motion must be longer."""
 LEISURELY = 2.0
 """Where a duration is needed and none is given: times that of the fastest cubics."""
 SMOOTHED = Friction(width=1e-2)
@@ -100,19 +102,20 @@ class Planner:
         description: Description,
         objective: ObjectiveLike = "time",
         limits: Limits | None = None,
-        constraints: Sequence[Constraint] = (),
+        constraints: Constraint | Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> None:
         if intervals is not None and (type(intervals) is not int or not LEAST <= intervals <= MOST):
             raise ValueError(f"intervals is {intervals!r}; expected a whole number from {LEAST} to {MOST}")
+        constraints = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
                 raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
         self.description = description
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
-        self.constraints = tuple(constraints)
+        self.constraints = constraints
         usual = NUMBERS // description.n if description.n <= FEW else USUAL
         # Smooth motions need half as many: their accelerations are parabolas.
         self._given = intervals
@@ -185,8 +188,16 @@ class Planner:
         if not isinstance(time_limit, Real) or not time_limit > 0:
             raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s")
         description = self.description
+        if payload is not None and not isinstance(payload, Payload):
+            raise TypeError(f"payload is {payload!r}; expected Payload(mass, com, inertia)")
+        if progress is not None and not callable(progress):
+            raise TypeError(f"progress is {progress!r}; expected a function")
         if warm is not None:
+            if not isinstance(warm, Trajectory):
+                raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
             warm.require(description)
+        if isinstance(via, str) or np.ndim(via[0] if len(via) else [[]]) == 0:
+            via = [via]
         names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
         places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
         if places[0].q is None:
@@ -204,7 +215,10 @@ class Planner:
         ways = routes(description, wish.limits, places)
         self._require(wish, places, ways)
         deadline = began + time_limit
-        found, branches, seconds, counts = self._best(wish, ways, warm, deadline, progress)
+        try:
+            found, branches, seconds, counts = self._best(wish, ways, warm, deadline, progress)
+        except PlanningError as error:
+            raise self._explained(error, wish, ways) from None
         task, best = found
         report = PlanReport(
             objective=str(self.objective),
@@ -296,6 +310,8 @@ class Planner:
         duration = wish.duration
         if duration is None and not self.objective.has_time:
             duration = LEISURELY * float(leg_durations(loaded, limits, points).sum())
+            if not duration > 0:
+                raise PlanningError(f"nothing limits how fast {self.objective} may be: give a duration, or limits")
         checker = Checker(loaded, limits, self.constraints, parameters, self.friction, wish.surroundings)
         return Task(
             description,
@@ -355,6 +371,21 @@ class Planner:
             raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}")
         told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
         return best, told, seconds, (iterations, solves)
+
+    def _explained(self, error: PlanningError, wish: Wish, ways: Sequence[Route]) -> PlanningError:
+        """Return why a motion of a given duration was not found: because there is no faster one, where that is it."""
+        if wish.duration is None or len(ways) > 1 or wish.surroundings:
+            return error
+        quickest = Planner(self.description, "time", wish.limits, self.constraints, LEAST_USUAL, self.friction or False)
+        try:
+            program, made = quickest.program(quick := quickest._task(replace(wish, duration=None), ways[0].points))
+            least = Search(quick, program, time.perf_counter() + made + EXPLAINING)(None).trajectory.duration
+        except PlanningError:
+            return error
+        if least <= wish.duration * (1 + NEARLY):
+            return error
+        fastest = f"the fastest motion found takes {least:.6g} s"
+        return PlanningError(f"a duration of {wish.duration:.6g} s is too short: {fastest}")
 
     def _coarse(self, task: Task, best: Found, deadline: float) -> tuple[int, float] | None:
         half = max(LEAST, self.intervals_for(task) // 2)

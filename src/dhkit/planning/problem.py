@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Knots", "Problem", "Rows"]
 
-CALM = 1e-3
-"""Share of the objective that accelerations have in least time or energy: joints with slack then move calmly."""
+CALM = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
+"""Share of the objective that accelerations have in least time or energy: joints with slack then move calmly.
+
+In arms of few joints no joint has much slack, and more of it would cost time."""
 TINY_TIME = 1e-4
 """s: the shortest duration of a leg."""
 
@@ -147,6 +149,8 @@ class Problem:
         add("position", motion.q_inside, -np.inf, np.inf)
         if motion.qd_inside is not None:
             add("velocity", motion.qd_inside, -np.inf, np.inf)
+        if motion.qdd_inside is not None:
+            add("acceleration", motion.qdd_inside, -np.inf, np.inf)
         if self.jerk_limited:
             add("jerk", motion.jerk, -np.inf, np.inf)
         add("duration", casadi.sum1(D), -np.inf, np.inf)
@@ -189,7 +193,11 @@ class Problem:
         if self.objective.needs_calm:
             # By shares of time: what counts is how long joints are busy, and meshes are finer at their ends.
             squares = casadi.sum1((A * casadi.repmat(usual, 1, A.shape[1])) ** 2)
-            cost += CALM / (self.n * len(self.mesh.legs)) * casadi.dot(casadi.DM(self._column_shares), squares.T)
+            cost += (
+                CALM[self.mesh.curve]
+                / (self.n * len(self.mesh.legs))
+                * casadi.dot(casadi.DM(self._column_shares), squares.T)
+            )
         return cost
 
     @property

@@ -7,8 +7,10 @@ from typing import Any
 
 from dhkit.planning.certificate import Certificate
 
-__all__ = ["BranchReport", "PlanReport"]
+__all__ = ["JOINTWISE", "BranchReport", "PlanReport"]
 
+JOINTWISE = ("position", "velocity", "acceleration", "jerk", "torque", "motor power", "torque-speed line")
+"""Limits of each joint."""
 TOLD = 3
 """So many limits are told in words."""
 
@@ -70,8 +72,11 @@ class PlanReport:
         return sorted(named, key=lambda item: -item[1])
 
     def _name(self, what: str, row: int) -> str:
-        joint_like = what in ("velocity", "acceleration", "torque", "motor power", "torque-speed line")
-        return self.joints[row] if joint_like and row < len(self.joints) else "the tool"
+        joint = self._joint(what, row)
+        return "the tool" if joint is None else joint
+
+    def _joint(self, what: str, row: int) -> str | None:
+        return self.joints[row] if what in JOINTWISE else None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the report as plain numbers and texts, for JSON."""
@@ -85,7 +90,12 @@ class PlanReport:
             "reference": certificate.reference,
             "states": certificate.states,
             "limits": [
-                {"what": check.what, "joint": check.row, "excess": check.excess, "time": check.time}
+                {
+                    "what": check.what,
+                    "joint": self._joint(check.what, check.row),
+                    "excess": check.excess,
+                    "time": check.time,
+                }
                 for check in certificate.checks
             ],
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],

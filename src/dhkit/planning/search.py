@@ -17,6 +17,7 @@ from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import Knots, Problem, Rows
+from dhkit.planning.report import JOINTWISE
 from dhkit.planning.solver import ProgressCall, Solution, Solver, Stopped
 from dhkit.planning.task import FEW, Margins, Task, g_bounds, worst_row, x_bounds
 from dhkit.trajectories import Trajectory
@@ -39,6 +40,8 @@ FACTORS = (2.5, 0.6)
 """What guessed durations are multiplied by where the first start fails."""
 STARTS = 4
 """Of arms of two or three joints: their programs have more than one optimum, and are small."""
+SHORTEST = 1e-3
+"""s: of a leg, where a search starts."""
 LONGEST, FACTORS_TRIED = 100.0, 24
 """Durations that are tried for objectives of time and something else: from the fastest to so many seconds."""
 DETOURS = 8
@@ -211,7 +214,7 @@ class Search:
         task, mesh = self.task, self.program.mesh
         if warm is not None and len(mesh.legs) == 1:
             yield lambda: knots_along(warm, mesh, np.array([warm.duration]))
-        durations = leg_durations(task.description, task.limits, task.points)
+        durations = np.maximum(leg_durations(task.description, task.limits, task.points), SHORTEST)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
         elif not self.program.problem.objective.only_time:
@@ -272,7 +275,7 @@ class Search:
 
     def _whose(self, what: str, row: int) -> str:
         names = [joint.name for joint in self.task.description.joints]
-        return f"{what} of joint {names[row]}" if what in JOINTWISE else what
+        return f"{what} of joint {names[row]}" if what in ROWS_OF_JOINTS else what
 
     def _scale(self, guess: Knots) -> float:
         """Return the cost of a guess, by which costs are divided."""
@@ -288,15 +291,5 @@ class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)
 
 
 SMALLEST = 1e-9
-JOINTWISE = (
-    "position",
-    "velocity",
-    "acceleration",
-    "jerk",
-    "torque",
-    "motor power",
-    "torque-speed line",
-    "joint positions",
-    "joint velocities",
-)
+ROWS_OF_JOINTS = (*JOINTWISE, "joint positions", "joint velocities")
 """What has a row for each joint."""

@@ -138,6 +138,9 @@ def g_bounds(task: Task, problem: Problem, rows: list[Rows], margins: Margins) -
             case "velocity":
                 b = limits.velocity * (1 - shares) + np.zeros_like(b)
                 a = -b
+            case "acceleration":
+                b = limits.acceleration + np.zeros_like(b)
+                a = -b
             case "jerk":
                 b = limits.jerk + np.zeros_like(b)
                 a = -b

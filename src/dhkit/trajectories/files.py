@@ -130,6 +130,8 @@ def read_samples(path: str | Path, description: Description, *, degrees: bool = 
     text_of = read_bounded(path, MOST_BYTES, "samples of a motion")
     try:
         text = _text(text_of)
+        if text.startswith(f"# {FORMAT}"):
+            _robot_named(*_label(text), description)
         is_csv = path.suffix.lower() == ".csv"
         samples = _table_samples(text, description) if is_csv else _message_samples(text, description)
         return samples.in_radians(description).trajectory(description) if degrees else samples.trajectory(description)

@@ -14,7 +14,7 @@ from dhkit.description.frames import number_array
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
 from dhkit.trajectories.interpolation import interpolated
-from dhkit.trajectories.pieces import Pieces, Side, joined
+from dhkit.trajectories.pieces import Pieces, Side, check_description, joined
 from dhkit.trajectories.samples import Samples
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ __all__ = ["Trajectory"]
 
 MEETS = 1e-9
 """rad and m: two motions whose ends are nearer to each other are joined."""
+MOST_SAMPLES = 1e8
 SAME_TIME = 1e-9
 """Of a sample's interval: a last sample nearer to the end than this is the end."""
 
@@ -66,6 +67,7 @@ class Trajectory:
     """The same polynomials, without the robot."""
 
     def __post_init__(self) -> None:
+        check_description(self.description)
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
         for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
             object.__setattr__(self, name, value)
@@ -160,6 +162,8 @@ class Trajectory:
             return np.linspace(0.0, self.duration, n)
         if rate is None or not 0 < rate < np.inf:
             raise ValueError(f"rate is {rate!r}; expected a positive number of samples a second")
+        if rate * self.duration > MOST_SAMPLES:
+            raise ValueError(f"rate is {rate:g}: {rate * self.duration:.3g} samples; expected {MOST_SAMPLES:g} at most")
         return np.append(np.arange(max(int(np.ceil(self.duration * rate - SAME_TIME)), 1)) / rate, self.duration)
 
     def slowed(self, c: float) -> Trajectory:
@@ -236,6 +240,7 @@ class Trajectory:
 
     def matches(self, description: Description) -> bool:
         """Return whether it is a motion of this robot."""
+        check_description(description)
         return self.description == description or self.description.digest == description.digest
 
     def require(self, description: Description) -> None:
