@@ -25,6 +25,8 @@ PACKAGES = (
     "ssik",
     "roboticstoolbox-python",
     "ikpy",
+    "casadi",
+    "toppra",
 )
 
 

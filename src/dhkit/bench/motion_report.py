@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Table, _listed, _markdown_table, _text_table, duration
+from dhkit.bench.report import Missing, Table, duration, listed_values, markdown_table, text_table
 
 __all__ = ["MeshBuild", "MotionReport", "MotionRow"]
 
@@ -86,20 +86,20 @@ class MotionReport:
 
     def json(self) -> dict[str, Any]:
         """Return everything as what JSON knows."""
-        listed: dict[str, Any] = _listed(asdict(self))
+        listed: dict[str, Any] = listed_values(asdict(self))
         return listed
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
         parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
         for heading, columns, cells in self._tables:
-            parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
+            parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
         return "\n".join([*parts, MEANING, ""])
 
     def __str__(self) -> str:
         parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
         for heading, columns, cells in self._tables:
-            parts += [heading, *_text_table(columns, cells), ""]
+            parts += [heading, *text_table(columns, cells), ""]
         return "\n".join([*parts, MEANING])
 
     @property

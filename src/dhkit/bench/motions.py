@@ -6,8 +6,7 @@ import gc
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
@@ -41,7 +40,6 @@ HELD = 0.95
 RATE = 1e4
 """Hz: where motions are held against their limits."""
 BUILDS = 3
-PEERS = ("casadi", "toppra")
 
 Progress = Callable[[str], None]
 
@@ -118,7 +116,7 @@ def compare_motions(
         What was measured; when interrupted from the keyboard, what was measured until then.
     """
     tell = progress or (lambda line: None)
-    machine = _named(Machine.here())
+    machine = Machine.here()
     usual = intervals or Planner(description).intervals
     counts = sorted({*meshes, usual} - {FINER * usual})
     samples: list[_Sample] = []
@@ -261,14 +259,3 @@ def _rows(samples: list[_Sample], usual: int) -> Iterator[MotionRow]:
             seconds=float(middle),
             late=float(late),
         )
-
-
-def _named(machine: Machine) -> Machine:
-    """Return a machine's facts with the packages that take part here alone."""
-    packages = dict(machine.packages)
-    for name in PEERS:
-        try:
-            packages[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return replace(machine, packages=packages)

@@ -12,7 +12,18 @@ from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 
-__all__ = ["BATCH", "BenchReport", "Missing", "Requirement", "Row"]
+__all__ = [
+    "BATCH",
+    "BenchReport",
+    "Missing",
+    "Requirement",
+    "Row",
+    "Table",
+    "duration",
+    "listed_values",
+    "markdown_table",
+    "text_table",
+]
 
 BATCH = 100_000
 """Items of the batch that the figures are asked at."""
@@ -170,20 +181,20 @@ class BenchReport:
         for key in ("requirements", "scaling", "memory"):
             for entry, value in zip(plain[key], getattr(self, key), strict=True):
                 entry |= value.derived
-        listed: dict[str, Any] = _listed(plain)
+        listed: dict[str, Any] = listed_values(plain)
         return listed
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
         parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
         for heading, columns, cells in self._tables:
-            parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
+            parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
         return "\n".join([*parts, RATIO_MEANING, ""])
 
     def __str__(self) -> str:
         parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
         for heading, columns, cells in self._tables:
-            parts += [heading, *_text_table(columns, cells), ""]
+            parts += [heading, *text_table(columns, cells), ""]
         return "\n".join([*parts, RATIO_MEANING])
 
     @property
@@ -257,7 +268,8 @@ def _ratio(value: float | None) -> str:
     return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
-def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+    """Return a table's lines for a terminal."""
     lines = [list(columns), *map(list, cells)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
     return [
@@ -265,14 +277,16 @@ def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[
     ]
 
 
-def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+def markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+    """Return a table's lines in Markdown."""
     lines = [columns, ["---"] * len(columns), *cells]
     return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
 
 
-def _listed(value: Any) -> Any:
+def listed_values(value: Any) -> Any:
+    """Return plain data with tuples as lists, as JSON has them."""
     if isinstance(value, dict):
-        return {key: _listed(entry) for key, entry in value.items()}
+        return {key: listed_values(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_listed(entry) for entry in value]
+        return [listed_values(entry) for entry in value]
     return value
