@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.ready-bench
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: help demo test check accept bench assets lowest format clean
+.PHONY: help demo test coverage check accept bench assets lowest format clean
 
 help:  ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -21,6 +21,9 @@ demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560
 
 test: $(READY)  ## the tests, laws at a small sample size
 	$(BIN)/python -m pytest -n 2 --dist loadgroup -q $(ARGS)
+
+coverage: $(READY)  ## the same traced: which lines they run; 90 % at least
+	$(BIN)/python -m pytest -n 2 --dist loadgroup -q --cov=dhkit --cov-report=term:skip-covered --cov-fail-under=90
 
 check: $(READY)  ## ruff, mypy --strict, import order
 	$(BIN)/ruff check .

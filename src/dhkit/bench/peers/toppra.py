@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from dhkit.bench.contenders import import_peer
 from dhkit.description import Array, Description
@@ -94,6 +93,8 @@ class StraightTiming:
         return ToppraMotion(motion)
 
     def _torque(self, q: Array, qd: Array, qdd: Array) -> Array:
+        import pinocchio as pin
+
         torque: Array = pin.rnea(self._model, self._data, q, qd, qdd)
         return torque
 
