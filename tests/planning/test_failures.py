@@ -103,6 +103,16 @@ def test_an_obstacle_around_start_or_goal(planner):
     refused(r"^start: link \d is .* ball", lambda: planner.solve(START, GOAL, obstacles=beside))
 
 
+def test_an_obstacle_around_the_only_branch_of_a_pose():
+    arm = dhkit.Arm.load("polar_rp")
+    T = arm.fk([0.5, 0.6])
+    around = [Obstacle.sphere(0.05, T[:3, 3], name="ball")]
+    refused(
+        r"goal: link \d is [\d.]+ mm inside ball",
+        lambda: arm.planner(intervals=12).solve([-0.5, 0.6], T, obstacles=around),
+    )
+
+
 @pytest.mark.parametrize("seconds", [60.0, 2.0])
 def test_no_way_around_an_obstacle(seconds):
     """An arm in a plane cannot pass a wall from its base outwards: that is said, within the time limit."""

@@ -28,7 +28,7 @@ from dhkit.planning import (
     TorqueSpeedLine,
 )
 from dhkit.trajectories import Limits
-from planning_reference import grids, worst_excess
+from planning_reference import grids, slide, worst_excess
 
 PUMA = library_robot("puma560")
 START = np.array([0.0, 0.8, -1.0, 0.0, 0.5, 0.0])
@@ -348,6 +348,11 @@ def test_the_report(planner):
     for word in ("certified by Pinocchio", "quintic", "some limit is active", "intervals"):
         assert word in text
     assert report.as_dict()["certified"] is True
+
+
+def test_a_report_where_nothing_is_limited():
+    motion = Planner(slide(), "effort", intervals=12).solve([0.0], [1.0], duration=1.0)
+    assert motion.report.certificate.ok and "nothing is limited" in str(motion.report)
 
 
 def test_an_arm_keeps_its_planners():

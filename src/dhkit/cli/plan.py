@@ -231,7 +231,8 @@ def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None
     active = [(name, share) for name, share in report.active_limits() if share >= SEEN]
     reached = ", ".join(f"{name} {100 * share:.0f} %" for name, share in active) or "none"
     say(f"\ncertificate: {verdict} in {certificate.states} states, by {certificate.reference}")
-    say(f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s")
+    if worst is not None:
+        say(f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s")
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {reached}")
     if report.slow_down > 1:
         say(f"slowed down by {100 * (report.slow_down - 1):.3f} % to keep its limits between knots")

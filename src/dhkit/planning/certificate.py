@@ -13,7 +13,7 @@ from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
-__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker"]
+__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker", "position_sizes"]
 
 POINTS = 24
 """States an interval, both its ends included: more than anybody will ask for."""
@@ -54,8 +54,8 @@ class Certificate:
 
     @property
     def violation(self) -> float:
-        """The largest excess, as a share of its limit; 0 where all limits are kept."""
-        return max((check.excess for check in self.checks), default=0.0) if self.checks else 0.0
+        """The largest excess, as a share of its limit; 0 where nothing is limited."""
+        return 0.0 if self.worst is None else self.worst.excess
 
     @property
     def ok(self) -> bool:
@@ -63,9 +63,9 @@ class Certificate:
         return self.violation <= ACCEPTED
 
     @property
-    def worst(self) -> Check:
-        """The check that comes nearest to its limit, or exceeds it most."""
-        return max(self.checks, key=lambda check: check.excess)
+    def worst(self) -> Check | None:
+        """The check that comes nearest to its limit, or exceeds it most; None where nothing is limited."""
+        return max(self.checks, key=lambda check: check.excess, default=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +123,7 @@ class Checker:
         Raised as in :meth:`peaks`.
         """
         lower, upper = self.limits.lower, self.limits.upper
-        size = np.where(np.isfinite(upper - lower), np.maximum(np.abs(lower), np.abs(upper)), 1.0)
-        size = np.where(size > 0, size, 1.0)
+        size = position_sizes(self.limits)
         if not np.isfinite(upper - lower).any():
             return np.full(states.q.shape, -np.inf)
         with np.errstate(invalid="ignore"):
@@ -180,6 +179,12 @@ class Checker:
         resting = {constraint.what for constraint in self.constraints if not constraint.moving}
         moving = replace(self, surroundings=NOTHING)
         return [(what, use) for what, use in moving.peaks(states) if what not in resting]
+
+
+def position_sizes(limits: Limits) -> Array:
+    """Return by what positions outside their limits are measured, shape (n,): the larger limit, or 1 rad or m."""
+    size = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
+    return np.where(np.isfinite(size) & (size > 0), size, 1.0)
 
 
 def _rises(use: Array, points: int) -> Array:

@@ -27,7 +27,7 @@ from dhkit.planning.feasibility import (
 )
 from dhkit.planning.goals import Place, Route, place, routes
 from dhkit.planning.guess import leg_durations
-from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.mesh import LEAST, Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.payload import Payload
@@ -49,11 +49,11 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 """Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
 USUAL = 48
 """Intervals of arms of six joints; of fewer joints more, as they cost less."""
-LEAST, MOST, LEAST_USUAL = 6, 2000, 24
+MOST, LEAST_USUAL = 2000, 24
 NUMBERS = 384
 """Joints times intervals: what arms of few joints get."""
-EXPLAINING, NEARLY = 5.0, 1e-3
-"""s that may be spent to tell that a duration is too short; by what share the fastest motion must be longer."""
+NEARLY = 1e-3
+"""By what share the fastest motion must be longer than a duration that is called too short."""
 LEISURELY = 2.0
 """Where a duration is needed and none is given: times that of the fastest cubics."""
 SMOOTHED = Friction(width=1e-2)
@@ -218,7 +218,7 @@ class Planner:
         try:
             found, branches, seconds, counts = self._best(wish, ways, warm, deadline, progress)
         except PlanningError as error:
-            raise self._explained(error, wish, ways) from None
+            raise self._explained(error, wish, ways, deadline) from None
         task, best = found
         report = PlanReport(
             objective=str(self.objective),
@@ -348,7 +348,7 @@ class Planner:
                 reports.append(BranchReport(way.label, way.bound, solved=False))
                 continue
             try:
-                if len(ways) > 1:
+                if way.label:  # a branch that was chosen here: of others _require has seen the ends
                     self._require_ends(wish, way.points)
                 task = self._task(wish, way.points)
                 program, made = self.program(task)
@@ -372,14 +372,15 @@ class Planner:
         told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
         return best, told, seconds, (iterations, solves)
 
-    def _explained(self, error: PlanningError, wish: Wish, ways: Sequence[Route]) -> PlanningError:
+    def _explained(self, error: PlanningError, wish: Wish, ways: Sequence[Route], deadline: float) -> PlanningError:
         """Return why a motion of a given duration was not found: because there is no faster one, where that is it."""
-        if wish.duration is None or len(ways) > 1 or wish.surroundings:
+        late = time.perf_counter() > deadline
+        if late or wish.duration is None or len(ways) > 1 or wish.surroundings:
             return error
         quickest = Planner(self.description, "time", wish.limits, self.constraints, LEAST_USUAL, self.friction or False)
         try:
             program, made = quickest.program(quick := quickest._task(replace(wish, duration=None), ways[0].points))
-            least = Search(quick, program, time.perf_counter() + made + EXPLAINING)(None).trajectory.duration
+            least = Search(quick, program, deadline + made)().trajectory.duration
         except PlanningError:
             return error
         if least <= wish.duration * (1 + NEARLY):

@@ -118,12 +118,15 @@ class PlanReport:
     def __str__(self) -> str:
         certificate, lines = self.certificate, []
         lines.append(f"{self.duration:.4f} s, least {self.objective}: {self.cost:.6g}")
-        worst = certificate.worst
-        lines.append(
-            f"certified by {certificate.reference} in {certificate.states} states: largest excess "
-            f"{max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
-            f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
-        )
+        kept = f"certified by {certificate.reference} in {certificate.states} states"
+        if certificate.worst is None:
+            lines.append(f"{kept}: nothing is limited")
+        else:
+            worst = certificate.worst
+            lines.append(
+                f"{kept}: largest excess {max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
+                f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
+            )
         if self.slow_down > 1:
             lines.append(f"slowed down by {100 * (self.slow_down - 1):.3f} % to keep its limits between knots")
         if self.tightened:

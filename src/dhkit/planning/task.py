@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.certificate import Checker
+from dhkit.planning.certificate import Checker, position_sizes
 from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import TINY_TIME, Problem, Rows
@@ -97,7 +97,7 @@ class Margins:
 def x_bounds(task: Task, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> tuple[Array, Array]:
     """Return the bounds of a program's numbers."""
     n, K, limits = len(task.start_velocity), mesh.intervals, task.limits
-    room = margins.at_knots("position", n) * _sizes(limits)
+    room = margins.at_knots("position", n) * position_sizes(limits)
     q = limits.lower + room, limits.upper - room
     speed = limits.velocity * (1 - margins.at_knots("velocity", n))
     qd = -speed, speed.copy()
@@ -132,7 +132,7 @@ def g_bounds(task: Task, problem: Problem, rows: list[Rows], margins: Margins) -
         b: Array = np.tile(row.high, (row.points, 1))
         match row.what:
             case "position":
-                room = shares * _sizes(limits)
+                room = shares * position_sizes(limits)
                 zeros = np.zeros_like(a)
                 a, b = limits.lower + room + zeros, limits.upper - room + zeros
             case "velocity":
@@ -170,12 +170,6 @@ def worst_row(solution: Solution, rows: list[Rows], bounds: tuple[Array, Array])
             return row, which, point / max(row.points - 1, 1), float(misses[at])
         begin += size
     raise AssertionError("a row of none")
-
-
-def _sizes(limits: Limits) -> Array:
-    """Return by what positions are measured: the larger limit, as the certificate does."""
-    finite = np.isfinite(limits.upper - limits.lower)
-    return np.where(finite, np.maximum(np.abs(limits.lower), np.abs(limits.upper)), 1.0)
 
 
 def curve_for(n: int, has_time: bool, jerk_counts: bool) -> Curve:

@@ -93,7 +93,7 @@ def _certified(task: TimingTask, quickest: Found | None, deadline: float, progre
         knots = task.knots
         task, reserved = _wider(task, reserved, excess)
         b = np.interp(task.knots, knots, b)
-    worst = task.checker.check(trajectory, states).worst
+    worst = max(task.checker.check(trajectory, states).checks, key=lambda check: check.excess)
     raise PlanningError(f"{worst.what} stays exceeded by {100 * worst.excess:.2g} % at {worst.time:.4g} s")
 
 
