@@ -8,7 +8,8 @@ import pytest
 from dhkit.description import from_dh, library_robot, pose, with_base, with_tool, world_to_tool
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
-from dhkit.grading.judging.inverse import CLOSES, INVERSE_MISTAKES, POSE_NAMES, judge_inverse
+from dhkit.grading.judging.inverse import CLOSES, POSE_NAMES, judge_inverse
+from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Verdict
 
 CORRECT, WRONG = Verdict.CORRECT, Verdict.WRONG
@@ -154,7 +155,7 @@ def test_mistakes_have_names_and_places(name, joint, formula, mistake):
     assert judged.closed < judged.poses == 1000
     assert judged.joint == joint
     assert [(found.mistake, found.joint) for found in judged.explanations] == [(mistake, joint)]
-    assert mistake in INVERSE_MISTAKES
+    assert mistake in LIBRARY
 
 
 def test_several_mistakes_of_a_branch_are_all_named():

@@ -5,7 +5,7 @@ import pytest
 
 from dhkit.grading import grade_answers
 from dhkit.grading.judging.truth import kinematic_quantity, truth_of
-from dhkit.grading.mistakes.variants import kinematic_variants, variants
+from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.symbolic.mistakes import MISTAKES
 from dhkit.symbolic.ring import element_array
 from dhkit.symbolic.textbook import derive
@@ -17,8 +17,8 @@ DYNAMICS = ("M", "h", "g", "tau", "K", "V")
 def mutated(description, variant, quantity):
     """Return a quantity of a derivation with a mistake: derived anew where the textbook makes it."""
     truth = truth_of(description)
-    if variant.name.partition("@")[0] in MISTAKES:
-        wrong = derive(description, {variant.name})
+    if variant.identity in MISTAKES:
+        wrong = derive(description, {variant.made})
         return element_array(getattr(wrong, quantity)) - truth.of(quantity)
     return variant.adds_to(quantity, truth.coordinates)
 
@@ -28,7 +28,7 @@ def test_every_mistake_is_found_and_named(robot, law):
     """Exactly for every quantity that it changes; an equivalent mistake's name is as good."""
     description = corpus_robot(robot)
     truth = truth_of(description)
-    cases = [(variant, quantity) for variant in variants(truth) for quantity in DYNAMICS]
+    cases = [(variant, quantity) for variant in variants_of(truth).dynamic for quantity in DYNAMICS]
     size = law.samples(len(cases))
     chosen = np.random.default_rng(0).permutation(len(cases))[:size]
     missed = []
@@ -42,9 +42,8 @@ def test_every_mistake_is_found_and_named(robot, law):
         answer = element_array(truth.of(quantity) + change)
         report = grade_answers(description, {quantity: written(answer, truth.arm(quantity))})
         found = named(report)
-        place = f"{variant.name.partition('@')[0]} ({variant.where})"
-        if report.verdict.value != "wrong" or not {variant.name.partition("@")[0], place} & found:
-            missed.append((variant.name, variant.where, quantity, str(report)))
+        if report.verdict.value != "wrong" or not {variant.identity, variant.called} & found:
+            missed.append((variant.called, quantity, str(report)))
     law.holds("mistakes that are not found or not named", len(missed), 0, missed[:3])
 
 
@@ -53,7 +52,7 @@ def test_every_kinematic_mistake_is_found_and_named(robot, law):
     description = corpus_robot(robot)
     truth = truth_of(description)
     quantities = [*(f"A{i + 1}" for i in range(description.n)), "T", "J"]
-    cases = [(variant, quantity) for variant in kinematic_variants(truth) for quantity in quantities]
+    cases = [(variant, quantity) for variant in variants_of(truth).kinematic for quantity in quantities]
     size = law.samples(min(len(cases), 400))
     missed = []
     for k in sorted(np.random.default_rng(1).permutation(len(cases))[:size]):
@@ -63,6 +62,6 @@ def test_every_kinematic_mistake_is_found_and_named(robot, law):
             continue
         answer = kinematic_quantity(truth.kinematics, quantity) + change
         report = grade_answers(description, {quantity: written(answer, truth.arm(quantity))})
-        if report.verdict.value != "wrong" or variant.name.partition("@")[0] not in named(report):
-            missed.append((variant.name, quantity, str(report)))
+        if report.verdict.value != "wrong" or variant.identity not in named(report):
+            missed.append((variant.called, quantity, str(report)))
     law.holds("mistakes that are not found or not named", len(missed), 0, missed[:3])

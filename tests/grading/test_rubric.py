@@ -88,7 +88,7 @@ def test_a_weight_of_nothing_alone_leaves_the_others_equal():
         ((), Credit(), 0),
         ((Diagnosis("gravity_sign", "", "g", ("g1",)),), Credit(diagnosed=0.3), 0.3),
         ((Diagnosis("gravity_sign", "", "g", ("g1",)),), Credit(diagnosed=0.3, mistakes={"gravity_sign": 0.1}), 0.1),
-        ((Diagnosis("gravity_sign@2", "", "g", ("g1",)),), Credit(mistakes={"gravity_sign": 0.1}), 0.1),
+        ((Diagnosis("gravity_sign (link 2)", "", "g", ("g1",)),), Credit(mistakes={"gravity_sign": 0.1}), 0.1),
         (
             (Diagnosis("a", "", "g", ("g1",), equivalent=("gravity_sign",)),),
             Credit(diagnosed=0.3, mistakes={"gravity_sign": 0.6}),

@@ -11,6 +11,7 @@ from dhkit.grading import grade_answers
 from dhkit.grading.judging import truth as truths
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
+from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.textbook import _motion, _places, derive
 from grading_answers import SHEETS, written
 
@@ -54,9 +55,9 @@ def test_a_right_entry(law):
 @pytest.mark.parametrize(
     ("robot", "quantities", "mistakes", "first", "then"),
     [
-        ("planar2r", DYNAMICS, {"half_forgotten@2", "gravity_sign"}, 1.0, 0.1),
-        ("planar3r", DYNAMICS, {"inertia_forgotten@2", "height_at_joint@3"}, 5.0, 5.0),
-        ("puma560", ("M",), {"inertia_forgotten@3"}, 30.0, 30.0),
+        ("planar2r", DYNAMICS, {MadeAt("half_forgotten", 2), "gravity_sign"}, 1.0, 0.1),
+        ("planar3r", DYNAMICS, {MadeAt("inertia_forgotten", 2), MadeAt("height_at_joint", 3)}, 5.0, 5.0),
+        ("puma560", ("M",), {MadeAt("inertia_forgotten", 3)}, 30.0, 30.0),
     ],
 )
 def test_a_sheet_with_its_full_diagnosis(robot, quantities, mistakes, first, then, law):

@@ -8,7 +8,8 @@ import pytest
 from dhkit.description import Convention, from_dh, library_robot, robots
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
-from dhkit.grading.judging.tables import TABLE_MISTAKES, judge_table
+from dhkit.grading.judging.tables import judge_table
+from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Verdict
 
 CORRECT, WRONG, UNDECIDED = Verdict.CORRECT, Verdict.WRONG, Verdict.UNDECIDED
@@ -86,7 +87,7 @@ def test_numbers_in_place_of_parameters():
     l1, l2 = (float(description.numbers.a[i]) for i in (0, 1))
     judgement = judge("planar2r", [["q1", "0", l1, "0"], ["q2", "0", l2, "0"]])
     assert set(judgement.rows) == {CORRECT}
-    assert "in place of parameters" in judgement.notes[0]
+    assert judgement.judged_at == {"l1": l1, "l2": l2}
     turned = judge("planar2r", [["q1", "0", l1, "0"], ["q2 + pi", "0", -l2, "0"]])
     assert turned.rows == (CORRECT, UNDECIDED)
     assert turned.other_frames == ("frame 2's x axis points the other way",)
@@ -274,7 +275,7 @@ def test_mistakes_of_a_row_have_names(name, entries, mistake):
     assert judgement.rows[place] is not CORRECT
     if mistake is not None:
         assert mistakes(judgement) == [(mistake, place)]
-    assert all(found.mistake in TABLE_MISTAKES for found in judgement.explanations)
+    assert all(found.mistake in LIBRARY for found in judgement.explanations)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_spongs_equations_are_proved():
         ("m2*(0.5773*l2)^2", Verdict.WRONG),  # 0.57735 is 0.5774 in four digits
         ("0.3333*m2*l2^2 + 0.0001", Verdict.WRONG),
         ("0.3333*m2*l2^2.0", Verdict.ROUNDED),
-        ("(0.6667 - 0.3333)*m2*l2^2", Verdict.ROUNDED),
+        ("(0.6667 - 0.3333)*m2*l2^2", Verdict.WRONG),  # 0.3334: cancellation grants nothing
         ("(0.6667 - 0.3335)*m2*l2^2", Verdict.WRONG),
     ],
 )
@@ -69,7 +69,7 @@ def test_rounding_is_half_a_unit_of_the_last_digit(entry, expected):
 def test_rounding_states_its_bound():
     rows = [list(row) for row in M]
     rows[1][1] = "0.3333*m2*l2^2"
-    assert "more than 0.67 of half a unit" in ARM.grade(M=rows).of("M")[3].statement
+    assert "at most 0.67 of half a unit" in ARM.grade(M=rows).of("M")[3].statement
 
 
 def test_one_decimal_cannot_be_two_numbers():
@@ -250,11 +250,16 @@ def test_two_mistakes_in_one_quantity_are_both_named():
 
 
 def test_where_nothing_fits_the_terms_are_told():
-    (found,) = ARM.grade(M=[[M[0][0] + " + m1*l1*l2", M[0][1]], M[1]]).diagnosis
+    (found,) = ARM.grade(M=[[M[0][0] + " + m1*l1*l2 - m2*l1*s2", M[0][1]], M[1]]).diagnosis
     assert found.mistake is None
-    assert found.sentence == "Too much: m1*l1*l2."
+    assert found.sentence == "Too much: -m2*l1*s2, m1*l1*l2."
+
+
+def test_slips_in_single_terms_are_named_with_the_term():
+    (found,) = ARM.grade(M=[[M[0][0] + " + m1*l1*l2", M[0][1]], M[1]]).diagnosis
+    assert found.mistake == "term_extra" and found.sentence == "There is a term too much: m1*l1*l2."
     (found,) = ARM.grade(g=["m1*g*l1*c1/2 + m2*g*l1*c1", G[1]]).diagnosis
-    assert found.sentence == "Missing: m2*g*l2*c12/2." or found.mistake
+    assert found.mistake == "term_missing" and found.sentence == "A term is missing: m2*g*l2*c12/2."
 
 
 def test_answers_of_other_kinds():
@@ -318,10 +323,10 @@ def test_a_quantity_that_cannot_be_read_leaves_the_others_judged():
     ]
 
 
-def test_entries_that_stay_empty_are_wrong_where_others_are_not():
+def test_entries_that_stay_empty_make_a_sheet_incomplete():
     report = ARM.grade(M=[["", M[0][1]], [M[1][0], M[1][1]]])
-    assert [entry.verdict for entry in report.entries] == [Verdict.WRONG, *[Verdict.CORRECT] * 3]
-    assert report.entries[0].statement == "left empty"
+    assert [entry.verdict for entry in report.entries] == [Verdict.INCOMPLETE, *[Verdict.CORRECT] * 3]
+    assert report.verdict is Verdict.INCOMPLETE and report.missing == ("M11",) and not report
 
 
 def test_own_numbers_are_those_of_the_shorthand_too():

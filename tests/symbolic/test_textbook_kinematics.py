@@ -21,7 +21,7 @@ from dhkit.description import (
 from dhkit.description.values import Placement
 from dhkit.expressions import parse
 from dhkit.kinematics import jacobian
-from dhkit.symbolic import exact_arm
+from dhkit.symbolic import MadeAt, exact_arm
 from dhkit.symbolic.textbook_kinematics import (
     JACOBIAN_MISTAKES,
     KINEMATIC_MISTAKES,
@@ -125,7 +125,7 @@ def test_every_mistake_changes_something(mistake):
 @pytest.mark.parametrize("mistake", sorted(LINK_MISTAKES))
 def test_at_one_link_the_other_links_stay_right(mistake):
     right = derive_kinematics(placed("stanford"))
-    wrong = derive_kinematics(placed("stanford"), {f"{mistake}@3"})
+    wrong = derive_kinematics(placed("stanford"), {MadeAt(mistake, 3)})
     assert all((right.A[i] == wrong.A[i]).all() for i in range(6) if i != 2)
     assert all((right.frames[i] == wrong.frames[i]).all() for i in range(3))
 
@@ -146,12 +146,12 @@ def test_a_locked_arm_keeps_its_kinematics():
 @pytest.mark.parametrize(
     ("mistakes", "error", "complaint"),
     [
-        ("tool_forgotten", TypeError, "expected a set of names"),
-        ({3}, TypeError, "expected a name"),
+        ("tool_forgotten", TypeError, "expected a set of identities"),
+        ({3}, TypeError, "expected MadeAt"),
         ({"tool"}, ValueError, "no mistake 'tool'"),
-        ({"alpha_sign@3"}, ValueError, "no link '3'; expected 1 to 2"),
-        ({"alpha_sign@x"}, ValueError, "no link 'x'"),
-        ({"tool_forgotten@1"}, ValueError, "concerns the whole arm"),
+        ({MadeAt("alpha_sign", 3)}, ValueError, "no link 3; expected 1 to 2"),
+        ({"alpha_sign@x"}, ValueError, "no mistake 'alpha_sign@x'"),
+        ({MadeAt("tool_forgotten", 1)}, ValueError, "concerns the whole arm"),
     ],
 )
 def test_unknown_mistakes_are_refused(mistakes, error, complaint):

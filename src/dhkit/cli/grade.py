@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, get_args
@@ -13,9 +13,9 @@ from dhkit.arm import Arm
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
 from dhkit.errors import AnswerError
 from dhkit.grading import LIBRARY, grade
-from dhkit.grading.answers.sheet import read_sheet
+from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.batch import GIGABYTE, Judge, find_sheets, grade_all
-from dhkit.grading.judgement import prepare
+from dhkit.grading.judgement import prepare, robot_of
 from dhkit.grading.marks import marks
 from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
@@ -46,32 +46,64 @@ def _own_rubric(path: Path) -> Rubric:
         data = read_sheet(path).rubric
     except AnswerError:  # said when it is judged
         return Rubric()
-    rubric = Rubric.from_data(data, f"{path}: rubric: ")
-    rubric.require_mistakes(LIBRARY, f"{path}: rubric: ")
-    return rubric
+    return _rubric_from(data, path)
 
 
-def grade_files(sheets: Sequence[Path], robot: str | None, rubric: Path | None, **options: Any) -> int:
+def grade_files(
+    sheets: Sequence[Path],
+    robot: str | None,
+    rubric: Path | None,
+    task: Path | None = None,
+    seed: int | None = None,
+    **options: Any,
+) -> int:
     """Judge sheets about their own robots, or all about one; see :func:`run` for the options.
+
+    Parameters
+    ----------
+    sheets
+        Files, and folders of them.
+    robot
+        What all are about, before the task's and the sheets' own.
+    rubric
+        What answers are worth, before the task's.
+    task
+        An instructor's file of what was asked for, and of which robot.
+    seed
+        Of the random states, to replay a report.
 
     Raises
     ------
     AnswerError, DescriptionError
-        As :func:`run`, or no such robot or rubric.
+        As :func:`run`, or no such robot, rubric or task.
     """
+    asked = None if task is None else read_task(task)
     about = Arm.load(robot).description if robot is not None else None
-    alone = rubric is None and len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
-    chosen = _own_rubric(sheets[0]) if alone else rubric_of(rubric)
+    if about is None and asked is not None and task is not None and asked.robot:
+        about = robot_of(asked, task.parent)
+    alone = len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
+    if rubric is None and asked is not None and asked.rubric:
+        chosen = _rubric_from(asked.rubric, task)
+    elif rubric is None and asked is None and alone:
+        chosen = _own_rubric(sheets[0])
+    else:
+        chosen = rubric_of(rubric)
     prepare(about)
-    own_files = [path for path in (rubric, Path(robot) if robot else None) if path is not None]
+    own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
     return run(
         sheets,
-        judge=lambda path: grade(path, about, chosen),
+        judge=lambda path: grade(path, about, chosen, task=asked, seed=seed),
         rubric=chosen,
         exclude=own_files,
         prepare=lambda report: prepare(about, report),
         **options,
     )
+
+
+def _rubric_from(data: Mapping[str, Any], path: Path | None) -> Rubric:
+    rubric = Rubric.from_data(data, f"{path}: rubric: ")
+    rubric.require_mistakes(LIBRARY, f"{path}: rubric: ")
+    return rubric
 
 
 def run(
@@ -84,6 +116,7 @@ def run(
     jobs: int | None = None,
     output: Path | None = None,
     json: bool = False,
+    read: bool = False,
     seconds: float = 60.0,
     memory: int = 2 * GIGABYTE,
     exclude: Collection[Path] = (),
@@ -110,6 +143,8 @@ def run(
         and all else is the teacher's, whole.
     json
         As ``form="json"``.
+    read
+        Whether text shows how each entry was read.
     exclude
         Files in the folders that are no sheets.
 
@@ -133,7 +168,7 @@ def run(
             progress=progress,
         )
         reports = list(judged)
-    deliver([Graded(report, marks(report, rubric)) for report in reports], form, level, output, several)
+    deliver([Graded(report, marks(report, rubric)) for report in reports], form, level, output, several, read)
     return _status(reports)
 
 
@@ -191,9 +226,10 @@ def _level(feedback: str | None, rubric: Rubric) -> Feedback:
 
 
 def _status(reports: Sequence[GradeReport]) -> int:
-    """Return the exit status of the worst: a sheet that could not be judged, then one that is wrong."""
-    worst = max((report.verdict for report in reports), key=lambda verdict: verdict.severity)
-    return {Verdict.UNREADABLE: 2, Verdict.WRONG: 1}.get(worst, 0)
+    """Return the exit status of the worst: a sheet that could not be judged, then one that does not pass."""
+    if any(report.verdict is Verdict.UNREADABLE for report in reports):
+        return 2
+    return 0 if all(reports) else 1
 
 
 @contextmanager

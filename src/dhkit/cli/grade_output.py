@@ -73,7 +73,9 @@ def check_output(output: Path | None, form: str, several: bool) -> None:
         raise AnswerError(f"{output.parent}: no such folder")
 
 
-def deliver(graded: Sequence[Graded], form: str, level: Feedback, output: Path | None, several: bool) -> None:
+def deliver(
+    graded: Sequence[Graded], form: str, level: Feedback, output: Path | None, several: bool, read: bool = False
+) -> None:
     """Print reports, or write them; what is written into a folder is told on stdout as well."""
     told = [one.told(level) for one in graded]
     if output is not None and _is_folder(output, form, several):
@@ -83,7 +85,7 @@ def deliver(graded: Sequence[Graded], form: str, level: Feedback, output: Path |
     if form == "json" and (output is None or output.is_dir()):
         sys.stdout.write(_document(told, form, level, several))
     elif form == "text":
-        _print(told, several)
+        _print(told, several, read)
     elif output is None:
         sys.stdout.write(_document(told, form, level, several))
     if output is not None and form != "json":
@@ -94,13 +96,15 @@ def _is_folder(output: Path, form: str, several: bool) -> bool:
     return output.is_dir() or (several and form == "text")
 
 
-def _print(told: Sequence[Graded], several: bool) -> None:
-    if several:
+def _print(told: Sequence[Graded], several: bool, read: bool) -> None:
+    if several and not read:
         console().print(terminal_class(*_columns(told)))
-    elif told[0].report.error:
-        sys.stderr.write(f"dhkit: {fault_of(told[0].report)}\n")
-    else:
-        console().print(terminal_report(told[0].report, told[0].marks))
+        return
+    for one in told:
+        if one.report.error:
+            sys.stderr.write(f"dhkit: {fault_of(one.report)}\n")
+        else:
+            console().print(terminal_report(one.report, one.marks, read))
 
 
 def _document(told: Sequence[Graded], form: str, level: Feedback, several: bool) -> str:

@@ -321,7 +321,12 @@ def grade(
     robot: Annotated[
         str | None, typer.Option(help="A library name or a robot file, in place of the sheets' own.")
     ] = None,
+    task: Annotated[
+        Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
+    ] = None,
     rubric: Annotated[Path | None, typer.Option(help="What answers are worth (.toml).")] = None,
+    read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
     form: Annotated[str, typer.Option("--format", help="text, json, gradescope, junit or html.")] = "text",
     feedback: Annotated[
         str | None, typer.Option(help="full, hint or verdict: how much is told; the rubric's unless given.")
@@ -338,7 +343,10 @@ def grade(
     ] = None,
     json: Json = False,
 ) -> int:
-    """Judge students' answers exactly, entry by entry; exit status 1 where one is wrong, 2 where one is unreadable."""
+    """Judge students' answers exactly, entry by entry.
+
+    Exit status 0: all pass; 1: one is wrong or incomplete, or lacks the proof that is asked for; 2: one is unreadable.
+    """
     from dhkit.cli import grade as grade_command
     from dhkit.cli import grade_texts
 
@@ -351,7 +359,7 @@ def grade(
     wanted: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
     if remark:
         return grade_command.remark(sheets, grade_command.rubric_of(rubric), **wanted)
-    return grade_command.grade_files(sheets, robot, rubric, jobs=jobs, seconds=seconds, **wanted)
+    return grade_command.grade_files(sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **wanted)
 
 
 @app.command()

@@ -9,9 +9,10 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import TracebackType
 
-from dhkit.grading.isolation import Judge, Limits, judged, killed, started
+from dhkit.grading.isolation import PIECE, Judge, Limits, judged, kill, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet, find_sheets
@@ -21,7 +22,6 @@ __all__ = ["GIGABYTE", "Judge", "Sheet", "find_sheets", "grade_all"]
 GIGABYTE = 1024**3
 MOST = 20_000_000
 """Bytes of a report."""
-PIECE = 1 << 18
 
 Numbered = tuple[int, GradeReport]
 """A report with its sheet's number, from 0."""
@@ -149,7 +149,7 @@ class _Processes:
     def start(self, number: int, sheet: Sheet) -> str:
         """Begin with a sheet; return why that cannot be."""
         try:
-            pid, pipe = started(sheet.path, self.judge, self.limits)
+            pid, pipe = start_worker(partial(judged, sheet.path, self.judge, self.limits), self.limits)
         except OSError as error:
             return f"no process to judge it in: {error.strerror}"
         now = time.monotonic()
@@ -188,7 +188,7 @@ class _Processes:
         self.running.remove(process)
         self._selector.unregister(process.pipe)
         os.close(process.pipe)
-        return killed(process.pid)
+        return kill(process.pid)
 
     def _report(self, process: _Process, status: int) -> GradeReport:
         """Return what a process that has ended sent, or why it sent nothing."""
@@ -214,8 +214,13 @@ def _signal(number: int) -> str:
 
 def _of_sheet(report: GradeReport, sheet: Sheet, seconds: float) -> GradeReport:
     """Return a report with what this process knows better than the judge."""
-    student = _printable(sheet.student or report.student or sheet.path.stem)
-    return replace(report, sheet=_printable(str(sheet.path)), student=student, seconds=report.seconds or seconds)
+    return replace(
+        report,
+        sheet=_printable(str(sheet.path)),
+        student=_printable(sheet.student or report.student or sheet.path.stem),
+        seconds=report.seconds or seconds,
+        left_out=(*report.left_out, *(f"not read: {_printable(name)}" for name in sheet.beside)),
+    )
 
 
 def _printable(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Judging one sheet in a forked process that can harm nobody: without files, and with limits."""
+"""Work in a forked process that can harm nobody: without files, and with limits of time and memory."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import contextlib
 import faulthandler
 import math
 import os
+import select
 import signal
 import sys
+import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,11 +19,13 @@ from typing import NoReturn, TypeAlias
 from dhkit.errors import DhkitError
 from dhkit.grading.report import GradeReport
 
-__all__ = ["Judge", "Limits", "judged", "killed", "started"]
+__all__ = ["Judge", "Limits", "judged", "kill", "result_of", "start_worker"]
 
 Judge: TypeAlias = Callable[[Path], GradeReport]
 """Judges a sheet; what it raises becomes the report's error."""
 
+PIECE = 1 << 18
+"""Bytes that are read from a pipe at once."""
 MOST_FILES = 65_536
 GRACE = 5.0
 """Seconds that a process may outlive its limit: then its parent has died and nobody else ends it."""
@@ -72,8 +76,8 @@ def _failed(error: str) -> bytes:
     return GradeReport(error=" ".join(error.split())).to_json().encode("utf-8", "replace")
 
 
-def started(path: Path, judge: Judge, limits: Limits) -> tuple[int, int]:
-    """Fork a process that judges a sheet; return its id and the end of a pipe from which to read its report.
+def start_worker(work: Callable[[], bytes], limits: Limits) -> tuple[int, int]:
+    """Fork a process that does some work; return its id and the end of a pipe from which to read its result.
 
     Raises
     ------
@@ -91,14 +95,48 @@ def started(path: Path, judge: Judge, limits: Limits) -> tuple[int, int]:
         os.close(end)
         raise
     if pid == 0:
-        _run(end, path, judge, limits)
+        _run(end, work, limits)
     os.close(end)
     with contextlib.suppress(OSError):  # the child does it too: whoever is first
         os.setpgid(pid, pid)
     return pid, pipe
 
 
-def killed(pid: int) -> int:
+def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
+    """Return what work in a process of its own gives; in this process where there is no ``os.fork`` (Windows).
+
+    Raises
+    ------
+    TimeoutError
+        It took longer than the limit.
+    ChildProcessError
+        The process ended without a result.
+    OSError
+        No process is to be had.
+    """
+    if not hasattr(os, "fork"):
+        return work()
+    pid, pipe = start_worker(work, limits)
+    received = bytearray()
+    deadline = time.monotonic() + limits.seconds
+    try:
+        while True:
+            ready, _, _ = select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))
+            if not ready:
+                raise TimeoutError(limits.late)
+            piece = os.read(pipe, PIECE)
+            if not piece:
+                break
+            received += piece
+    finally:
+        os.close(pipe)
+        kill(pid)
+    if not received:
+        raise ChildProcessError("the process ended without a result")
+    return bytes(received)
+
+
+def kill(pid: int) -> int:
     """End a process with all that it started, unless it has ended; return its status, below 0 a signal's."""
     with contextlib.suppress(OSError):
         os.killpg(pid, signal.SIGKILL)
@@ -110,8 +148,8 @@ def killed(pid: int) -> int:
         return 0
 
 
-def _run(end: int, path: Path, judge: Judge, limits: Limits) -> NoReturn:
-    """Be the child: judge, write the report, and leave without cleaning up what is the parent's."""
+def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
+    """Be the child: work, write the result, and leave without cleaning up what is the parent's."""
     status = 1
     try:
         with contextlib.suppress(OSError):
@@ -119,7 +157,7 @@ def _run(end: int, path: Path, judge: Judge, limits: Limits) -> NoReturn:
         end = _above_standard(end)
         _close_files(end)
         _limit(limits)
-        text = judged(path, judge, limits)
+        text = work()
         signal.setitimer(signal.ITIMER_REAL, 0.0)  # the parent may be busy with other reports
         _write(end, text)
         status = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import secrets
 import time
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -12,11 +13,19 @@ import numpy as np
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
-from dhkit.grading.answers.given import Given, given_branches, given_quantity, given_rows, vocabulary_of
+from dhkit.grading.answers.given import (
+    Given,
+    given_branches,
+    given_quantity,
+    given_rows,
+    vocabulary_of,
+    with_entries_gathered,
+)
 from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names
+from dhkit.grading.answers.typeset import typeset
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
-from dhkit.grading.judging.findings import Finding, readable
+from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.functions import judge_function
 from dhkit.grading.judging.kinematic_entries import KinematicEntries, inverse_entries, table_entries
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
@@ -25,16 +34,14 @@ from dhkit.grading.judging.truth import Truth, shape_of, truth_of
 from dhkit.grading.mistakes.explaining import explain
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.symbolic import ExactArm
-from dhkit.symbolic.equations import latex_text
 from dhkit.symbolic.ring import RingError
 
-__all__ = ["LONGEST_LATEX", "judge"]
-
-LONGEST_LATEX = 200
-"""Terms of an answer that is typeset in reports."""
+__all__ = ["judge"]
 
 
-def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> GradeReport:
+def judge(
+    description: Description, sheet: AnswerSheet, digits: int = 4, *, seed: int | None = None, explained: bool = True
+) -> GradeReport:
     """Judge everything on a sheet.
 
     Parameters
@@ -45,6 +52,11 @@ def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> Grad
         What was handed in.
     digits
         Significant digits from which a decimal may have been rounded.
+    seed
+        Of the random states that answers outside the exact ring are tried at; from the system's entropy unless given,
+        so that no sheet can be made for the states that are tried. The report has it, for replay.
+    explained
+        Whether mistakes are looked for; verdicts do not depend on it.
 
     Raises
     ------
@@ -54,28 +66,36 @@ def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> Grad
         The robot has no bodies, and equations of motion were handed in.
     """
     start = time.perf_counter()
+    seed = secrets.randbits(53) if seed is None else seed
     truth = truth_of(description, sheet.names.absolute, sheet.task.friction)
     vocabulary = vocabulary_of(description, sheet.names, truth.coordinates.sums)
-    judged, refused = _judged(description, sheet, vocabulary, truth, digits)
-    others, refused_others = _kinematic(description, sheet, vocabulary)
+    judged, refused = _judged(description, sheet, vocabulary, truth, digits, seed)
+    others, refused_others = _kinematic(description, sheet, vocabulary, seed)
     refused |= refused_others
     if refused and not judged and not others:
         raise next(iter(refused.values()))
     if not judged and not others:
         raise AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity")
-    parts = Consistency(truth, judged)
-    follows, agreement, diagnosis, too_long = _explained(truth, parts, digits)
+    follows, agreement, diagnosis = _explained(truth, judged, digits) if explained else ({}, [], [])
     entries = [
         entry
         for name, quantity in judged.items()
         for entry in _entries(truth.arm(name), quantity, follows.get(name, {}))
     ]
-    notes = [*_notes(truth, judged, vocabulary), *agreement, *too_long]
+    notes = [*sheet.notes, *_notes(truth, judged, vocabulary), *agreement]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
+    judged_at = _judged_at(truth, judged)
     for other in others:
+        judged_at |= other.judged_at
         entries += other.entries
-        diagnosis += other.diagnosis
+        diagnosis += other.diagnosis if explained else ()
         notes += other.notes
+    on_sheet = {entry.quantity for entry in entries}
+    entries += [
+        Entry(name, (), Verdict.INCOMPLETE, statement="asked for, and not on the sheet")
+        for name in sheet.task.asked
+        if name not in on_sheet
+    ]
     return GradeReport(
         description.name,
         description.digest,
@@ -87,18 +107,32 @@ def judge(description: Description, sheet: AnswerSheet, digits: int = 4) -> Grad
         sheet.student,
         "",
         time.perf_counter() - start,
+        sheet.left_out,
+        judged_at,
+        seed,
+        sheet.task.proof_required,
     )
 
 
+def _judged_at(truth: Truth, judged: Mapping[str, JudgedQuantity]) -> dict[str, float]:
+    """Return the values of the parameters that answers hold as numbers."""
+    found: dict[str, float] = {}
+    for name, quantity in judged.items():
+        values = truth.arm(name).parameters
+        found |= {parameter: values[parameter] for parameter in sorted(quantity.numbers)}
+    return found
+
+
 def _explained(
-    truth: Truth, parts: Consistency, digits: int
-) -> tuple[dict[str, dict[tuple[int, ...], str]], list[str], list[Diagnosis], list[str]]:
-    """Return what wrong entries follow from, which parts agree, what went wrong, and a note where that is too long."""
+    truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int
+) -> tuple[dict[str, dict[tuple[int, ...], str]], list[str], list[Diagnosis]]:
+    """Return what wrong entries follow from, which parts agree or why that is not told, and what went wrong."""
+    parts = Consistency(truth, judged)
     try:
         follows = {name: parts.follows(name) for name in parts.judged}
-        return follows, parts.notes(), explain(truth, parts.judged, digits), []
+        return follows, parts.notes(), explain(truth, parts.judged, digits, follows)
     except RingError as error:
-        return {}, [], [], [f"not explained, since an answer is too long: {error}"[:200]]
+        return {}, [f"not explained, since an answer is too long: {error}"[:200]], []
 
 
 def _version() -> str:
@@ -109,16 +143,16 @@ def _version() -> str:
 
 
 def _judged(
-    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, truth: Truth, digits: int
+    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, truth: Truth, digits: int, seed: int
 ) -> tuple[dict[str, JudgedQuantity], dict[str, DhkitError]]:
     """Judge a sheet's quantities; return them, and why others could not be: one does not stop the rest."""
     judged: dict[str, JudgedQuantity] = {}
     refused: dict[str, DhkitError] = {}
-    for name, value in sheet.answers.items():
+    for name, value in with_entries_gathered(sheet.answers, description).items():
         if _is_empty(value):
             continue
         try:
-            judged[name] = _judge_one(name, value, description, sheet, vocabulary, truth, digits)
+            judged[name] = _judge_one(name, value, description, sheet, vocabulary, truth, digits, seed)
         except AnswerError as error:
             refused[name] = AnswerError(f"{sheet.file}: answer: {error}")
         except DescriptionError as error:
@@ -134,6 +168,7 @@ def _judge_one(
     vocabulary: Vocabulary,
     truth: Truth,
     digits: int,
+    seed: int,
 ) -> JudgedQuantity:
     known = quantity_names(description.n)
     if name not in known:
@@ -141,24 +176,24 @@ def _judge_one(
         hint = f"did you mean {meant!r}?" if meant else f"expected {', '.join(known)}, dh, ik"
         raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
     if callable(value):
-        return judge_function(name, value, truth)
+        return judge_function(name, value, truth, seed)
     given = given_quantity(name, value, shape_of(name, description.n), vocabulary)
-    return judge_quantity(name, given, truth, sheet.task, digits)
+    return judge_quantity(name, given, truth, sheet.task, digits, seed)
 
 
 def _kinematic(
-    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary
+    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, seed: int
 ) -> tuple[list[KinematicEntries], dict[str, DhkitError]]:
     """Judge a sheet's table and formulas of inverse kinematics, as :func:`_judged` does its quantities."""
     n = description.n
 
     def table() -> KinematicEntries:
         convention, rows = sheet.table or ("", ())
-        return table_entries(description, given_rows(rows, n, vocabulary), convention)
+        return table_entries(description, given_rows(rows, n, vocabulary), convention, sheet.task, seed)
 
     def inverse() -> KinematicEntries:
         own = vocabulary_of(description, sheet.names, inverse=True)
-        return inverse_entries(description, given_branches(sheet.branches, n, own))
+        return inverse_entries(description, given_branches(sheet.branches, n, own), seed)
 
     found, refused = [], dict[str, DhkitError]()
     for name, judge_it, is_there in (("dh", table, sheet.table), ("ik", inverse, sheet.branches)):
@@ -171,7 +206,9 @@ def _kinematic(
 
 def _is_empty(value: Any) -> bool:
     """Whether nothing was handed in: a template's entries that stayed empty."""
-    return all(map(_is_empty, value)) if isinstance(value, list) else value == "" if isinstance(value, str) else False
+    if isinstance(value, list):
+        return all(map(_is_empty, value))
+    return isinstance(value, str) and not value.strip()
 
 
 def _entries(arm: ExactArm, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> list[Entry]:
@@ -179,23 +216,19 @@ def _entries(arm: ExactArm, quantity: JudgedQuantity, follows: Mapping[tuple[int
 
 
 def _entry(arm: ExactArm, name: str, given: Given, finding: Finding, follows: Mapping[tuple[int, ...], str]) -> Entry:
-    latex = ""
-    if finding.answer is not None and name != "C":
-        element = finding.answer.element()
-        short = element is not None and len(element) <= LONGEST_LATEX
-        latex = latex_text(readable(arm, element)) if element is not None and short else ""
-    source = follows.get(given.index, "")
+    text, latex = typeset(given.tree) if given.tree is not None else ("", "")
     return Entry(
         name,
         given.index,
         finding.verdict,
         given.text,
         latex,
-        finding.statement,
+        "missing" if given.is_missing else finding.statement,
         finding.texts[0],
         finding.texts[1],
         finding.witness,
-        source,
+        follows.get(given.index, ""),
+        text,
     )
 
 
@@ -207,6 +240,9 @@ def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocab
             values = truth.arm(name).parameters
             listed = ", ".join(f"{p} = {values[p]:g}" for p in sorted(quantity.numbers))
             notes.append(f"{name}: judged at the file's numbers: {listed}")
+        for index in quantity.contradictions:
+            entry = Entry(name, index, Verdict.WRONG).name
+            notes.append(f"{entry}: the sides of its chain of equations differ; the last one is judged")
     if "C" in judged:
         notes += _about_C(truth, judged["C"])
     notes += [f"{typed!r} was read as {meant}" for typed, meant in vocabulary.taken_for.items()]
@@ -222,7 +258,7 @@ def _is_shifted(quantity: JudgedQuantity | None) -> bool:
     if quantity is None or quantity.wrong:
         return False
     answers = quantity.answers
-    return answers is not None and not answers[()].less(quantity.right(())).is_zero
+    return answers is not None and not answers[()].numerator_of_difference(quantity.right(())).is_zero
 
 
 def _about_C(truth: Truth, judged: JudgedQuantity) -> list[str]:

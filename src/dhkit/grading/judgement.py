@@ -10,7 +10,7 @@ from typing import Any
 from dhkit.description import Description, library_robot, read_robot, robots
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
-from dhkit.grading.answers.sheet import AnswerSheet, quantity_names, read_sheet, sheet_of
+from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sources import LANGUAGES, read_source
 from dhkit.grading.judge import judge
 from dhkit.grading.judging.truth import truth_of
@@ -26,7 +26,15 @@ LONGEST_NAME = 200
 ONE = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
 
 
-def grade(path: str | Path, robot: Description | None = None, rubric: Rubric | None = None) -> GradeReport:
+def grade(
+    path: str | Path,
+    robot: Description | None = None,
+    rubric: Rubric | None = None,
+    *,
+    task: AnswerSheet | None = None,
+    seed: int | None = None,
+    explain: bool = True,
+) -> GradeReport:
     """Judge an answer sheet, or what a program or a paper assigns; nothing in it is executed.
 
     Work and size are bounded; for limits of time and memory see :func:`dhkit.grading.batch.grade_all`.
@@ -39,6 +47,13 @@ def grade(path: str | Path, robot: Description | None = None, rubric: Rubric | N
         What it is about; the sheet says so unless given.
     rubric
         What counts as rounding.
+    task
+        What was asked for, from :func:`dhkit.grading.answers.sheet.read_task`: it goes before the sheet's own [task],
+        and its [names] count where the sheet has none.
+    seed
+        Of the random states that answers outside the exact ring are tried at; from the system's entropy unless given.
+    explain
+        Whether mistakes are looked for; verdicts do not depend on it.
 
     Raises
     ------
@@ -51,9 +66,21 @@ def grade(path: str | Path, robot: Description | None = None, rubric: Rubric | N
     if path.suffix.lower() == ".ipynb" or path.suffix.lower() in LANGUAGES:
         if robot is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
-        return judge(robot, read_source(path, robot.n), digits)
-    sheet = read_sheet(path)
-    return judge(robot or robot_of(sheet, path.parent), sheet, digits)
+        sheet = read_source(path, robot)
+    else:
+        sheet = read_sheet(path)
+    about = robot or robot_of(sheet, path.parent)
+    if task is not None:
+        sheet = replace(sheet, task=task.task, names=_names(sheet.names, task.names))
+    report = judge(about, sheet, digits, seed=seed, explained=explain)
+    return replace(report, own_robot=robot is None)
+
+
+def _names(own: Names, given: Names) -> Names:
+    """Return a sheet's names, those of the task where it has none of its own."""
+    parameters = {**given.parameters, **own.parameters}
+    q, qd, qdd = own.q or given.q, own.qd or given.qd, own.qdd or given.qdd
+    return replace(own, q=q, qd=qd, qdd=qdd, absolute=own.absolute or given.absolute, parameters=parameters)
 
 
 def grade_answers(
@@ -62,6 +89,9 @@ def grade_answers(
     names: Mapping[str, Any] | None = None,
     task: Mapping[str, Any] | None = None,
     rubric: Rubric | None = None,
+    *,
+    seed: int | None = None,
+    explain: bool = True,
 ) -> GradeReport:
     """Judge answers that are text, numbers, sympy or CasADi expressions, or functions.
 
@@ -75,6 +105,8 @@ def grade_answers(
         As on a sheet: ``{"q": ["th1", "th2"], "angles": "absolute"}``, ``{"friction": True}``.
     rubric
         What counts as rounding.
+    seed, explain
+        As in :func:`grade`.
 
     Raises
     ------
@@ -88,7 +120,8 @@ def grade_answers(
         except AnswerError as error:
             raise AnswerError(f"{name}: {error}") from None
     sheet = sheet_of({"answer": listed, "names": dict(names or {}), "task": dict(task or {})}, "answers")
-    return replace(judge(description, sheet, (rubric or Rubric()).digits), sheet=None)
+    report = judge(description, sheet, (rubric or Rubric()).digits, seed=seed, explained=explain)
+    return replace(report, sheet=None)
 
 
 def robot_of(sheet: AnswerSheet, folder: Path) -> Description:

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from dhkit.grading.answers.sheet import QUANTITY
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
-from dhkit.grading.rubric import QUANTITY, Credit, Rubric
+from dhkit.grading.rubric import Credit, Rubric
 
 __all__ = ["Mark", "Marks", "marks"]
 
@@ -63,7 +64,7 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     entries, sums = [], {quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()}
     for entry in report.entries:
         most = sums[entry.quantity][1] * _part(entry, report, rubric)
-        share, rule = _share(entry, report.diagnosis, rubric.credit)
+        share, rule = _share(entry, report, rubric.credit)
         sums[entry.quantity][0] += share * most
         entries.append(Mark(entry.name, float(share * most), float(most), rule if most else "counts nothing"))
     missing = weights.keys() - set(report.quantities)
@@ -95,18 +96,19 @@ def _part(entry: Entry, report: GradeReport, rubric: Rubric) -> Fraction:
     return _entry_weight(entry, rubric) / total if total else Fraction(0)
 
 
-def _share(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> tuple[Fraction, str]:
+def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction, str]:
     """Return the share that an entry gets of its points, and why: of several reasons the best."""
     simple = {
         Verdict.CORRECT: 1.0,
         Verdict.ROUNDED: credit.rounding,
-        Verdict.UNDECIDED: credit.undecided,
+        Verdict.UNDECIDED: 0.0 if report.proof_required else credit.undecided,
+        Verdict.INCOMPLETE: 0.0,
         Verdict.UNREADABLE: 0.0,
     }
     if entry.verdict in simple:
         reasons = [(_exact(simple[entry.verdict]), entry.verdict.value)]
     else:
-        reasons = [(Fraction(0), "wrong"), *_reasons(entry, diagnosis, credit)]
+        reasons = [(Fraction(0), "wrong"), *_reasons(entry, report.diagnosis, credit)]
     share, rule = max(reasons, key=lambda reason: reason[0])
     return share, rule if share in (0, 1) else f"{rule}: {100 * float(share):g} %"
 
@@ -126,7 +128,7 @@ def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> 
 def _mistake_share(found: Diagnosis, credit: Credit, otherwise: float) -> float:
     """Return what the rubric gives for a mistake, or for one that gives the same answers and is worth more."""
     names = (str(found.mistake), *found.equivalent)
-    bare = [name if name in credit.mistakes else name.partition("@")[0] for name in names]  # half_forgotten@2
+    bare = [name if name in credit.mistakes else name.partition(" (")[0] for name in names]  # half_forgotten (link 2)
     return max((credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise)
 
 

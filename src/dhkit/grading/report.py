@@ -20,6 +20,7 @@ class Verdict(Enum):
     CORRECT = "correct"
     ROUNDED = "correct within rounding"
     UNDECIDED = "undecided"
+    INCOMPLETE = "incomplete"
     WRONG = "wrong"
     UNREADABLE = "unreadable"
 
@@ -66,7 +67,7 @@ class Entry:
     answer
         The text as it was handed in.
     latex
-        The answer as it was read, in LaTeX; empty where it is not in the exact ring.
+        The answer as it was read, in LaTeX, names in the robot's own; empty where it could not be read, or is too long.
     statement
         Why the verdict holds, in a line: proved, sampled, within which rounding.
     difference
@@ -77,6 +78,8 @@ class Entry:
         A state in which both differ, where it is wrong.
     follows
         Which earlier answers of the same sheet this follows from: right in itself, wrong because they are.
+    read
+        The answer as it was read, as plain text in the robot's own names; empty where ``latex`` is.
     """
 
     quantity: str
@@ -89,6 +92,7 @@ class Entry:
     difference_latex: str = ""
     witness: Witness | None = None
     follows: str = ""
+    read: str = ""
 
     @property
     def name(self) -> str:
@@ -152,11 +156,22 @@ class GradeReport:
     sheet
         The file, or what else it was; None for answers of the Python API.
     student
-        Whose it is; empty where nobody says.
+        Student's name; empty if unknown.
     error
         Why the sheet could not be judged; empty where it was.
     seconds
         How long it took.
+    left_out
+        Statements and files of the student's that were not read as answers.
+    judged_at
+        Parameters that the answers hold as numbers: what is right is right at these values alone, the file's.
+    seed
+        Seed of the random states that answers outside the exact ring were tried at; None where the sheet was not
+        judged.
+    proof_required
+        Whether the task asks for proof: what is undecided then does not pass.
+    own_robot
+        Whether the sheet itself names the robot that it was judged by.
 
     Examples
     --------
@@ -176,6 +191,11 @@ class GradeReport:
     student: str = ""
     error: str = ""
     seconds: float = field(default=0.0, compare=False)
+    left_out: tuple[str, ...] = ()
+    judged_at: Mapping[str, float] = field(default_factory=dict)
+    seed: int | None = field(default=None, compare=False)
+    proof_required: bool = False
+    own_robot: bool = False
 
     @property
     def verdict(self) -> Verdict:
@@ -185,8 +205,23 @@ class GradeReport:
         return max((entry.verdict for entry in self.entries), key=lambda verdict: verdict.severity)
 
     def __bool__(self) -> bool:
-        """Whether nothing was found wrong."""
-        return self.verdict.passes
+        """Whether the sheet passes: nothing is wrong, missing or unread, and all is proved where that is asked for."""
+        return self.verdict.passes and not (self.proof_required and self.verdict is Verdict.UNDECIDED)
+
+    @property
+    def conclusion(self) -> str:
+        """The verdict in words, with the parameter values at which it holds and what it lacks to pass."""
+        said = self.verdict.value
+        if self.judged_at:
+            said += f", judged at {', '.join(f'{name} = {value:g}' for name, value in self.judged_at.items())}"
+        if self.proof_required and self.verdict is Verdict.UNDECIDED:
+            said += ", and a proof is asked for"
+        return said
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the entries and quantities that were begun or asked for, and are not on the sheet."""
+        return tuple(entry.name for entry in self.entries if entry.verdict is Verdict.INCOMPLETE)
 
     @property
     def fault(self) -> str:
@@ -198,9 +233,13 @@ class GradeReport:
         """Return the verdict, what is wrong, and why, in a few lines."""
         if self.error:
             return f"{self.robot or self.sheet}: unreadable: {self.error}"
-        failed = [entry.name for entry in self.entries if not entry.verdict.passes]
-        head = f"{self.robot}: {self.verdict.value}" + (f": {', '.join(failed)}" if failed else "")
-        return "\n".join([head, *(f"  {found.place}: {found.sentence}" for found in self.diagnosis)])
+        failed = [
+            entry.name for entry in self.entries if not entry.verdict.passes and entry.verdict is not Verdict.INCOMPLETE
+        ]
+        head = f"{self.robot}: {self.conclusion}" + (f": {', '.join(failed)}" if failed else "")
+        lines = [f"  {found.place}: {found.sentence}" for found in self.diagnosis]
+        lines += [f"  missing: {', '.join(self.missing)}"] if self.missing else []
+        return "\n".join([head, *lines])
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -242,7 +281,8 @@ class GradeReport:
             Diagnosis(**{**found, "entries": tuple(found["entries"]), "equivalent": tuple(found["equivalent"])})
             for found in data["diagnosis"]
         )
-        return cls(**{**data, "entries": entries, "diagnosis": diagnosis, "notes": tuple(data["notes"])})
+        listed = {name: tuple(data[name]) for name in ("notes", "left_out")}
+        return cls(**{**data, "entries": entries, "diagnosis": diagnosis, **listed})
 
     def to_json(self) -> str:
         """Return :meth:`data` as JSON."""

@@ -16,13 +16,12 @@ from pydantic_core import ErrorDetails
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.answers.sheet import QUANTITY
 
-__all__ = ["QUANTITY", "Credit", "Feedback", "Rubric"]
+__all__ = ["Credit", "Feedback", "Rubric"]
 
 MAX_BYTES = 100_000
 STRICT = ConfigDict(extra="forbid")
-QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
-"""Names of quantities."""
 WEIGHED = re.compile(rf"({QUANTITY.pattern})(_?[0-9]+)?")
 QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A1")
 

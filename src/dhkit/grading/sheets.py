@@ -6,7 +6,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dhkit.errors import AnswerError
@@ -14,9 +14,9 @@ from dhkit.errors import AnswerError
 __all__ = ["SUFFIXES", "Sheet", "find_sheets"]
 
 SUFFIXES = frozenset((".toml", ".py", ".m", ".tex", ".ipynb"))
-DOCUMENTS = frozenset((".pdf", ".doc", ".docx", ".odt", ".rtf", ".zip", ".jpg", ".jpeg", ".png", ".heic"))
-"""What students hand in that cannot be judged, and must not be lost."""
 MAX_DEPTH = 8
+MAX_LISTED = 20
+"""Names of unread files that are listed one by one."""
 MAX_SHEETS = 10_000
 MAX_FILES = 200_000
 """Entries of folders that are looked at: a student may hand in a whole disk."""
@@ -37,19 +37,24 @@ class Sheet:
         Whose it is: the name of the file, or of the folder of a student's own.
     error
         Why it is not to be judged; empty where it is.
+    beside
+        Names of the student's other files, which are not read.
     """
 
     path: Path
     student: str = ""
     error: str = ""
+    beside: tuple[str, ...] = ()
 
 
 def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[Sheet]:
     """Return the sheets among files and folders, each once, in the order given and by name within a folder.
 
     Files are taken as they are. Of folders, those files whose names end as sheets' do, in folders below as well;
-    hidden files and robot files are passed over. A link that leaves the folder is not followed, and becomes a sheet
-    with an error; a link to a folder within is passed over, since that folder is read anyway.
+    hidden files, and robot files right in a folder, are passed over. Files of another kind are not read: a student's
+    sheet lists them, and of a student without a sheet they become one with an error. A link that leaves the folder is
+    not followed, and becomes a sheet with an error; a link to a folder within is passed over, since that folder is
+    read anyway.
 
     A sheet right in a folder is its file's name's, one further below that of the first folder below; a file given is
     its own name's, and of several with one name (``*/answer.toml``) each its folder's. What a sheet says itself counts
@@ -80,10 +85,6 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
     return list(found.values())
 
 
-def _is_document(sheet: Sheet) -> bool:
-    return sheet.path.suffix.lower() in DOCUMENTS
-
-
 def _student(path: Path, stems: Counter[str]) -> str:
     if stems.total() == 1:
         return ""
@@ -91,13 +92,35 @@ def _student(path: Path, stems: Counter[str]) -> str:
 
 
 def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
-    sheets = [sheet for sheet in _seen(root) if sheet.error or sheet.path.resolve() not in passed_over]
-    handed_in = {sheet.student for sheet in sheets if not _is_document(sheet)}
-    # A figure beside a sheet is no answer of its own.
-    sheets = [sheet for sheet in sheets if not _is_document(sheet) or sheet.student not in handed_in]
-    if all(map(_is_document, sheets)):
+    sheets: dict[str, list[Sheet]] = {}
+    unread: dict[str, list[Path]] = {}
+    for sheet in _seen(root):
+        if not sheet.error and sheet.path.resolve() in passed_over:
+            continue
+        if sheet.error == UNREAD:
+            unread.setdefault(sheet.student, []).append(sheet.path)
+        else:
+            sheets.setdefault(sheet.student, []).append(sheet)
+    if not sheets:
         raise AnswerError(f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SUFFIXES))}")
-    return sheets
+    for student, paths in unread.items():
+        if student in sheets:
+            first, *others = sheets[student]
+            sheets[student] = [replace(first, beside=_listed([path.name for path in paths])), *others]
+        else:
+            kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
+            error = f"not read: {', '.join(_listed(list(kinds)))}; expected {', '.join(sorted(SUFFIXES))}"
+            sheets[student] = [Sheet(paths[0], student, error)]
+    return sorted((sheet for own in sheets.values() for sheet in own), key=lambda sheet: sheet.path.parts)
+
+
+def _listed(names: Sequence[str]) -> tuple[str, ...]:
+    more = (f"{len(names) - MAX_LISTED} more",) if len(names) > MAX_LISTED else ()
+    return (*names[:MAX_LISTED], *more)
+
+
+UNREAD = "unread"
+"""Stands, in :func:`_seen`, for the error of a file of an unknown kind."""
 
 
 def _seen(root: Path) -> Iterator[Sheet]:
@@ -112,9 +135,10 @@ def _seen(root: Path) -> Iterator[Sheet]:
         elif path.is_dir():
             if fault := _fault_of_folder(path, len(parts)):
                 yield Sheet(path, student, fault)
-        elif path.suffix.lower() in DOCUMENTS:
-            yield Sheet(path, student, f"a {path.suffix.lower()} file; expected {', '.join(sorted(SUFFIXES))}")
-        elif path.suffix.lower() in SUFFIXES and not _is_robot(path):
+        elif path.suffix.lower() not in SUFFIXES or _is_robot(path):
+            if len(parts) > 1 or path.suffix.lower() not in SUFFIXES:
+                yield Sheet(path, student, UNREAD)
+        else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
 
 

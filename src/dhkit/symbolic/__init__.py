@@ -28,7 +28,7 @@ from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.exact.regressor import Regressor
-from dhkit.symbolic.mistakes import MISTAKES
+from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
 from dhkit.symbolic.programs.graph import Graph, Node, Variable
 from dhkit.symbolic.programs.operations import operation_count
 from dhkit.symbolic.programs.printers import c_source, export_c, python_lines
@@ -47,12 +47,15 @@ __all__ = [
     "Graph",
     "InertialTable",
     "Lagrangian",
+    "MadeAt",
+    "Mistake",
     "Moments",
     "Node",
     "Proof",
     "ReferenceAxes",
     "Regressor",
     "RingError",
+    "Subject",
     "SymbolicTable",
     "Symbols",
     "TextbookDerivation",

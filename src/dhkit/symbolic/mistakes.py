@@ -1,59 +1,218 @@
-"""Where students go wrong when they derive equations of motion: places in :mod:`dhkit.symbolic.textbook`, by name."""
+"""Mistakes as values, and those that are made while deriving equations of motion as a textbook does.
+
+A mistake has an identity that stays the same over versions, a subject, what is then the case, and where to look. Those
+of this module are places in :mod:`dhkit.symbolic.textbook`, made at every link or at one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
 from fractions import Fraction
 
-__all__ = ["LINK_MISTAKES", "MISTAKES", "ROTOR_MISTAKES", "STEP_FACTORS", "VELOCITY_FACTORS", "check_mistake", "has"]
+__all__ = [
+    "LINK_MISTAKES",
+    "MISTAKES",
+    "ROTOR_MISTAKES",
+    "STEP_FACTORS",
+    "VELOCITY_FACTORS",
+    "MadeAt",
+    "Mistake",
+    "Subject",
+    "catalogue",
+    "check_mistake",
+    "has",
+    "made_at",
+]
 
 HALF = Fraction(1, 2)
 
-MISTAKES: Mapping[str, str] = {
-    "gravity_sign": "gravity has the wrong sign: V falls where it should rise",
-    "gravity_forgotten": "gravity is missing: V is zero",
-    "mass_forgotten": "the link's mass is missing",
-    "inertia_forgotten": "the link's inertia about its centre of mass is missing",
-    "height_at_joint": "the height is that of the joint in place of the centre of mass",
-    "height_at_end": "the height is that of the link's end in place of the centre of mass",
-    "height_relative_angle": "the height uses the joint's own angle in place of the sum of the angles up to it",
-    "height_forgotten": "the link's potential energy is missing",
-    "com_at_end": "the centre of mass is taken at the link's end, the full length in place of the half",
-    "velocity_at_joint": "the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
-    "velocity_cross_term": "the square of the velocity lacks the cross term 2 v.(omega x r)",
-    "velocity_relative_angle": "the velocity uses the joint's own angle in place of the sum of the angles up to it",
-    "rotation_transposed": "the link's rotation is transposed where its centre of mass is placed",
-    "omega_relative": "the angular velocity is that of the joint alone, without the joints before it",
-    "inertia_doubled": "the link's inertia about its centre of mass counts twice",
-    "inertia_about_joint": "the inertia about the joint is used as if it were about the centre of mass: Steiner twice",
-    "inertia_about_com_at_joint": (
-        "the inertia about the centre of mass is used as if it were about the joint: no parallel-axis term"
+
+class Subject(Enum):
+    """What a mistake is made in."""
+
+    TABLE = "table"
+    TRANSFORM = "transform"
+    JACOBIAN = "Jacobian"
+    ENERGY = "energy"
+    EQUATION = "equation"
+    INVERSE = "inverse"
+    WRITING = "writing"
+    """Units, signs and digits of any answer."""
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake that students make.
+
+    Attributes
+    ----------
+    identity
+        A stable name.
+    subject
+        What it is made in.
+    sentence
+        What is then the case, without the place: a clause that begins with its subject.
+    hint
+        Where to look, without saying what is wrong.
+    """
+
+    identity: str
+    subject: Subject
+    sentence: str
+    hint: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+@dataclass(frozen=True)
+class MadeAt:
+    """A mistake where it is made.
+
+    Attributes
+    ----------
+    identity
+        Of the mistake.
+    link
+        The link, from 1; None where it is made throughout.
+    """
+
+    identity: str
+    link: int | None = None
+
+    def __str__(self) -> str:
+        return self.identity if self.link is None else f"{self.identity} at link {self.link}"
+
+
+def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:
+    """Return mistakes as values; an identity alone is made throughout.
+
+    Raises
+    ------
+    TypeError
+        A text in place of a set of identities.
+    """
+    if isinstance(mistakes, str):
+        raise TypeError(f"mistakes is {mistakes!r}; expected a set of identities, as in {{{mistakes!r}}}")
+    return frozenset(MadeAt(mistake) if isinstance(mistake, str) else mistake for mistake in mistakes)
+
+
+def catalogue(*groups: Iterable[Mistake]) -> dict[str, Mistake]:
+    """Return mistakes by identity, in their order.
+
+    Raises
+    ------
+    ValueError
+        Two mistakes have one identity.
+    """
+    found: dict[str, Mistake] = {}
+    for group in groups:
+        for mistake in group:
+            if mistake.identity in found:
+                raise ValueError(f"two mistakes are called {mistake.identity!r}")
+            found[mistake.identity] = mistake
+    return found
+
+
+POTENTIAL = "Look again at the potential energy: which way does it grow, and of which point is the height?"
+COM_VELOCITY = "Look again at the velocity of the centre of mass: differentiate its position."
+ANGULAR_VELOCITY = "Look again at the angular velocity: which joints turn this link?"
+INERTIA = "Look again at the inertia: of which body, about which point, and about which axes?"
+KINETIC_FACTORS = "Look again at the factors in the kinetic energy."
+DRIVES = "Look again at the drives: how fast does the rotor turn when the joint does?"
+RATE_TERMS = "Look again at the terms with rates: d/dt of dK/dqd, less dK/dq."
+MASSES = "Look again at the masses: which body moves with which joint?"
+
+
+def _energy(hint: str, **sentences: str) -> list[Mistake]:
+    return [Mistake(identity, Subject.ENERGY, sentence, hint) for identity, sentence in sentences.items()]
+
+
+def _equation(hint: str, **sentences: str) -> list[Mistake]:
+    return [Mistake(identity, Subject.EQUATION, sentence, hint) for identity, sentence in sentences.items()]
+
+
+MISTAKES: Mapping[str, Mistake] = catalogue(
+    _energy(
+        POTENTIAL,
+        gravity_sign="gravity has the wrong sign: V falls where it should rise",
+        gravity_forgotten="gravity is missing: V is zero",
     ),
-    "inertia_axes": "the inertia's moments are exchanged in turn: taken about the wrong axes",
-    "half_forgotten": "the kinetic energy lacks its factor 1/2",
-    "half_squared": "the kinetic energy has the factor 1/4 in place of 1/2",
-    "translation_half_forgotten": "the energy of translation lacks its factor 1/2",
-    "rotation_half_forgotten": "the energy of rotation lacks its factor 1/2",
-    "rotor_forgotten": "the rotor's inertia is missing",
-    "rotor_gear": "the rotor's inertia is multiplied by the gear ratio in place of its square",
-    "gravity_axis": "gravity acts along the wrong axis: its components are exchanged in turn, x to y to z",
-    "gravity_axis_back": "gravity acts along the wrong axis: its components are exchanged in turn, z to y to x",
-    "potential_gradient_sign": "dV/dq has the wrong sign in Euler and Lagrange's equation",
-    "mass_rate_omitted": "d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
-    "mass_rate_halved": "d/dt dK/dqd - dK/dq is replaced by half of dM/dt qd",
-    "kinetic_gradient_omitted": "dK/dq is missing from Euler and Lagrange's equation",
-    "kinetic_gradient_sign": "dK/dq has the wrong sign in Euler and Lagrange's equation",
-    "christoffel_indices": (
-        "the indices of the Christoffel symbols are exchanged: dM_jk/dq_i is added and dM_ij/dq_k taken off"
+    _energy(MASSES, mass_forgotten="the link's mass is missing"),
+    _energy(INERTIA, inertia_forgotten="the link's inertia about its centre of mass is missing"),
+    _energy(
+        POTENTIAL,
+        height_at_joint="the height is that of the joint in place of the centre of mass",
+        height_at_end="the height is that of the link's end in place of the centre of mass",
+        height_relative_angle="the height uses the joint's own angle in place of the sum of the angles up to it",
+        height_forgotten="the link's potential energy is missing",
     ),
-    "coriolis_missing": "products of two different rates are missing",
-    "coriolis_halved": "products of two different rates have half their factor",
-    "coriolis_doubled": "products of two different rates have twice their factor",
-    "coriolis_sign": "products of two different rates have the wrong sign",
-    "centrifugal_missing": "squares of rates are missing",
-    "centrifugal_sign": "squares of rates have the wrong sign",
-}
-"""Places where a derivation goes wrong, by stable names, each with what is then the case; the more frequent first."""
+    _energy(
+        COM_VELOCITY,
+        com_at_end="the centre of mass is taken at the link's end, the full length in place of the half",
+        velocity_at_joint="the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
+        velocity_cross_term="the square of the velocity lacks the cross term 2 v.(omega x r)",
+        velocity_relative_angle="the velocity uses the joint's own angle in place of the sum of the angles up to it",
+        com_rotation_transposed="the link's rotation is transposed where its centre of mass is placed",
+    ),
+    _energy(
+        ANGULAR_VELOCITY,
+        omega_relative="the angular velocity is that of the joint alone, without the joints before it",
+    ),
+    _energy(
+        INERTIA,
+        inertia_doubled="the link's inertia about its centre of mass counts twice",
+        inertia_about_joint="the inertia about the joint is used as if it were about the centre of mass: Steiner twice",
+        inertia_about_com_at_joint=(
+            "the inertia about the centre of mass is used as if it were about the joint: no parallel-axis term"
+        ),
+        inertia_axes="the inertia's moments are exchanged in turn: taken about the wrong axes",
+    ),
+    _energy(
+        KINETIC_FACTORS,
+        half_forgotten="the kinetic energy lacks its factor 1/2",
+        half_squared="the kinetic energy has the factor 1/4 in place of 1/2",
+        translation_half_forgotten="the energy of translation lacks its factor 1/2",
+        rotation_half_forgotten="the energy of rotation lacks its factor 1/2",
+    ),
+    _energy(
+        DRIVES,
+        rotor_forgotten="the rotor's inertia is missing",
+        rotor_gear="the rotor's inertia is multiplied by the gear ratio in place of its square",
+        rotor_without_gear="the rotor's inertia is taken without the gear: the rotor turns N times per joint turn",
+    ),
+    _energy(
+        POTENTIAL,
+        gravity_axis="gravity acts along the wrong axis: its components are exchanged in turn, x to y to z",
+        gravity_axis_back="gravity acts along the wrong axis: its components are exchanged in turn, z to y to x",
+    ),
+    _equation(
+        "Look again at the sign of dV/dq.",
+        potential_gradient_sign="dV/dq has the wrong sign in Euler and Lagrange's equation",
+    ),
+    _equation(
+        RATE_TERMS,
+        mass_rate_omitted="d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
+        mass_rate_halved="d/dt dK/dqd - dK/dq is replaced by half of dM/dt qd",
+        kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation",
+        kinetic_gradient_sign="dK/dq has the wrong sign in Euler and Lagrange's equation",
+        christoffel_indices=(
+            "the indices of the Christoffel symbols are exchanged: dM_jk/dq_i is added and dM_ij/dq_k taken off"
+        ),
+        coriolis_missing="products of two different rates are missing",
+        coriolis_halved="products of two different rates have half their factor",
+        coriolis_doubled="products of two different rates have twice their factor",
+        coriolis_sign="products of two different rates have the wrong sign",
+        centrifugal_missing="squares of rates are missing",
+        centrifugal_sign="squares of rates have the wrong sign",
+        centrifugal_halved="squares of rates have half their factor",
+        centrifugal_doubled="squares of rates have twice their factor",
+        velocity_torques_doubled="all terms with products of rates count twice",
+    ),
+)
+"""Places where a derivation goes wrong, by identity; the more frequent first."""
 
 VELOCITY_FACTORS = {
     "coriolis_missing": (False, Fraction(0)),
@@ -62,6 +221,8 @@ VELOCITY_FACTORS = {
     "coriolis_sign": (False, Fraction(-1)),
     "centrifugal_missing": (True, Fraction(0)),
     "centrifugal_sign": (True, Fraction(-1)),
+    "centrifugal_halved": (True, HALF),
+    "centrifugal_doubled": (True, Fraction(2)),
 }
 """Whether squares of rates are meant, and their factor."""
 
@@ -71,34 +232,34 @@ STEP_FACTORS = {
     "kinetic_gradient_omitted": (Fraction(1), Fraction(0)),
     "kinetic_gradient_sign": (Fraction(1), Fraction(-1)),
     "christoffel_indices": (Fraction(0), Fraction(-1)),
+    "velocity_torques_doubled": (Fraction(2), Fraction(2)),
 }
 """Factors of dM/dt qd and of dK/dq in Euler and Lagrange's equation."""
 
-ROTOR_MISTAKES = frozenset(("rotor_forgotten", "rotor_gear"))
+ROTOR_MISTAKES = frozenset(("rotor_forgotten", "rotor_gear", "rotor_without_gear"))
 
 LINK_MISTAKES = frozenset(MISTAKES) - {*VELOCITY_FACTORS, *STEP_FACTORS, *ROTOR_MISTAKES, "potential_gradient_sign"}
 """Those that change a link's own energies."""
 
 
-def has(mistakes: frozenset[str], mistake: str, i: int | None = None) -> bool:
-    """Return whether a mistake is made, at link i (from 0) if one is given."""
-    return mistake in mistakes or (i is not None and f"{mistake}@{i + 1}" in mistakes)
+def has(mistakes: Iterable[MadeAt], identity: str, i: int | None = None) -> bool:
+    """Return whether a mistake is made throughout, or at link i (from 0) if one is given."""
+    return MadeAt(identity) in mistakes or (i is not None and MadeAt(identity, i + 1) in mistakes)
 
 
-def check_mistake(mistake: object, n: int) -> None:
-    """Refuse what is no mistake of :data:`MISTAKES`, or made at no link of an arm of n joints.
+def check_mistake(made: object, n: int, known: Mapping[str, Mistake] = MISTAKES) -> None:
+    """Refuse what is no mistake of a catalogue, or made at no link of an arm of n joints.
 
     Raises
     ------
     TypeError
-        Not a name.
+        Not a :class:`MadeAt`.
     ValueError
         No such mistake, or no such link.
     """
-    if not isinstance(mistake, str):
-        raise TypeError(f"mistake {mistake!r}: expected a name")
-    name, at, link = mistake.partition("@")
-    if name not in MISTAKES:
-        raise ValueError(f"no mistake {name!r}; expected one of {', '.join(MISTAKES)}")
-    if at and (not link.isdecimal() or not 1 <= int(link) <= n):
-        raise ValueError(f"mistake {mistake!r}: no link {link!r}; expected 1 to {n}")
+    if not isinstance(made, MadeAt):
+        raise TypeError(f"mistake {made!r}: expected MadeAt(identity, link)")
+    if made.identity not in known:
+        raise ValueError(f"no mistake {made.identity!r}; expected one of {', '.join(known)}")
+    if made.link is not None and not 1 <= made.link <= n:
+        raise ValueError(f"mistake {made.identity!r}: no link {made.link}; expected 1 to {n}")

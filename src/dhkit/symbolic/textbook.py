@@ -17,7 +17,7 @@ import numpy as np
 
 from dhkit.description import Description
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
-from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, check_mistake, has
+from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
 from dhkit.symbolic.ring import Element, Elements, Ring
 
 __all__ = ["LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
@@ -66,10 +66,10 @@ class TextbookDerivation:
 
     arm: ExactArm
     links: tuple[LinkMotion, ...]
-    mistakes: frozenset[str] = field(default=frozenset())
+    mistakes: frozenset[MadeAt] = field(default=frozenset())
 
     def __repr__(self) -> str:
-        made = ", ".join(sorted(self.mistakes)) or "no mistakes"
+        made = ", ".join(sorted(map(str, self.mistakes))) or "no mistakes"
         return f"<TextbookDerivation of {self.arm.description.name}: {made}>"
 
     @cached_property
@@ -79,6 +79,8 @@ class TextbookDerivation:
         for i, (gear, rotor) in enumerate(zip(arm.gear, arm.rotor, strict=True)):
             if not self._has("rotor_forgotten", i):
                 ratio = gear if self._has("rotor_gear", i) else gear * gear
+                if self._has("rotor_without_gear", i):
+                    ratio = arm.ring.one
                 energies.append(rotor * ratio * arm.ring.rate(i) * arm.ring.rate(i) * HALF)
         return arm.ring.sum(energies)
 
@@ -129,7 +131,7 @@ class TextbookDerivation:
         return has(self.mistakes, mistake, i)
 
 
-def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozenset[str] = frozenset()) -> Elements:
+def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozenset[MadeAt] = frozenset()) -> Elements:
     """Return d/dt dK/dqd - dK/dq without accelerations, shape (n,): linear in K.
 
     Parameters
@@ -145,21 +147,21 @@ def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozen
     """
     of_rate, of_gradient = Fraction(1), Fraction(1)
     for name, (rate, gradient) in STEP_FACTORS.items():
-        if name in mistakes:
+        if MadeAt(name) in mistakes:
             of_rate, of_gradient = of_rate * rate, of_gradient * gradient
     torques = []
     for i, momentum in enumerate(momenta):
         rates = ring.sum(momentum.by_position(k) * ring.rate(k) for k in range(ring.n))
         torque = rates * of_rate - K.by_position(i) * of_gradient
         for name, (squares, factor) in VELOCITY_FACTORS.items():
-            if name in mistakes:
+            if MadeAt(name) in mistakes:
                 torque = scaled(torque, squares, factor)
         torques.append(torque)
     return np.array(torques, dtype=object)
 
 
 def derive(
-    description: Description, mistakes: Iterable[str] = frozenset(), symbols: Symbols = "file"
+    description: Description, mistakes: Iterable[MadeAt | str] = frozenset(), symbols: Symbols = "file"
 ) -> TextbookDerivation:
     """Derive an arm's equations of motion as a textbook does.
 
@@ -168,7 +170,8 @@ def derive(
     description
         The robot.
     mistakes
-        Names of :data:`dhkit.symbolic.MISTAKES`, made at every link, or ``NAME@2`` for link 2 alone.
+        Of :data:`dhkit.symbolic.MISTAKES`, by identity where they are made at every link, or ``MadeAt(identity, 2)``
+        for link 2 alone.
     symbols
         See :func:`dhkit.symbolic.exact.exact_arm`.
 
@@ -179,7 +182,7 @@ def derive(
     ValueError
         No such mistake, or no such link.
     TypeError
-        Mistakes that are no names.
+        Mistakes that are neither.
 
     Examples
     --------
@@ -188,15 +191,13 @@ def derive(
     >>> print(derive(library_robot("planar2r")).g[1] - wrong.g[1] == -2 * wrong.g[1])
     True
     """
-    if isinstance(mistakes, str):
-        raise TypeError(f"mistakes is {mistakes!r}; expected a set of names, as in {{{mistakes!r}}}")
-    made = frozenset(mistakes)
+    made = made_at(mistakes)
     for mistake in made:
         check_mistake(mistake, description.n)
     arm = exact_arm(description, symbols)
     motions = []
     for i in range(arm.n):
-        concerned = frozenset(m.partition("@")[0] for m in made if m.partition("@")[2] in ("", str(i + 1)))
+        concerned = frozenset(mistake.identity for mistake in made if mistake.link in (None, i + 1))
         motions.append(_motion(arm, i, concerned & LINK_MISTAKES))
     return TextbookDerivation(arm, tuple(motions), made)
 
@@ -289,7 +290,7 @@ class _Link:
         """Return where the centre of mass is, in frame 0."""
         if self.has(mistake):
             return self.at.alone + self.at.R_own @ self.com  # type: ignore[no-any-return]
-        R = self.at.R.T if self.has("rotation_transposed") else self.at.R
+        R = self.at.R.T if self.has("com_rotation_transposed") else self.at.R
         return self.at.origin + R @ self.com  # type: ignore[no-any-return]
 
     def velocity(self) -> Elements:

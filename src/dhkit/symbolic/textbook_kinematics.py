@@ -17,7 +17,7 @@ from dhkit.description import Body, Description, Placement
 from dhkit.expressions import ZERO, Expression, cos, exact_angle, sin
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm
 from dhkit.symbolic.exact.naming import Naming
-from dhkit.symbolic.mistakes import has
+from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_mistake, has, made_at
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring, RingError
 
 __all__ = [
@@ -31,60 +31,100 @@ __all__ = [
     "with_massless_links",
 ]
 
-LINK_MISTAKES: Mapping[str, str] = {
-    "a_d_exchanged": "a and d are exchanged: a is measured along the x axis, d along the z axis",
-    "a_forgotten": "the length a along the x axis is missing",
-    "d_forgotten": "the offset d along the z axis is missing",
-    "alpha_sign": "the twist alpha has the wrong sign: it turns from one z axis to the next about x, by the right hand",
-    "alpha_forgotten": "the twist alpha is missing: the next z axis is taken parallel to this one",
-    "alpha_sin_cos": "sine and cosine of alpha are exchanged",
-    "theta_offset_forgotten": "theta lacks its constant offset: at joint value 0 the x axes are not aligned",
-    "theta_offset_sign": "theta's constant offset has the wrong sign",
-    "theta_sign": "theta has the wrong sign: the joint turns the wrong way round",
-    "theta_sin_cos": "sine and cosine of theta are exchanged: the angle is measured from the y axis, 90 deg - theta",
-    "theta_quarter_more": "the zero pose is shifted: theta is 90 degrees too large",
-    "theta_quarter_less": "the zero pose is shifted: theta is 90 degrees too small",
-    "variable_forgotten": "the joint's variable is missing: the joint is taken for fixed",
-    "rotations_first": "both rotations come before both translations: a and d are measured along turned axes",
-    "translations_first": "both translations come before both rotations: a and d are measured along unturned axes",
-    "rotation_transposed": "the rotation inside A_i is transposed: it maps frame i - 1 to frame i",
-    "translations_unrotated": "translations are added up without turning them into the axes of the frames before",
-}
-"""Mistakes inside one A_i, or in multiplying by it: made at every link, or ``NAME@2`` at link 2 alone."""
+ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
+ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
+ORDER = "Look again at the order of rotations and translations inside A_i."
+ENDS = "Look again at the product of the transforms: where does it begin, where does it end, and which way does it run?"
+COLUMNS = "Look again at the Jacobian's columns: the joint's axis, and the lever from the joint to the tool."
+AXES = "Look again at which axes and which point the Jacobian is for."
 
-POSE_MISTAKES: Mapping[str, str] = {
-    "convention_exchanged": "the table's numbers are put into the A_i of the other convention (standard, modified)",
-    "product_reversed": "the product runs the wrong way: A_n ... A_1 in place of A_1 ... A_n",
-    "tool_forgotten": "the tool's transform is missing: the product ends at frame n",
-    "tool_inverted": "the tool's transform is inverted",
-    "base_forgotten": "the base's transform is missing: the product begins at frame 0",
-    "base_inverted": "the base's transform is inverted",
-    "pose_inverted": "the pose is inverted: it maps the world to the tool in place of the tool to the world",
-}
+
+def _mistakes(subject: Subject, hint: str, **sentences: str) -> list[Mistake]:
+    return [Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()]
+
+
+LINK_MISTAKES: Mapping[str, Mistake] = catalogue(
+    _mistakes(
+        Subject.TABLE,
+        ROW,
+        a_d_exchanged="a and d are exchanged: a is measured along the x axis, d along the z axis",
+        a_forgotten="the length a along the x axis is missing",
+        d_forgotten="the offset d along the z axis is missing",
+        alpha_sign="the twist alpha has the wrong sign: it turns from one z axis to the next about x, by the right "
+        "hand",
+        alpha_forgotten="the twist alpha is missing: the next z axis is taken parallel to this one",
+        alpha_sin_cos="sine and cosine of alpha are exchanged",
+    ),
+    _mistakes(
+        Subject.TABLE,
+        ZERO_POSE,
+        theta_offset_forgotten="theta lacks its constant offset: at joint value 0 the x axes are not aligned",
+        theta_offset_sign="theta's constant offset has the wrong sign",
+        theta_sign="theta has the wrong sign: the joint turns the wrong way round",
+        theta_sin_cos="sine and cosine of theta are exchanged: the angle is measured from the y axis, 90 deg - theta",
+        theta_quarter_more="the zero pose is shifted: theta is 90 degrees too large",
+        theta_quarter_less="the zero pose is shifted: theta is 90 degrees too small",
+        variable_forgotten="the joint's variable is missing: the joint is taken for fixed",
+    ),
+    _mistakes(
+        Subject.TRANSFORM,
+        ORDER,
+        rotations_first="both rotations come before both translations: a and d are measured along turned axes",
+        translations_first="both translations come before both rotations: a and d are measured along unturned axes",
+        rotation_transposed="the rotation inside A_i is transposed: it maps frame i - 1 to frame i",
+        translations_unrotated="translations are added up without turning them into the axes of the frames before",
+    ),
+)
+"""Mistakes inside one A_i, or in multiplying by it: made at every link or at one."""
+
+POSE_MISTAKES: Mapping[str, Mistake] = catalogue(
+    _mistakes(
+        Subject.TRANSFORM,
+        ENDS,
+        convention_exchanged="the table's numbers are put into the A_i of the other convention (standard, modified)",
+        product_reversed="the product runs the wrong way: A_n ... A_1 in place of A_1 ... A_n",
+        tool_forgotten="the tool's transform is missing: the product ends at frame n",
+        tool_inverted="the tool's transform is inverted",
+        base_forgotten="the base's transform is missing: the product begins at frame 0",
+        base_inverted="the base's transform is inverted",
+        pose_inverted="the pose is inverted: it maps the world to the tool in place of the tool to the world",
+    )
+)
 """Mistakes in the pose of the tool, and in what follows from it."""
 
-JACOBIAN_MISTAKES: Mapping[str, str] = {
-    "rows_exchanged": "angular rows stand above linear ones: here the linear velocity comes first",
-    "point_frame_n": "the linear velocity is that of frame n's origin in place of the tool's",
-    "point_frame_0": "the linear velocity is that of the point at frame 0's origin in place of the tool's",
-    "point_world": "the linear velocity is that of the point at the world's origin (the spatial Jacobian), "
-    "in place of the tool's",
-    "lever_not_subtracted": "the lever is the tool's position from frame 0: the joint's position is not subtracted",
-    "lever_own": "the lever is frame i's position from frame 0, in place of that from the joint to the tool",
-    "lever_neighbour": "the lever begins at the neighbouring frame: at p_i in place of p_(i-1) (modified: the reverse)",
-    "axis_neighbour": "the axis is that of the neighbouring frame: z_i in place of z_(i-1) (modified: the reverse)",
-    "axis_unturned": "every axis is taken as (0, 0, 1): the joints before do not turn it",
-    "cross_product_order": "the cross product is lever x axis in place of axis x lever: the linear rows change sign",
-    "prismatic_as_revolute": "a sliding joint's column is that of a turning one: it should be (axis; 0)",
-    "prismatic_angular": "a sliding joint turns the tool: the lower half of its column should be 0",
-    "revolute_as_prismatic": "a turning joint's column is that of a sliding one: it should be (axis x lever; axis)",
-    "axes_of_tool": "the Jacobian is in the tool's axes in place of the world's",
-    "axes_of_frame_0": "the Jacobian is in frame 0's axes in place of the world's",
-}
+JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
+    _mistakes(
+        Subject.JACOBIAN,
+        AXES,
+        jacobian_halves_exchanged="angular rows stand above linear ones: here the linear velocity comes first",
+        point_frame_n="the linear velocity is that of frame n's origin in place of the tool's",
+        point_frame_0="the linear velocity is that of the point at frame 0's origin in place of the tool's",
+        point_world="the linear velocity is that of the point at the world's origin (the spatial Jacobian), "
+        "in place of the tool's",
+        axes_of_tool="the Jacobian is in the tool's axes in place of the world's",
+        axes_of_frame_0="the Jacobian is in frame 0's axes in place of the world's",
+    ),
+    _mistakes(
+        Subject.JACOBIAN,
+        COLUMNS,
+        lever_not_subtracted="the lever is the tool's position from frame 0: the joint's position is not subtracted",
+        lever_own="the lever is frame i's position from frame 0, in place of that from the joint to the tool",
+        lever_neighbour="the lever begins at the neighbouring frame: at p_i in place of p_(i-1) (modified: the "
+        "reverse)",
+        axis_neighbour="the axis is that of the neighbouring frame: z_i in place of z_(i-1) (modified: the reverse)",
+        axis_unturned="every axis is taken as (0, 0, 1): the joints before do not turn it",
+        cross_product_order="the cross product is lever x axis in place of axis x lever: the linear rows change sign",
+        prismatic_as_revolute="a sliding joint's column is that of a turning one: it should be (axis; 0)",
+        prismatic_angular="a sliding joint turns the tool: the lower half of its column should be 0",
+        revolute_as_prismatic="a turning joint's column is that of a sliding one: it should be (axis x lever; axis)",
+    ),
+)
 """Mistakes in the Jacobian alone."""
 
-KINEMATIC_MISTAKES: Mapping[str, str] = {**LINK_MISTAKES, **POSE_MISTAKES, **JACOBIAN_MISTAKES}
-"""Places where a derivation goes wrong, by stable names, each with what is then the case."""
+KINEMATIC_MISTAKES: Mapping[str, Mistake] = catalogue(
+    LINK_MISTAKES.values(), POSE_MISTAKES.values(), JACOBIAN_MISTAKES.values()
+)
+"""Places where a derivation of transforms and Jacobians goes wrong, by identity."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,10 +140,10 @@ class TextbookKinematics:
     """
 
     arm: ExactArm
-    mistakes: frozenset[str] = field(default=frozenset())
+    mistakes: frozenset[MadeAt] = field(default=frozenset())
 
     def __repr__(self) -> str:
-        made = ", ".join(sorted(self.mistakes)) or "no mistakes"
+        made = ", ".join(sorted(map(str, self.mistakes))) or "no mistakes"
         return f"<TextbookKinematics of {self.arm.description.name}: {made}>"
 
     @cached_property
@@ -134,7 +174,7 @@ class TextbookKinematics:
             linear, angular = (self._pose[:3, :3].T @ rows for rows in (linear, angular))
         if self._has("axes_of_frame_0"):
             linear, angular = (self.base[:3, :3].T @ rows for rows in (linear, angular))
-        halves = (angular, linear) if self._has("rows_exchanged") else (linear, angular)
+        halves = (angular, linear) if self._has("jacobian_halves_exchanged") else (linear, angular)
         return np.concatenate(halves)
 
     @cached_property
@@ -260,7 +300,7 @@ class TextbookKinematics:
 
 
 def derive_kinematics(
-    description: Description, mistakes: Iterable[str] = frozenset(), symbols: Symbols = "file"
+    description: Description, mistakes: Iterable[MadeAt | str] = frozenset(), symbols: Symbols = "file"
 ) -> TextbookKinematics:
     """Derive an arm's link transforms, the pose of its tool and its Jacobian as a textbook does.
 
@@ -272,8 +312,8 @@ def derive_kinematics(
     description
         The robot; links may lack bodies.
     mistakes
-        Names of :data:`KINEMATIC_MISTAKES`, those of :data:`LINK_MISTAKES` made at every link or, as ``NAME@2``, at
-        link 2 alone.
+        Of :data:`KINEMATIC_MISTAKES`, by identity where they are made throughout; those of :data:`LINK_MISTAKES` at
+        one link as ``MadeAt(identity, link)``.
     symbols
         See :func:`dhkit.symbolic.exact_arm`.
 
@@ -293,9 +333,7 @@ def derive_kinematics(
     >>> print(derive_kinematics(arm, {"translations_unrotated"}).T[0, 3])
     l1*c1 + l2*c2
     """
-    if isinstance(mistakes, str):
-        raise TypeError(f"mistakes is {mistakes!r}; expected a set of names, as in {{{mistakes!r}}}")
-    made = frozenset(mistakes)
+    made = made_at(mistakes)
     for mistake in made:
         check_kinematic_mistake(mistake, description.n)
     return TextbookKinematics(_arm_with_tool(with_massless_links(description), symbols), made)
@@ -313,25 +351,19 @@ def with_massless_links(description: Description) -> Description:
     return replace(description, joints=joints)
 
 
-def check_kinematic_mistake(mistake: object, n: int) -> None:
+def check_kinematic_mistake(made: object, n: int) -> None:
     """Refuse what is no mistake of :data:`KINEMATIC_MISTAKES`, or made at no link of an arm of n joints.
 
     Raises
     ------
     TypeError
-        Not a name.
+        Not a :class:`~dhkit.symbolic.mistakes.MadeAt`.
     ValueError
         No such mistake, no such link, or a link given for a mistake that concerns the whole arm.
     """
-    if not isinstance(mistake, str):
-        raise TypeError(f"mistake {mistake!r}: expected a name")
-    name, at, link = mistake.partition("@")
-    if name not in KINEMATIC_MISTAKES:
-        raise ValueError(f"no mistake {name!r}; expected one of {', '.join(KINEMATIC_MISTAKES)}")
-    if at and name not in LINK_MISTAKES:
-        raise ValueError(f"mistake {mistake!r}: {name} concerns the whole arm, no single link")
-    if at and (not link.isdecimal() or not 1 <= int(link) <= n):
-        raise ValueError(f"mistake {mistake!r}: no link {link!r}; expected 1 to {n}")
+    check_mistake(made, n, KINEMATIC_MISTAKES)
+    if isinstance(made, MadeAt) and made.link is not None and made.identity not in LINK_MISTAKES:
+        raise ValueError(f"mistake {made.identity!r} concerns the whole arm, no single link")
 
 
 def _arm_with_tool(description: Description, symbols: Symbols) -> ExactArm:

@@ -5,21 +5,34 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.reading import meaning_of, read_matrix
-from dhkit.grading.answers.sheet import Names, Refusal
+from dhkit.grading.answers.sheet import ALIASES, Chain, Entries, Names, Refusal, quantity_names
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-__all__ = ["LEFT_EMPTY", "POSE_NAMES", "Given", "given_branches", "given_quantity", "given_rows", "vocabulary_of"]
+__all__ = [
+    "LEFT_EMPTY",
+    "POSE_NAMES",
+    "Given",
+    "given_branches",
+    "given_quantity",
+    "given_rows",
+    "vocabulary_of",
+    "with_entries_gathered",
+]
 
 LEFT_EMPTY = "left empty"
+ENTRY_NAME = re.compile(r"(?:(?=[MCJ]\d\d$|[hg]\d$|tau\d$)([A-Za-z]+)(\d)(\d)?)", re.ASCII)
+"""Names of single entries on a sheet, counted from 1."""
 POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
 """The tool's pose in the world, which inverse kinematics start from: its origin, m, and its rotation by rows."""
 
@@ -35,15 +48,23 @@ class Given:
     text
         As it was typed.
     tree
-        What it was read as; None where it could not be.
+        What it was read as; None where it could not be, or is missing.
     error
         Why it could not be read.
+    earlier
+        The other formulas of a statement ``V = a = b``, of which ``tree`` is the last.
     """
 
     index: tuple[int, ...]
     text: str
     tree: Tree | None = None
     error: str = ""
+    earlier: tuple[Tree, ...] = ()
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether the entry was not handed in."""
+        return self.tree is None and self.error == LEFT_EMPTY
 
 
 def vocabulary_of(
@@ -62,7 +83,7 @@ def vocabulary_of(
         if names.lenient and _stays(name, text, vocabulary, description):
             continue
         if isinstance(text, Refusal):
-            vocabulary.refuse(name, text.reason)
+            vocabulary.refuse(name, f"its own assignment is not read: {text.reason}")
             continue
         try:
             meaning = meaning_of(text, vocabulary)
@@ -71,7 +92,7 @@ def vocabulary_of(
             if not names.lenient:
                 raise AnswerError(f"names.parameters: {shown(name)}: {error}") from None
             if not vocabulary.knows(name):
-                vocabulary.refuse(name, str(error))
+                vocabulary.refuse(name, f"its own assignment is not read: {error}")
     return vocabulary
 
 
@@ -86,14 +107,14 @@ def _stays(name: str, text: str | Refusal, vocabulary: Vocabulary, description: 
 
 
 def given_quantity(name: str, value: Any, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
-    """Return a quantity's entries, of those that were handed in.
+    """Return all entries of a quantity, those that were not handed in among them.
 
     Parameters
     ----------
     name
-        What messages call it.
+        What messages call it. Of M an entry that is missing is taken from the other half.
     value
-        Text, a number, or lists of them; a matrix may stand in one text.
+        Text, a number, or lists of them; a matrix may stand in one text; :class:`~dhkit.grading.answers.sheet.Entries`.
     shape
         What is expected.
     vocabulary
@@ -106,12 +127,88 @@ def given_quantity(name: str, value: Any, shape: tuple[int, ...], vocabulary: Vo
     """
     if isinstance(value, Refusal):
         raise AnswerError(f"{name}: {value.reason}; a program is read, not run: write it in one assignment")
-    if isinstance(value, str) and math.prod(shape) == 1 and "[" not in value and "\\begin" not in value:
+    if isinstance(value, Entries):
+        given = _from_entries(name, value, shape, vocabulary)
+    elif isinstance(value, Chain):
+        sides = [given_quantity(name, formula, shape, vocabulary) for formula in value.formulas]
+        return _chained(sides)
+    elif isinstance(value, str) and math.prod(shape) == 1 and "[" not in value and "\\begin" not in value:
         return (_read((0,) * len(shape), _without_head(name, value), vocabulary),)
-    if isinstance(value, str) and shape:
+    elif isinstance(value, str) and shape:
         return _from_one_text(name, _without_head(name, value), shape, vocabulary)
-    entries = _flat(name, value, shape, ())
-    return tuple(_read(index, text, vocabulary) for index, text in entries)
+    else:
+        given = tuple(_read(index, text, vocabulary) for index, text in _flat(name, value, shape, ()))
+    return _mirrored(given) if name == "M" else given
+
+
+def with_entries_gathered(answers: Mapping[str, Any], description: Description) -> dict[str, Any]:
+    """Return answers by quantity: those that name one entry (``M11``, ``g_2``) gathered in :class:`Entries`.
+
+    Raises
+    ------
+    AnswerError
+        A quantity that is given whole and by its entries.
+    """
+    n = description.n
+    known = {*quantity_names(n), *ALIASES}
+    gathered: dict[str, Any] = {}
+    for name, value in answers.items():
+        match = None if name in known else ENTRY_NAME.fullmatch(plain_name(name))
+        if match is None:
+            if name in gathered:
+                raise AnswerError(f"{name}: given whole and entry by entry; expected one of them")
+            gathered[name] = value
+            continue
+        quantity, index = match[1], tuple(int(k) - 1 for k in (match[2], match[3]) if k)
+        texts = gathered.setdefault(quantity, Entries({}))
+        if not isinstance(texts, Entries):
+            raise AnswerError(f"{quantity}: given whole and entry by entry; expected one of them")
+        gathered[quantity] = Entries({**texts.texts, index: value})
+    return gathered
+
+
+def _from_entries(name: str, value: Entries, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+    """Return a quantity's entries of those that were given one by one."""
+    places = list(np.ndindex(shape))
+    for index in value.texts:
+        if index not in places:
+            found = name + "".join(f"[{k + 1}]" for k in index)
+            raise AnswerError(f"{name}: found {found}; expected {' x '.join(map(str, shape))} entries, counted from 1")
+    return tuple(_entry(index, value.texts.get(index, ""), vocabulary) for index in places)
+
+
+def _entry(index: tuple[int, ...], text: str | Chain | Refusal, vocabulary: Vocabulary) -> Given:
+    if isinstance(text, Refusal):
+        return Given(index, "", error=f"{text.reason}; a program is read, not run: write it in one assignment")
+    if isinstance(text, Chain):
+        (given,) = _chained([(_read(index, formula, vocabulary),) for formula in text.formulas])
+        return given
+    return _read(index, text, vocabulary)
+
+
+def _chained(sides: Sequence[Sequence[Given]]) -> tuple[Given, ...]:
+    """Return the entries of a chain's last side, each with those of the sides before it.
+
+    A side before the last that cannot be read makes the entry unreadable: what it says may differ.
+    """
+    found = []
+    for entries in zip(*sides, strict=True):
+        *earlier, last = entries
+        error = next((entry.error for entry in entries if entry.tree is None), "")
+        trees = tuple(entry.tree for entry in earlier if entry.tree is not None)
+        found.append(Given(last.index, last.text, error=error) if error else replace(last, earlier=trees))
+    return tuple(found)
+
+
+def _mirrored(given: Sequence[Given]) -> tuple[Given, ...]:
+    """Return the entries of a symmetric matrix: those that are missing from the other half."""
+    by_index = {entry.index: entry for entry in given}
+
+    def filled(entry: Given) -> Given:
+        other = by_index[entry.index[::-1]]
+        return replace(other, index=entry.index) if entry.is_missing and not other.is_missing else entry
+
+    return tuple(map(filled, given))
 
 
 def _without_head(name: str, text: str) -> str:

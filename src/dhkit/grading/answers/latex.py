@@ -14,6 +14,8 @@ __all__ = ["is_latex", "latex_tokens"]
 MAX_DEPTH = 50
 MAX_LETTERS = 64
 PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
+MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
+"""A number in front of a fraction, which is no subscript or exponent."""
 SPACES = frozenset(
     [
         ",",
@@ -240,7 +242,7 @@ class _Latex:
         return [Token("name", name, at) for name in self._names(letters, below)]
 
     def _names(self, letters: str, below: str) -> list[str]:
-        if len(letters) == 1 or self.knows(letters + below):
+        if len(letters) == 1 or self.knows(letters + below) or (letters == "dt" and not below):
             return [letters + below]
         for k in range(1, len(letters)):
             if self.knows(letters[k:] + below) and (k == 1 or self.knows(letters[:k])):
@@ -277,8 +279,9 @@ class _Latex:
             return self._delimiter(at)
         if name in FRACTIONS:
             above, below = self._bracketed(at), self._bracketed(at)
-            if order := _order_of_derivative(above, below):
-                return self._derivative(above, order, at)
+            if order := _order_by_time(below[1:-1]):
+                return self._derivative(above[1:-1], order, at)
+            self._refuse_mixed_number(above, below, at)
             return [Token("sign", "(", at), *above, Token("sign", "/", at), *below, Token("sign", ")", at)]
         if name == "sqrt":
             if self._next_is("["):
@@ -303,15 +306,55 @@ class _Latex:
             return [Token("sign", "(" if name == "{" else ")", at)]
         return fail(self.text, at, f"the macro \\{name}, which is not read,")
 
+    def _refuse_mixed_number(self, above: list[Token], below: list[Token], at: int) -> None:
+        """Refuse a fraction of two numbers right behind a number."""
+        before = MIXED.search(self.text[:at])
+        if before and [token.kind for token in above[1:-1]] == ["number"] == [token.kind for token in below[1:-1]]:
+            part = f"{above[1].text}/{below[1].text}"
+            fail(
+                self.text,
+                at,
+                f"{before[1]} {part} may be {before[1]} + {part} or {before[1]}*{part}; write one of them",
+            )
+
     def _derivative(self, above: list[Token], order: int, at: int) -> list[Token]:
-        r"""Read \frac{d}{d t} \theta_{1}{\left(t \right)}, as sympy prints it, and \frac{d \theta_1}{dt}."""
-        names = [token for token in above if token.kind == "name" and token.text != "d"]
-        if not names:
-            piece = self._peek()
-            names = self._item(piece) if piece is not None else []
-        if len(names) != 1 or names[0].kind != "name":
-            fail(self.text, at, "a derivative other than of a joint's variable by t")
-        return [Token("name", dotted(names[0].text, ("dot", "ddot")[order - 1]), at)]
+        r"""Read \frac{d}{d t} \theta_{1}{\left(t \right)}, as sympy prints it, and \frac{d (5 \theta_1)}{dt}."""
+        inner = _without_d(above, order)
+        if inner is None:
+            fail(self.text, at, "a fraction over dt that is no derivative by t")
+        inner = inner or self._operand_of_derivative(at)
+        for _ in range(order):
+            inner = [Token("function", "ddt", at), Token("sign", "(", at), *inner, Token("sign", ")", at)]
+        return inner
+
+    def _operand_of_derivative(self, at: int) -> list[Token]:
+        r"""Read what \frac{d}{dt} stands in front of: brackets, a function of something, or a name without a power."""
+        found = self._one_item()
+        if found and found[0].text == "(":
+            while closing_bracket(found, 0) != len(found) - 1:
+                found += self._one_item() or fail(self.text, at, "a bracket that does not close")
+            return found
+        if found and found[0].kind == "name" and found[0].text in FUNCTION_NAMES:
+            return found + self._function_argument()
+        if len(found) != 1 or found[0].kind != "name" or self._next_is("^"):
+            fail(self.text, at, "a derivative that may reach further than the name behind it; put brackets around what")
+        return found
+
+    def _one_item(self) -> list[Token]:
+        piece = self._peek()
+        return [] if piece is None or piece[4] == "}" else self._item(piece)
+
+    def _function_argument(self) -> list[Token]:
+        """Read what a function applies to, with a power in front of it: up to a name, or a closing bracket."""
+        found: list[Token] = []
+        while item := self._one_item():
+            found += item
+            first = next(
+                (k for k, token in enumerate(found) if token.text == "(" and found[max(k - 1, 0)].text != "^"), -1
+            )
+            if found[-1].kind == "name" or (first >= 0 and closing_bracket(found, first) == len(found) - 1):
+                break
+        return found
 
     def _delimiter(self, at: int) -> list[Token]:
         piece = self._peek()
@@ -340,7 +383,8 @@ class _Latex:
         name = "".join(token.text for token in inner)
         if not name:
             return []
-        return [Token("name", name if bare or name in FUNCTION_NAMES else self._with_subscript(name), at)]
+        is_function = name in FUNCTION_NAMES and not self._next_is("_")
+        return [Token("name", name if bare or is_function else self._with_subscript(name), at)]
 
     def _environment(self, name: str, at: int) -> list[Token]:
         match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)
@@ -350,12 +394,19 @@ class _Latex:
         return [Token("sign", "[" if name == "begin" else "]", at)]
 
 
-def _order_of_derivative(above: list[Token], below: list[Token]) -> int:
-    """Return 1 of d/dt, 2 of d^2/dt^2, 0 of another fraction."""
-    top = "".join(token.text for token in above if token.text not in "()")
+def _order_by_time(below: list[Token]) -> int:
+    """Return 1 of dt, 2 of dt^2, 0 of another denominator."""
     bottom = "".join(token.text for token in below if token.text not in "()")
-    for order, (begins, ends) in enumerate((("d", "dt"), ("d^2", "dt^2")), start=1):
-        names = sum(token.kind == "name" and token.text != "d" for token in above)
-        if bottom == ends and (top == begins or (top.startswith(begins) and names == 1)) and above[1].text == "d":
-            return order
-    return 0
+    return {"dt": 1, "dt^2": 2}.get(bottom, 0)
+
+
+def _without_d(above: list[Token], order: int) -> list[Token] | None:
+    """Return what a derivative's numerator differentiates: nothing of d alone, None where it has no d."""
+    texts = [token.text for token in above]
+    power = [] if order == 1 else ["^", "(", "2", ")"]
+    if texts[: 1 + len(power)] == ["d", *power]:
+        return above[1 + len(power) :]
+    first = above[0] if above else None
+    if first is not None and order == 1 and first.kind == "name" and len(first.text) > 1 and first.text[0] == "d":
+        return [Token("name", first.text[1:], first.at), *above[1:]]
+    return None

@@ -9,6 +9,8 @@ from fractions import Fraction
 
 from dhkit.errors import AnswerError, ExpressionError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Token, Tree, read_tokens
+from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima, is_mathematica
+from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
 from dhkit.grading.answers.rewriting import rewritten
 from dhkit.grading.answers.tokens import fail, folded, tokens
@@ -19,6 +21,10 @@ __all__ = ["meaning_of", "read_answer", "read_matrix"]
 MATRIX_WORDS = frozenset(
     ("sym", "Matrix", "array", "matrix", "simplify", "transpose", "MutableDenseMatrix", "ImmutableMatrix", "DM", "SX")
 )
+COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
+"""A comment behind an answer, such as its unit: % N m."""
+STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
+"""What sympy's maple_code adds to a matrix."""
 MAX_ENTRIES = 1_024
 MAX_MEANING = 20_000
 """Tokens of what a student's own name stands for, the names in it written out."""
@@ -62,6 +68,7 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     """
     text = _in_rows(text)
     found = _stripped(_tokens(text, vocabulary))
+    found = _in_one_bracket(found)
     start, end = _matrix_in(found, text)
     before, after = found[:start], found[end + 1 :]
     if sum(token.text in (",", ";", "&", "\\\\") for token in found) > MAX_ENTRIES:
@@ -93,9 +100,13 @@ def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
 
 def _tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
     plain, places = folded(text)
+    plain = COMMENT.sub(lambda found: " " * len(found[0]), plain)
+    if is_mathematica(plain):
+        plain = plain.partition("//")[0]
+        return from_mathematica(tokens(plain, places, text, allowed="{}\\"), text)
     if is_latex(plain):
         return latex_tokens(plain, vocabulary.knows)
-    return tokens(plain, places, text, allowed="{}")
+    return from_maxima(tokens(STORAGE.sub("", plain), places, text, allowed="{}%$"))
 
 
 def _tree(found: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:
@@ -117,7 +128,7 @@ def _tree(found: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:
 
 def _in_rows(text: str) -> str:
     """Return a text with ; where MATLAB begins a row by a new line, and without its ..."""
-    if is_latex(text):
+    if is_latex(text) or is_mathematica(text):
         return text
     lines = [line.strip() for line in re.sub(r"\.\.\.[^\n]*\n", " ", text.strip()).splitlines()]
     joined = ""
@@ -134,6 +145,16 @@ def _matrix_in(found: Sequence[Token], text: str) -> tuple[int, int]:
     if not opening or end < opening[0]:
         raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}")
     return opening[0], end
+
+
+def _in_one_bracket(found: list[Token]) -> list[Token]:
+    """Return Maxima's rows [a, b], [c, d] of matrix(...) as a list of rows."""
+    depth = 0
+    for token in found:
+        depth += {"[": 1, "]": -1, "(": 1, ")": -1}.get(token.text, 0)
+        if depth == 0 and token.text == "," and found[0].text == "[" and found[-1].text == "]":
+            return [Token("sign", "[", found[0].at), *found, Token("sign", "]", found[-1].at)]
+    return found
 
 
 def _scaled(before: Sequence[Token], entry: Sequence[Token], after: Sequence[Token]) -> list[Token]:
@@ -173,7 +194,7 @@ def _rows(found: Sequence[Token], text: str) -> list[list[list[Token]]]:
     if inner and inner[0].text == "[":
         return [_separated(_stripped(list(row))[1:-1], (",", "&"), text) for row in _separated(inner, (",", ";"), text)]
     rows = _separated(inner, (";", "\\\\"), text)
-    spaced = not is_latex(text)
+    spaced = not is_latex(text) and not is_mathematica(text)
     return [
         _by_spaces(row, text) if spaced and not _has(row, ",&") else _separated(row, (",", "&"), text)
         for row in rows
@@ -248,6 +269,8 @@ def _known(tree: Tree) -> Tree:
 
 
 def _call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
+    if function == "atan" and len(arguments) == 2:
+        function = "atan2"  # Maple's arctan(y, x)
     two = function in ("atan2", "pow", "Rational", "min", "max")
     if len(arguments) != 1 + two:
         if function == "Rational" and len(arguments) == 1:
@@ -258,6 +281,8 @@ def _call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
         case "sec" | "csc" | "cot":
             name = {"sec": "cos", "csc": "sin", "cot": "tan"}[function]
             return Product(((True, _one(at)), (False, Call(name, (first,), at))))
+        case "ddt":
+            return time_derivative(first)
         case "sind" | "cosd" | "tand":
             return Call(function[:3], (_radians(first, at),), at)
         case "radians":

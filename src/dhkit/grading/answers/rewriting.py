@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from dhkit.expressions.syntax import Token
@@ -12,6 +13,7 @@ __all__ = ["rewritten"]
 
 CALLED = frozenset(FUNCTION_NAMES.values())
 MODULES = frozenset(("np", "numpy", "math", "sp", "sympy", "sym", "ca", "cs", "casadi", "cmath", "mpmath", "mp", "cas"))
+ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
 MAX_DEPTH = 50
 MAX_TOKENS = 300_000
@@ -26,11 +28,12 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
         An unknown name, an attribute, or brackets that do not match.
     """
     _check_depth(tokens, text)
-    found = _without_modules(tokens, text)
+    found = _without_modules(_methods(tokens), text)
     found = _without_time(_indexed(_without_primes(found, vocabulary), vocabulary, text), vocabulary)
     # Square brackets that are left stand for round ones.
     found = [Token("sign", {"[": "(", "]": ")"}.get(x.text, x.text), x.at) if x.kind == "sign" else x for x in found]
     found = _derivatives(found, text)
+    found = _fractions_by_time(found, vocabulary, text)
     found = _named(found, vocabulary, text)
     found = _functions(found, text)
     return _products(found)
@@ -44,11 +47,26 @@ def _check_depth(tokens: Sequence[Token], text: str) -> None:
             fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 
 
+def _methods(tokens: Sequence[Token]) -> list[Token]:
+    """Read q1.diff(t) as diff(q1, t)."""
+    found: list[Token] = []
+    k = 0
+    while k < len(tokens):
+        if [x.text for x in tokens[k : k + 3]] == [".", "diff", "("] and found and found[-1].kind == "name":
+            name = found.pop()
+            found += [tokens[k + 1], tokens[k + 2], name, Token("sign", ",", tokens[k].at)]
+            k += 3
+            continue
+        found.append(tokens[k])
+        k += 1
+    return found
+
+
 def _without_modules(tokens: Sequence[Token], text: str) -> list[Token]:
     """Take np. off np.sin; no other attribute is read."""
     found: list[Token] = []
     for token in tokens:
-        if len(found) > 1 and found[-1].text == "." and token.kind == "name" and token.text in FUNCTION_NAMES:
+        if len(found) > 1 and found[-1].text == "." and token.kind == "name" and token.text in ATTRIBUTES:
             module = found[-2]
             if module.kind != "name" or module.text not in MODULES:
                 fail(text, module.at, f"an attribute of {module.text!r}, which is not read,")
@@ -79,8 +97,9 @@ def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Tok
 
 
 def _indexed(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read q[0] as Python's first joint, q(1) as MATLAB's."""
+    """Read q[0] as Python's first joint, q(1) as MATLAB's, theta[1](t) as Maple's."""
     found: list[Token] = []
+    first = _first_index(tokens)
     k = 0
     while k < len(tokens):
         name, *behind = tokens[k : k + 4]
@@ -90,10 +109,8 @@ def _indexed(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list
             and pattern in (["[", "number", "]"], ["(", "number", ")"])
             and behind[1].text.isdecimal()
         ):
-            number = int(behind[1].text[:4]) + (pattern[0] == "[")
-            whole = plain_name(name.text) + str(number)
-            is_index = pattern[0] == "[" or (name.text not in FUNCTION_NAMES and not vocabulary.knows(name.text))
-            if is_index and vocabulary.knows(whole):
+            whole = _indexed_name(name, int(behind[1].text[:4]), pattern[0] == "[", first, vocabulary)
+            if whole:
                 found.append(Token("name", whole, name.at))
                 k += 4
                 continue
@@ -104,20 +121,56 @@ def _indexed(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list
     return found
 
 
+def _first_index(tokens: Sequence[Token]) -> int | None:
+    """Return from where indices in square brackets count: 0 where a 0 occurs, 1 in Maple's theta[1](t), or unknown."""
+    one = False
+    for k in range(len(tokens) - 2):
+        if tokens[k].text == "[" and tokens[k + 1].text.isdecimal() and tokens[k + 2].text == "]":
+            if int(tokens[k + 1].text) == 0:
+                return 0
+            one = one or [x.text for x in tokens[k + 3 : k + 6]] == ["(", "t", ")"]
+    return 1 if one else None
+
+
+def _indexed_name(name: Token, index: int, is_square: bool, first: int | None, vocabulary: Vocabulary) -> str:
+    """Return the name that an index makes, empty where it makes none."""
+    plain = plain_name(name.text)
+    if not is_square:
+        whole = plain + str(index)
+        alone = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
+        is_index = alone or (name.text not in FUNCTION_NAMES and not vocabulary.knows(name.text))
+        return whole if is_index and vocabulary.knows(whole) else ""
+    from_zero, from_one = f"{plain}{index + 1}", f"{plain}{index}"
+    if first is not None:
+        whole = from_zero if first == 0 else from_one
+        return whole if vocabulary.knows(whole) else ""
+    if vocabulary.knows(from_zero):
+        if vocabulary.knows(from_one) and index:
+            vocabulary.taken_for[f"{name.text}[{index}]"] = f"{from_zero}, counted from 0 as in Python"
+        return from_zero
+    return from_one if vocabulary.knows(from_one) else ""
+
+
 def _without_time(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Token]:
-    """Read theta1(t) as theta1."""
+    """Read theta1(t), and Mathematica's theta1[t], as theta1."""
+    if vocabulary.knows("t"):
+        return list(tokens)
     found: list[Token] = []
     k = 0
     while k < len(tokens):
         found.append(tokens[k])
-        is_name = tokens[k].kind == "name" and tokens[k].text not in FUNCTION_NAMES
-        of_time = [x.text for x in tokens[k + 1 : k + 4]] == ["(", "t", ")"] and not vocabulary.knows("t")
-        k += 4 if is_name and of_time else 1
+        is_operand = (tokens[k].kind == "name" and tokens[k].text not in FUNCTION_NAMES) or tokens[k].text in (")", "}")
+        behind = [x.text for x in tokens[k + 1 : k + 4]]
+        k += 4 if is_operand and behind in (["(", "t", ")"], ["[", "t", "]"]) else 1
     return found
 
 
+ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
+"""Orders of derivatives, by what stands behind the expression that is differentiated."""
+
+
 def _derivatives(tokens: Sequence[Token], text: str) -> list[Token]:
-    """Read diff(theta1, t) and Derivative(theta1, (t, 2)) as rates and accelerations."""
+    """Read diff(theta1, t) and Derivative(l1*theta1(t), (t, 2)) as time derivatives of what stands there."""
     found: list[Token] = []
     k = 0
     while k < len(tokens):
@@ -127,13 +180,91 @@ def _derivatives(tokens: Sequence[Token], text: str) -> list[Token]:
             k += 1
             continue
         end = _closing(tokens, k + 1, text)
-        name, *rest = tokens[k + 2 : end]
-        order = {",t": 1, ",t,t": 2, ",t,2": 2, ",(t,2)": 2, ",(t,1)": 1}.get("".join(x.text for x in rest))
-        if order is None or name.kind != "name":
-            fail(text, token.at, "a derivative other than of a joint's variable by t")
-        found.append(Token("name", plain_name(name.text) + ("dot", "ddot")[order - 1], name.at))
+        inner = list(tokens[k + 2 : end])
+        comma = _comma(inner)
+        order = ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
+        if not comma or not order:
+            fail(text, token.at, "a derivative other than by t")
+        found += _by_time(_derivatives(inner[:comma], text), order, token.at)
         k = end + 1
     return found
+
+
+def _comma(tokens: Sequence[Token]) -> int:
+    """Return where the first comma outside brackets is; 0 without one."""
+    depth = 0
+    for k, token in enumerate(tokens):
+        depth += {"(": 1, ")": -1}.get(token.text, 0)
+        if depth == 0 and token.text == ",":
+            return k
+    return 0
+
+
+def _by_time(inner: Sequence[Token], order: int, at: int) -> list[Token]:
+    found = list(inner)
+    for _ in range(order):
+        found = [Token("function", "ddt", at), Token("sign", "(", at), *found, Token("sign", ")", at)]
+    return found
+
+
+def _fractions_by_time(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
+    """Read dtheta1/dt, d(5 theta1)/dt, d/dt(theta1/2) and d^2 theta1/dt^2 as time derivatives."""
+    found: list[Token] = []
+    k = 0
+    while k < len(tokens):
+        token = tokens[k]
+        if token.kind == "name" and token.text[0] == "d" and "d" not in vocabulary.own:
+            read = _fraction_by_time(tokens, k, vocabulary, text)
+            if read is not None:
+                found += read[0]
+                k = read[1]
+                continue
+        if token.kind == "name" and token.text == "dt" and not vocabulary.is_own("dt"):
+            fail(text, token.at, "dt that belongs to no derivative")
+        found.append(token)
+        k += 1
+    return found
+
+
+def _fraction_by_time(
+    tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str
+) -> tuple[list[Token], int] | None:
+    """Return a derivative that begins with the d at k, and where it ends; None where there is none."""
+    token, order, at = tokens[k], 1, k + 1
+    if token.text == "d" and [x.text for x in tokens[at : at + 2]] == ["^", "2"]:
+        order, at = 2, at + 2
+    elif token.text == "d" and [x.text for x in tokens[at : at + 4]] == ["^", "(", "2", ")"]:
+        order, at = 2, at + 4
+    if token.text == "d" and (end := _over_time(tokens, at, order)):
+        stop = _operand(tokens, end, text)  # d/dt(...)
+        if stop == end or (stop < len(tokens) and tokens[stop].text == "^"):
+            fail(
+                text, token.at, "a derivative that may reach further than the name behind it; put brackets around what"
+            )
+        return _by_time(tokens[end:stop], order, token.at), stop
+    if token.text == "d":
+        stop = _operand(tokens, at, text)
+        end = _over_time(tokens, stop, order) if stop > at else 0
+        return (_by_time(tokens[at:stop], order, token.at), end) if end else None
+    name, end = token.text[1:], _over_time(tokens, k + 1, 1)
+    if end and vocabulary.is_state(name):
+        return _by_time([Token("name", name, token.at)], 1, token.at), end
+    return None
+
+
+def _over_time(tokens: Sequence[Token], k: int, order: int) -> int:
+    """Return where / dt, or / dt^2, ends that begins at k; 0 where something else stands there."""
+    texts = [x.text for x in tokens[k : k + 6]]
+    for below in (["/", "dt"], ["/", "d", "t"], ["/", "(", "dt", ")"]):
+        if texts[: len(below)] != below:
+            continue
+        end = k + len(below)
+        rest = [x.text for x in tokens[end : end + 4]]
+        for power in (["^", "2"], ["^", "(", "2", ")"]):
+            if order == 2 and rest[: len(power)] == power:
+                return end + len(power)
+        return end if order == 1 else 0
+    return 0
 
 
 def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
@@ -147,6 +278,7 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
             continue
         calls = k + 1 < len(tokens) and tokens[k + 1].text in ("(", "^")
         meaning = vocabulary.find(token.text)
+        _refuse_ambiguous(tokens, k, vocabulary, text)
         if token.text in FUNCTION_NAMES and (meaning is None or calls):
             found.append(Token("function", FUNCTION_NAMES[token.text], token.at))
         elif meaning is not None:
@@ -154,6 +286,29 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
         else:
             found += _split(token, calls, vocabulary, text)
     return found
+
+
+AMBIGUOUS = re.compile(r"(sin|cos|tan)(\d+)([A-Za-z]\w*)?", re.ASCII)
+
+
+def _refuse_ambiguous(tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str) -> None:
+    """Refuse sin2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
+    match = AMBIGUOUS.fullmatch(tokens[k].text)
+    if match is None or tokens[k].text in vocabulary.own:
+        return
+    function, number, rest = match.groups()
+    following = tokens[k + 1] if k + 1 < len(tokens) else None
+    if rest is None and following is not None and following.text == "(":
+        fail(
+            text,
+            tokens[k].at,
+            f"{function}{number}(...) may be {function}(...)^{number} or {function} of {number}(...)",
+        )
+    if rest is None and following is not None and following.kind == "name" and vocabulary.is_position(following.text):
+        rest = following.text
+    if rest is not None and vocabulary.is_position(rest):
+        both = f"{function}({number}*{rest}) or {function}(q{number})*{rest}"
+        fail(text, tokens[k].at, f"{tokens[k].text} may be {both}; put brackets")
 
 
 def _split(token: Token, calls: bool, vocabulary: Vocabulary, text: str) -> list[Token]:
@@ -202,9 +357,19 @@ def _functions(tokens: Sequence[Token], text: str) -> list[Token]:
         if k < len(tokens) and tokens[k].text == "^":
             end = _operand(tokens, k + 1, text)
             power, k = list(tokens[k:end]), end
-            if "".join(x.text for x in power).strip("^()") == "-1" and token.text in ("sin", "cos", "tan"):
-                token, power = Token("function", f"a{token.text}", token.at), []  # cos^-1 is the arc cosine
+            if "".join(x.text for x in power).strip("^()") == "-1":
+                if token.text in ("sec", "csc", "cot"):
+                    fail(text, token.at, f"{token.text}^-1 may be the inverse function or 1/{token.text}")
+                if token.text in ("sin", "cos", "tan"):
+                    token, power = Token("function", f"a{token.text}", token.at), []  # cos^-1 is the arc cosine
         end = _operand(tokens, k, text, product=True)
+        if token.text == "sqrt" and end - k > 1 and tokens[k].kind == "number":
+            both = " ".join(x.text for x in tokens[k:end])
+            fail(
+                text,
+                token.at,
+                f"sqrt {both} may be sqrt({both}) or sqrt({tokens[k].text}) times the rest; put brackets",
+            )
         argument = _functions(tokens[k:end], text)
         if not argument:
             fail(text, token.at, f"{token.text} without an argument")

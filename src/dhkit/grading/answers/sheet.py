@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -17,12 +18,16 @@ __all__ = [
     "ALIASES",
     "FORMAT",
     "MAX_BYTES",
+    "QUANTITY",
     "AnswerSheet",
+    "Chain",
+    "Entries",
     "Names",
     "Refusal",
     "Task",
     "quantity_names",
     "read_sheet",
+    "read_task",
     "read_text",
     "sheet_of",
 ]
@@ -32,6 +37,8 @@ MAX_BYTES = 4_000_000
 """A PUMA's M and C, multiplied out in numbers, are 2 MB."""
 MAX_NAMES = 100
 MAX_BRANCHES = 64
+QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
+"""Names of quantities."""
 ALIASES = {
     "D": "M",
     "G": "g",
@@ -58,6 +65,32 @@ class Refusal:
     """
 
     reason: str
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The formulas of one statement ``V = a = b``: the last is the answer, and those before it must equal it.
+
+    Attributes
+    ----------
+    formulas
+        As they were typed, two or more.
+    """
+
+    formulas: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Entries:
+    """A quantity that was given entry by entry, perhaps not all of them.
+
+    Attributes
+    ----------
+    texts
+        Text, :class:`Chain` or :class:`Refusal` by index, from 0.
+    """
+
+    texts: Mapping[tuple[int, ...], str | Chain | Refusal]
 
 
 @dataclass(frozen=True)
@@ -94,10 +127,22 @@ class Task:
         Whether tau includes viscous friction.
     total_derivative
         Whether L is right up to the total derivative of a function of q and t.
+    asked
+        Quantities that were assigned; a sheet without one of them is incomplete. Those that were begun unless given.
+    proof_required
+        Whether answers that are not proved do not pass (``proof = "required"``).
+    frames_given
+        Whether a table must have the file's own frames (``frames = "given"``).
+    zero_given
+        Whether a table's joint variables must be zero in the file's own zero pose (``zero = "given"``).
     """
 
     friction: bool = False
     total_derivative: bool = False
+    asked: tuple[str, ...] = ()
+    proof_required: bool = False
+    frames_given: bool = False
+    zero_given: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,9 +164,13 @@ class AnswerSheet:
     rubric
         How points are given; the instructor's own file comes first.
     student
-        Whose it is.
+        Student's name; empty if unknown.
     file
         What messages begin with.
+    notes
+        What a reader should know of how a program or a document was read, each with its line.
+    left_out
+        Statements that were not read as answers, each with its line.
     """
 
     robot: str = ""
@@ -133,6 +182,8 @@ class AnswerSheet:
     rubric: Mapping[str, Any] = field(default_factory=dict)
     student: str = ""
     file: str = "answers"
+    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 def read_text(path: Path, expected: str) -> str:
@@ -168,6 +219,23 @@ def read_sheet(path: Path) -> AnswerSheet:
         raise AnswerError(f"{path}: nested too deep") from None
 
 
+def read_task(path: Path) -> AnswerSheet:
+    """Read an instructor's task: a sheet without answers, with robot, [task], [names] and [rubric].
+
+    Raises
+    ------
+    AnswerError
+        A file that cannot be read, or is no task; with the file, the key, what was found and expected.
+    """
+    try:
+        data = toml_document(read_text(path, "a task"))
+        return _sheet(data, _Where(str(path)), ("format", "robot", "names", "task", "rubric"))
+    except DescriptionError as error:
+        raise AnswerError(f"{path}: {error}") from None
+    except RecursionError:
+        raise AnswerError(f"{path}: nested too deep") from None
+
+
 def quantity_names(n: int) -> list[str]:
     """Return what an arm of n joints may be asked for."""
     return ["M", "C", "h", "g", "tau", "K", "V", "L", *(f"A{i}" for i in range(1, n + 1)), "T", "J"]
@@ -182,12 +250,18 @@ def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:
         It is none; with the key, what was found and expected.
     """
     where = _Where(file)
-    where.keys(data, ("format", "robot", "student", "names", "task", "answer", "rubric"), "")
-    if data.get("format", FORMAT) != FORMAT:
-        raise AnswerError(f"{file}: format: found {where.shown(data['format'])}; expected {FORMAT}")
-    answers = where.table(data, "answer", "")
-    if not answers:
+    sheet = _sheet(data, where, ("format", "robot", "student", "names", "task", "answer", "rubric"))
+    if not where.table(data, "answer", ""):
         raise AnswerError(f"{file}: no answers; expected a table [answer] with M, g, tau or others")
+    return sheet
+
+
+def _sheet(data: Mapping[str, Any], where: _Where, known: Sequence[str]) -> AnswerSheet:
+    """Return what a document says, of the keys that it may have."""
+    where.keys(data, known, "")
+    if data.get("format", FORMAT) != FORMAT:
+        raise AnswerError(f"{where.file}: format: found {where.shown(data['format'])}; expected {FORMAT}")
+    answers = where.table(data, "answer", "")
     names, task = where.table(data, "names", ""), where.table(data, "task", "")
     table, inverse = where.table(answers, "dh", "answer."), where.table(answers, "ik", "answer.")
     return AnswerSheet(
@@ -199,7 +273,7 @@ def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:
         _branches(where, inverse) if "ik" in answers else (),
         where.table(data, "rubric", ""),
         where.text(data, "student", ""),
-        file,
+        where.file,
     )
 
 
@@ -277,8 +351,19 @@ def _names(where: _Where, data: Mapping[str, Any]) -> Names:
 
 
 def _task(where: _Where, data: Mapping[str, Any]) -> Task:
-    where.keys(data, ("friction", "total_derivative"), "task.")
-    return Task(where.switch(data, "friction", "task."), where.switch(data, "total_derivative", "task."))
+    where.keys(data, ("friction", "total_derivative", "asked", "proof", "frames", "zero"), "task.")
+    asked = where.texts(data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]')
+    for name in asked:
+        if not QUANTITY.fullmatch(name):
+            raise where.fail("task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik")
+    return Task(
+        where.switch(data, "friction", "task."),
+        where.switch(data, "total_derivative", "task."),
+        tuple(dict.fromkeys(asked)),
+        where.choice(data, "proof", "task.", ("optional", "required")) == "required",
+        where.choice(data, "frames", "task.", ("free", "given")) == "given",
+        where.choice(data, "zero", "task.", ("free", "given")) == "given",
+    )
 
 
 def _dh(where: _Where, data: Mapping[str, Any]) -> tuple[str, tuple[tuple[str, ...], ...]]:

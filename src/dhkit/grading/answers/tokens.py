@@ -40,6 +40,7 @@ _FOLDED = {
     "\u0307": "dot",
     "\u0308": "ddot",
 }
+_VULGAR = "½⅓¼¾⅔"
 _RAISED = {raised: str(k) for k, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "-", "⁺": "+"}
 
 
@@ -79,6 +80,9 @@ def folded(text: str) -> tuple[str, list[int]]:
     before_raised = False
     for at, character in enumerate(unicodedata.normalize("NFD", text)):
         piece, raised = character, character in _RAISED
+        if character in _VULGAR and pieces and pieces[-1][-1:].isdigit():
+            whole, part = pieces[-1][-1], _FOLDED[character]
+            fail(text, at, f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them")
         if raised:
             piece = ("" if before_raised else "^") + _RAISED[character]
         elif not character.isascii():

@@ -23,6 +23,8 @@ FUNCTION_NAMES = {
     **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp")},
     **{name: name for name in ("sec", "csc", "cot", "sind", "cosd", "tand", "pow", "min", "max")},
     **{name: name.lower() for name in ("Sin", "Cos", "Tan", "SIN", "COS", "TAN", "Sqrt", "SQRT", "ABS")},
+    **{f"Arc{name}": f"a{name.lower()}" for name in ("Sin", "Cos", "Tan")},
+    **{name: name.lower() for name in ("Sec", "Csc", "Cot", "Exp", "Sign")},
     "c": "cos",
     "s": "sin",
     "arcsin": "asin",
@@ -151,6 +153,10 @@ class Vocabulary:
         self.refused[plain_name(name)] = why
         self._found.clear()
 
+    def is_own(self, name: str) -> bool:
+        """Whether a name is one of the student's own, or a parameter of the file."""
+        return name in self.own or name in self._exact
+
     def is_state(self, name: str) -> bool:
         """Whether a name is a joint's variable, rate or acceleration."""
         return self._is_one_of(name, ("q", "qd", "qdd"))
@@ -186,6 +192,11 @@ class Vocabulary:
                 return self._exact[text]
         if plain in CONSTANTS:
             return (plain,)
+        if plain in ("dt", "ddt"):
+            return None
+        if why := self._ambiguous(plain):
+            self.refused[plain] = why
+            return None
         found = self._joint(plain) or self._turn(plain) or (self.gravity if plain == "g" else None)
         if found is None and len(self._loose.get(plain.lower(), ())) == 1:
             (symbol,) = self._loose[plain.lower()]
@@ -209,6 +220,10 @@ class Vocabulary:
 
     def _joint(self, name: str) -> Meaning | None:
         """Return a joint's variable, rate or acceleration, in any of the usual spellings."""
+        angular = RATES.fullmatch(name)
+        if angular and angular[1] in self.numbers and self.kinds[self.numbers[angular[1]] - 1] == "R":
+            self.taken_for[name] = f"the rate of joint {self.numbers[angular[1]]}"
+            return self._sum("qd", self.numbers[angular[1]])
         match = _VARIABLE.fullmatch(name)
         if match is None:
             alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
@@ -248,6 +263,15 @@ class Vocabulary:
             angle += ["-" if x[0] == "m" else "+", *self._sum("q", joint)]
         return ("cos" if match[1][0] in "cC" else "sin", "(", *angle[1:], ")")
 
+    def _ambiguous(self, name: str) -> str:
+        """Return why a name of an arm of ten joints or more has two meanings: c12 is cos(q12) or cos(q1 + q2)."""
+        match = _TURN.fullmatch(name)
+        if match is None or len(match[2]) < 2 or match[2] not in self.numbers:
+            return ""
+        function = "cos" if match[1][0] in "cC" else "sin"
+        summed = " + ".join(f"q{digit}" for digit in match[2])
+        return f"it may be {function}(q{match[2]}) or {function}({summed}); write one of them"
+
     def split(self, name: str) -> list[str] | None:
         """Return the known names that an unknown one is a product of, where there is one way: m2l1 is m2 l1."""
         if len(name) > LONGEST:
@@ -275,7 +299,7 @@ class Vocabulary:
     def nearest(self, name: str) -> str:
         """Return a hint: why a name could not be defined, or the known name that is nearest."""
         if plain_name(name) in self.refused:
-            return f"its own assignment is not read: {self.refused[plain_name(name)][:200]}"
+            return self.refused[plain_name(name)][:200]
         known = [*self.own, *self.further, *self.symbols, *FUNCTION_NAMES]
         known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
         known = [other for other in known if len(other) <= LONGEST]
@@ -284,6 +308,7 @@ class Vocabulary:
         return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
 
 
+RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
 _DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
 _BEFORE = "dot|ddot|d|dd|d2|D|DD"
 _LETTERS = "|".join(sorted((*ANGLES, *SLIDES), key=len, reverse=True))

@@ -48,7 +48,7 @@ class Consistency:
                 if finding.verdict is not Verdict.WRONG or index in found or finding.answer is None:
                     continue
                 place = index[:1] if quantity == "C" else index
-                if finding.answer.less(expected[place]).is_zero:
+                if finding.answer.numerator_of_difference(expected[place]).is_zero:
                     found[index] = ", ".join(wrong)
         return found
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Sum, Tree
-from dhkit.grading.judging.numeric import doubles, many_digits, names_of, parts_of, state_arrays
-from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading, decimals_in
-from dhkit.grading.judging.rounding import MOST, Rounding, rounded
+from dhkit.expressions.syntax import Tree
+from dhkit.grading.judging.numeric import TooLargeError, doubles, many_digits, names_of, parts_of, state_arrays
+from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
+from dhkit.grading.judging.rounding import Residuals, rounding_share
 from dhkit.grading.judging.sampling import DIGITS, SAMPLES, Sample, checked, differ, element_value, samples, show_state
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import ExactArm
@@ -21,18 +20,19 @@ from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, RingError, element_array
 
-__all__ = ["EXACT", "Comparison", "Finding", "compare", "equal", "names_in", "readable"]
+__all__ = ["EXACT", "Comparison", "Finding", "Residuals", "compare", "equal", "names_in", "readable"]
 
-Residuals = Callable[[Quotient, Element], Sequence[Element]]
-"""What must be zero for an answer to be right, given the answer and the truth."""
-LONGEST = 400
+MAX_WRITTEN_TERMS = 400
 """Terms of a difference that is written out."""
-PROVED = "proved equal, for every state and every value of the parameters"
+MAX_DIVISORS = 3
+"""Divisors that a statement names."""
+PROVED = "proved equal"
+ALWAYS = ", for every state and every value of the parameters"
 
 
 def EXACT(answer: Quotient, truth: Element) -> Sequence[Element]:
     """Return the difference itself."""
-    return [answer.less(truth)]
+    return [answer.numerator_of_difference(truth)]
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,10 @@ class Comparison:
         Parameters that stand for their numbers in the file.
     residuals
         What must be zero.
+    seed
+        Of the random states that answers outside the ring are tried at.
+    up_to_constant
+        Whether answers outside the ring may be off by a constant; None where they cannot be tried.
     """
 
     arm: ExactArm
@@ -58,6 +62,15 @@ class Comparison:
     digits: int = 4
     numbers: frozenset[str] = frozenset()
     residuals: Residuals = EXACT
+    seed: int = 0
+    up_to_constant: bool | None = False
+
+    @property
+    def place(self) -> str:
+        """At which parameter values a verdict holds, in words; empty where it holds for all."""
+        values = self.arm.parameters
+        listed = ", ".join(f"{name} = {values[name]:g}" for name in sorted(self.numbers))
+        return f" at {listed}" if listed else ""
 
 
 @dataclass(frozen=True)
@@ -102,17 +115,21 @@ def _compared(tree: Tree, truth: Element, by: Comparison) -> Finding:
         answer = by.reading.read(tree)
     except OutsideTheRingError as reason:
         return _sampled(tree, truth, by, str(reason))
-    residuals = by.residuals(answer, truth)
-    if all(residual.is_zero for residual in residuals):
-        return Finding(Verdict.CORRECT, PROVED, answer)
-    rounding = _rounding(tree, truth, by)
-    if rounding is not None:
+    divisors = list(by.reading.divisors)
+    try:
+        is_equal = all(residual.is_zero for residual in by.residuals(answer, truth))
+    except RingError:
+        return _sampled(tree, truth, by, "it multiplies out to too many terms")
+    if is_equal:
+        return Finding(Verdict.CORRECT, _proved(by, divisors), answer)
+    share = rounding_share(tree, truth, by.reading, by.residuals, by.digits)
+    if share is not None:
         statement = (
-            f"its decimals of {by.digits} digits or more allow the truth: none must move by more than "
-            f"{rounding.share:.2f} of half a unit of its last digit"
+            f"equal within rounding{by.place}: each coefficient is off by at most {max(share, 0.01):.2f} of half a "
+            f"unit in the last place of its coarsest decimal of {by.digits} digits or more"
         )
         return Finding(Verdict.ROUNDED, statement, answer)
-    difference = Quotient(answer.less(truth), answer.below).element()
+    difference = Quotient(answer.numerator_of_difference(truth), answer.denominator).element()
     return Finding(
         Verdict.WRONG,
         "proved different",
@@ -123,47 +140,25 @@ def _compared(tree: Tree, truth: Element, by: Comparison) -> Finding:
     )
 
 
+def _proved(by: Comparison, divisors: Sequence[Element]) -> str:
+    """Say for which states an answer is proved: where it divides by zero it has no value."""
+    held = by.place or ALWAYS
+    if not divisors:
+        return f"{PROVED}{held}{', for every state' if by.place else ''}"
+    shown = [plain_text(readable(by.arm, one)) for one in divisors[:MAX_DIVISORS] if len(one) <= MAX_WRITTEN_TERMS]
+    more = " or another divisor is 0" if len(shown) < len(divisors) else ""
+    where = " or ".join(f"{text} = 0" for text in shown) + more
+    return f"{PROVED}{by.place} wherever the answer is defined: it has no value where {where}"
+
+
 def equal(tree: Tree, truth: Element, by: Comparison) -> bool:
     """Whether an answer is an element, exactly or within the rounding of its decimals."""
     try:
         if all(residual.is_zero for residual in by.residuals(by.reading.read(tree), truth)):
             return True
-        moved = _rounding(tree, truth, by)
+        return rounding_share(tree, truth, by.reading, by.residuals, by.digits) is not None
     except (OutsideTheRingError, AnswerError, RingError):
         return False
-    return moved is not None
-
-
-def _rounding(tree: Tree, truth: Element, by: Comparison) -> Rounding | None:
-    """Return how an answer's decimals must be moved for it to be the truth."""
-    units = decimals_in(tree, by.digits)
-    if not units or len(units) > MOST:
-        return None
-    terms = tree.terms if isinstance(tree, Sum) else ((True, tree),)
-    owned = [{id(part) for part in parts_of(term, coefficients=True)} & set(units) for _, term in terms]
-
-    def residuals(moves: Mapping[int, Fraction]) -> Sequence[Element]:
-        return by.residuals(by.reading.read(tree, moves), truth)
-
-    def slopes(moves: Mapping[int, Fraction]) -> dict[int, Sequence[Element]]:
-        """Move one decimal after the other, and read its own term anew."""
-        found: dict[int, Sequence[Element]] = {}
-        for (added, term), own in zip(terms, owned, strict=True):
-            before = by.reading.read(term, moves).above if own else truth
-            for at in own:
-                change = by.reading.read(term, {**moves, at: moves[at] + units[at]}).above - before
-                one = Quotient(truth + (change if added else -change), truth.ring.one)
-                found[at] = by.residuals(one, truth)
-        return found
-
-    sizes = [sum(1 for _ in parts_of(term)) for _, term in terms]
-    if sum(len(own) * size for own, size in zip(owned, sizes, strict=True)) > MAX_READ:
-        return None
-    apart = sum(map(len, owned)) == len(units) and by.reading.read(tree).below is truth.ring.one
-    linear = apart and all(by.reading.read(term).below is truth.ring.one for _, term in terms)
-    if not linear and len(units) > MOST_IN_QUOTIENTS:
-        return None
-    return rounded(residuals, units, slopes if linear else None)
 
 
 def readable(arm: ExactArm, element: Element) -> Element:
@@ -173,26 +168,27 @@ def readable(arm: ExactArm, element: Element) -> Element:
 
 def _texts(arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None) -> tuple[str | None, str]:
     if difference is not None:
-        if len(difference) > LONGEST:
+        if len(difference) > MAX_WRITTEN_TERMS:
             return plain_text(difference), ""
         short = readable(arm, difference)
         return plain_text(short), latex_text(short)
-    above, below = answer.less(truth), answer.below
-    if max(len(above), len(below)) > LONGEST:
+    numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
+    if max(len(numerator), len(denominator)) > MAX_WRITTEN_TERMS:
         return None, ""
-    above, below = readable(arm, above), readable(arm, below)
-    return f"({plain_text(above)})/({plain_text(below)})", rf"\frac{{{latex_text(above)}}}{{{latex_text(below)}}}"
+    numerator, denominator = readable(arm, numerator), readable(arm, denominator)
+    return (
+        f"({plain_text(numerator)})/({plain_text(denominator)})",
+        rf"\frac{{{latex_text(numerator)}}}{{{latex_text(denominator)}}}",
+    )
 
 
 # Witnesses
 
-MAX_READ = 50_000
-"""Nodes that are read to see what each decimal changes: seconds."""
-MOST_IN_QUOTIENTS = 40
-"""Decimals of an answer that has to be read as a whole for each of them."""
 MAX_NODES = 20_000
-MAX_EVALUATIONS = 600_000
-"""Nodes times states: seconds."""
+MAX_EVALUATIONS = 300_000
+"""Nodes times states that an answer outside the ring is evaluated at."""
+LEAST_STATES = 15
+"""An answer too long to be evaluated at so many states cannot be judged."""
 TRIED = 24
 GROUP = 100
 """States that share parameters where an energy's zero is free."""
@@ -242,32 +238,40 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
     """Hold an answer against the truth at many states, each in fifty digits."""
     import mpmath
 
-    energy = by.residuals is not EXACT
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
+    if by.up_to_constant is None:
+        raise AnswerError(f"outside the exact ring ({reason}), where L is not judged up to a total derivative")
     if nodes > MAX_NODES:
         raise AnswerError(f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors")
     with mpmath.workdps(DIGITS):
-        count = min(SAMPLES, MAX_EVALUATIONS // nodes)
-        states = samples(by.arm, by.numbers, every=GROUP if energy else 1, count=count)
+        count = max(LEAST_STATES, min(SAMPLES, MAX_EVALUATIONS // nodes))
+        states = samples(by.arm, by.numbers, by.seed, every=GROUP if by.up_to_constant else 1, count=count)
         used = names_of(tree) | names_in(truth)
         shift: Any = 0
         for k, state in enumerate(states):
             right = element_value(truth, state)
             try:
                 value = checked(many_digits(tree, state.names))
+            except TooLargeError as error:
+                raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
             except AnswerError as error:
                 return _different(state, used, None, right, f"{error} there")
-            if energy and k % GROUP == 0:
+            if by.up_to_constant and k % GROUP == 0:
                 shift = value - right  # energies count from any zero
             if differ(value - shift, right):
                 return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
     return Finding(
         Verdict.UNDECIDED,
-        f"not proved, since it is outside the exact ring ({reason}); equal to the truth at {len(states)} random states "
-        "in 50 digits, to 25 of them",
+        f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {len(states)} "
+        "random states in 50 digits, to 25 of them",
     )
 
 
 def _different(state: Sample, used: set[str], value: Any, right: Any, why: str) -> Finding:
-    witness = Witness(show_state(state, used), None if value is None else float(value), float(right))
+    witness = Witness(show_state(state, used), _finite(value), _finite(right))
     return Finding(Verdict.WRONG, f"a state shows it: {why}", witness=witness)
+
+
+def _finite(value: Any) -> float | None:
+    number = float("nan") if value is None else float(value)
+    return number if np.isfinite(number) else None

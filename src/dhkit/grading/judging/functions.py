@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.given import Given
+from dhkit.grading.isolation import Limits, result_of
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in
 from dhkit.grading.judging.truth import Truth, shape_of
@@ -20,30 +21,39 @@ __all__ = ["judge_function"]
 
 SAMPLES = 1_000
 TOLERANCE = 1e-9
-"""Relative to a quantity's largest entry: a student's doubles, with room for a long formula's rounding."""
+"""Relative to a quantity's largest entry in a state: a student's doubles, with room for a long formula's rounding."""
 STATES = ("q", "qd", "qdd")
+LIMITS = Limits(seconds=30.0, memory=2 * 1024**3)
+"""Of the process that calls a function at all states: one that hangs or exits ends itself alone."""
+FAILED = b"!"
+"""How a worker's result begins that is a message and no array."""
 
 
-def judge_function(name: str, function: Callable[..., Any], truth: Truth) -> JudgedQuantity:
+def judge_function(name: str, function: Callable[..., Any], truth: Truth, seed: int = 0) -> JudgedQuantity:
     """Judge a quantity that is a function of (q), (q, qd) or (q, qd, qdd), each of shape (n,), SI and radians.
+
+    It is called in a process of its own.
 
     Raises
     ------
     AnswerError
-        It takes other arguments, fails, or returns another shape.
+        It takes other arguments, fails, hangs, ends its process, or returns another shape.
     """
     n, shape = truth.description.n, shape_of(name, truth.description.n)
     count = _arguments(name, function)
-    rng = np.random.default_rng(0)
-    y = [rng.uniform(-2.0, 2.0, (SAMPLES, n)) for _ in STATES]
+    rng = np.random.default_rng(seed)
+    y = [_spread(rng, n) for _ in STATES]
     states = [v @ truth.coordinates.B.T.astype(float) for v in y]
-    answers = np.array([_called(name, function, [v[k] for v in y[:count]], shape) for k in range(SAMPLES)])
+    answers = _called_at(name, function, y[:count], shape)
     right = truth.of("h" if name == "C" else name)
     expected = truth.arm(name).evaluate(right, *states)
     held = np.einsum("...ij,...j->...i", answers, y[1]) if name == "C" else answers
     if name in ("V", "L"):
         held = held - held[0] + expected[0]
-    size = np.max(np.abs(expected), initial=1e-12)
+    size = np.max(np.abs(expected).reshape(SAMPLES, -1), axis=1, initial=0.0)
+    if name in ("V", "L", "J", "T") or name[:1] == "A":
+        size = np.maximum(size, np.median(size))
+    size = np.maximum(size, 1e-3 * np.median(size) + 1e-12).reshape(SAMPLES, *(1,) * (expected.ndim - 1))
     differs = ~(np.abs(held - expected) <= TOLERANCE * size)
     findings = {}
     for index in np.ndindex(shape):
@@ -53,6 +63,34 @@ def judge_function(name: str, function: Callable[..., Any], truth: Truth) -> Jud
         )
     given = tuple(Given(index, f"{getattr(function, '__name__', 'function')}(...)") for index in np.ndindex(shape))
     return JudgedQuantity(name, given, findings, right, parameters_in(right, truth))
+
+
+def _spread(rng: np.random.Generator, n: int) -> Array:
+    """Return states of shape (SAMPLES, n): half within 2 rad or m, half at scales from 0.01 to 100."""
+    scale = np.where(np.arange(SAMPLES) % 2, 2.0, 10.0 ** rng.uniform(-2.0, 2.0, SAMPLES))
+    return rng.uniform(-1.0, 1.0, (SAMPLES, n)) * scale[:, None]
+
+
+def _called_at(name: str, function: Callable[..., Any], states: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Return the function's results, shape (SAMPLES, *shape)."""
+
+    def work() -> bytes:
+        try:
+            results = [_called(name, function, [state[k] for state in states], shape) for k in range(SAMPLES)]
+        except AnswerError as error:
+            return FAILED + str(error).encode("utf-8", "replace")
+        return np.array(results).tobytes()
+
+    try:
+        received = result_of(work, LIMITS)
+    except TimeoutError as error:
+        raise AnswerError(f"{name}: the function {error}") from None
+    except (ChildProcessError, OSError) as error:
+        raise AnswerError(f"{name}: the function gave no result: {error}") from None
+    size = 8 * SAMPLES * int(np.prod(shape, dtype=int))
+    if len(received) != size:
+        raise AnswerError(received.removeprefix(FAILED).decode("utf-8", "replace")[:500])
+    return np.frombuffer(received).reshape(SAMPLES, *shape)
 
 
 def _arguments(name: str, function: Callable[..., Any]) -> int:

@@ -19,7 +19,6 @@ from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.changed_calls import changed_calls, negated
 from dhkit.grading.judging.inverse_branch import (
-    INVERSE_MISTAKES,
     Branch,
     BranchJudgement,
     InverseExplanation,
@@ -28,11 +27,11 @@ from dhkit.grading.judging.inverse_branch import (
 )
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.judging.numeric import names_of, parts_of
+from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Verdict
 
 __all__ = [
     "CLOSES",
-    "INVERSE_MISTAKES",
     "POSE_NAMES",
     "BranchJudgement",
     "InverseExplanation",
@@ -172,7 +171,7 @@ def _duplicate(answers: Sequence[Branch], i: int, j: int) -> InverseExplanation:
     """Say of a branch that gives the same as an earlier one whether another sign would make it another."""
     for branch in _other_signs(answers[j]):
         if not np.any(branch.failing) and not any(branch.poses.same(branch.q, answer.q) for answer in answers):
-            sentence = f"gives the same as branch {i + 1}: {INVERSE_MISTAKES['elbow_sign']}"
+            sentence = f"gives the same as branch {i + 1}: {LIBRARY['elbow_sign'].sentence}"
             return InverseExplanation("elbow_sign", sentence)
     return InverseExplanation("duplicate_branch", f"gives the same as branch {i + 1}")
 

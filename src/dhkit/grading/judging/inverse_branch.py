@@ -17,30 +17,15 @@ from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.changed_calls import changed_calls, exchanged, negated
 from dhkit.grading.judging.inverse_poses import CLOSES, MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import doubles, names_of
+from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Verdict
 
-__all__ = ["INVERSE_MISTAKES", "Branch", "BranchJudgement", "InverseExplanation", "InverseWitness", "joint_order"]
+__all__ = ["Branch", "BranchJudgement", "InverseExplanation", "InverseWitness", "joint_order"]
 
 RARE = 0.01
 """Share of poses: solutions that a branch meets less often are met by chance."""
 SUBSTANTIAL = 0.3
 """Share of the failing poses: a mistake that explains so many is one, though others are made besides."""
-INVERSE_MISTAKES: Mapping[str, str] = {
-    "degrees_for_radians": "the result is in degrees, and radians are asked for",
-    "millimetres_for_metres": "the result is in millimetres, and metres are asked for",
-    "atan2_arguments": "the arguments of atan2 are exchanged: it is atan2(y, x)",
-    "elbow_sign": "a root or an arc cosine has the wrong sign: it belongs to another branch",
-    "joint_sign": "the joint value has the wrong sign",
-    "missing_offset": "the joint value is off by a constant: an offset of the table is missing",
-    "supplement": "the angle inside the triangle is given in place of the joint's, which is 180 degrees less it",
-    "quadrant": "the angle is in the wrong quadrant for some poses: atan, asin and acos know only half a turn, "
-    "atan2 knows all of it",
-    "sign_lost": "the sign is wrong for some poses: acos and sqrt know only one",
-    "duplicate_branch": "this branch gives the same solutions as another",
-}
-"""What goes wrong in inverse kinematics, by stable names."""
-
-
 Repair: TypeAlias = Callable[[Array], Array]
 
 
@@ -51,7 +36,7 @@ class InverseExplanation:
     Attributes
     ----------
     mistake
-        A name of :data:`INVERSE_MISTAKES`; None where none is found.
+        The identity of a mistake of the library; None where none is found.
     sentence
         What a student learns from it.
     joint
@@ -236,7 +221,7 @@ class Branch:
                 yield InverseExplanation(None, f"near to a solution, but not to {CLOSES:g}")
                 return
             name, joint, branch = branch.repaired(joint)
-            said = f"q{joint + 1}: {INVERSE_MISTAKES[name]}" if name else f"q{joint + 1} is the first that is wrong"
+            said = f"q{joint + 1}: {LIBRARY[name].sentence}" if name else f"q{joint + 1} is the first that is wrong"
             yield InverseExplanation(name, said, joint)
 
     def repaired(self, joint: int) -> tuple[str | None, int, Branch | None]:

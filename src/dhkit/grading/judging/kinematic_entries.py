@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from dhkit.description import Description
 from dhkit.grading.answers.given import Given
+from dhkit.grading.answers.sheet import Task
 from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.inverse import BranchJudgement, judge_inverse
 from dhkit.grading.judging.tables import TableJudgement, judge_table
@@ -26,9 +27,12 @@ class KinematicEntries:
     entries: tuple[Entry, ...]
     diagnosis: tuple[Diagnosis, ...] = ()
     notes: tuple[str, ...] = ()
+    judged_at: Mapping[str, float] = field(default_factory=dict)
 
 
-def table_entries(description: Description, rows: Sequence[Sequence[Given]], convention: str) -> KinematicEntries:
+def table_entries(
+    description: Description, rows: Sequence[Sequence[Given]], convention: str, task: Task, seed: int = 0
+) -> KinematicEntries:
     """Judge a table, a row an entry.
 
     Raises
@@ -40,18 +44,28 @@ def table_entries(description: Description, rows: Sequence[Sequence[Given]], con
     if unreadable:
         return unreadable
     trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
-    judgement = judge_table(description, trees, convention)
+    judgement = judge_table(description, trees, convention, seed)
     # One slip is more likely than a choice of frames that differs in one entry alone.
     slipped = bool(judgement.other_frames) and any(found.mistake for found in judgement.explanations)
+    refused = _refused(judgement, task)
     entries = []
     for i, (verdict, statement) in enumerate(zip(judgement.rows, judgement.statements, strict=True)):
-        if slipped and verdict is Verdict.UNDECIDED:
-            verdict, statement = Verdict.WRONG, f"A{i + 1} differs"
+        if judgement.is_in_other_frames(i) and (slipped or refused):
+            verdict, statement = Verdict.WRONG, f"A{i + 1} differs{refused}"
         entries.append(Entry("dh", (i,), verdict, _row_text(rows[i]), statement=statement))
     notes = judgement.notes
     if slipped:
         notes += ("dh: it would be right for the same arm in other frames than the file's",)
-    return KinematicEntries(tuple(entries), _table_diagnosis(judgement, entries, slipped), notes)
+    return KinematicEntries(tuple(entries), _table_diagnosis(judgement, entries, slipped), notes, judgement.judged_at)
+
+
+def _refused(judgement: TableJudgement, task: Task) -> str:
+    """Return why a table in other frames is wrong for this task; empty where it is allowed."""
+    if judgement.other_frames and task.frames_given:
+        return ": the task gives the frames"
+    if judgement.moves_zero and (task.zero_given or task.frames_given):
+        return ": the task gives the zero pose"
+    return ""
 
 
 def _table_diagnosis(judgement: TableJudgement, entries: Sequence[Entry], slipped: bool) -> tuple[Diagnosis, ...]:
@@ -68,7 +82,7 @@ def _table_diagnosis(judgement: TableJudgement, entries: Sequence[Entry], slippe
     return tuple(found)
 
 
-def inverse_entries(description: Description, branches: Sequence[Sequence[Given]]) -> KinematicEntries:
+def inverse_entries(description: Description, branches: Sequence[Sequence[Given]], seed: int = 0) -> KinematicEntries:
     """Judge formulas of inverse kinematics, a branch an entry.
 
     Raises
@@ -79,7 +93,9 @@ def inverse_entries(description: Description, branches: Sequence[Sequence[Given]
     unreadable = _unreadable("ik", branches)
     if unreadable:
         return unreadable
-    judgement = judge_inverse(description, [[e.tree for e in branch if e.tree is not None] for branch in branches])
+    judgement = judge_inverse(
+        description, [[e.tree for e in branch if e.tree is not None] for branch in branches], seed=seed
+    )
     entries, diagnosis = [], []
     for k, (branch, given) in enumerate(zip(judgement.branches, branches, strict=True)):
         entry = Entry(

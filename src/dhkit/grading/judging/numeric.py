@@ -14,7 +14,16 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 
-__all__ = ["FUNCTIONS", "doubles", "general_state", "many_digits", "names_of", "parts_of", "state_arrays"]
+__all__ = [
+    "FUNCTIONS",
+    "TooLargeError",
+    "doubles",
+    "general_state",
+    "many_digits",
+    "names_of",
+    "parts_of",
+    "state_arrays",
+]
 
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp", "min", "max")
 """What an answer may call; secants and the like are read as quotients of these."""
@@ -23,6 +32,11 @@ LARGEST, LARGEST_POWER = 2_000, 100_000
 """Bits: of a function's argument in many digits, and of a power."""
 
 Table = Mapping[str, Callable[..., Any]]
+
+
+class TooLargeError(AnswerError):
+    """A number that would fill the memory if it were worked out."""
+
 
 _NUMPY: Table = {
     "sin": np.sin,
@@ -146,7 +160,7 @@ def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
 
     def checked(*arguments: Any) -> Any:
         if any(x and mpmath.isfinite(x) and mpmath.mag(x) > LARGEST for x in arguments):
-            raise AnswerError("no finite value")
+            raise TooLargeError("a number too large to be worked out")
         return function(*arguments)
 
     return checked
@@ -160,7 +174,7 @@ def _bounded_power(base: Any, exponent: Any) -> Any:
             raise AnswerError("no finite value")
     digits = abs(mpmath.mag(base)) * abs(exponent) if base and exponent else 0
     if digits > LARGEST_POWER or (exponent and mpmath.mag(exponent) > LARGEST):
-        raise AnswerError("no finite value")
+        raise TooLargeError("a number too large to be worked out")
     return operator.pow(base, exponent)
 
 

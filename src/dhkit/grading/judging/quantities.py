@@ -14,11 +14,11 @@ from dhkit.grading.answers.sheet import Task
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.findings import EXACT, Comparison, Finding, Residuals, compare, names_in
 from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
-from dhkit.grading.judging.quotients import Quotient, Reading
+from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
 from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.grading.report import Verdict
 from dhkit.symbolic import ExactArm
-from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.ring import Element, Elements, RingError
 
 __all__ = ["JudgedQuantity", "judge_quantity", "parameters_in"]
 
@@ -43,6 +43,8 @@ class JudgedQuantity:
         What is right, with numbers where the answer has them.
     numbers
         Parameters that the answer has as numbers.
+    contradictions
+        Entries of which a chain ``V = a = b`` has sides that differ.
     """
 
     name: str
@@ -50,6 +52,12 @@ class JudgedQuantity:
     findings: Mapping[Index, Finding]
     truth: Elements
     numbers: frozenset[str] = frozenset()
+    contradictions: tuple[Index, ...] = ()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every entry was handed in."""
+        return not any(entry.is_missing for entry in self.given)
 
     @property
     def wrong(self) -> int:
@@ -68,9 +76,14 @@ class JudgedQuantity:
 
     @property
     def differences(self) -> Mapping[Index, Element] | None:
-        """Answer less truth where every entry is an element of the ring, zero where it is right."""
+        """Answer less truth of the entries that were handed in, zero where one is right.
+
+        None where an entry's difference is no element of the ring.
+        """
         found: dict[Index, Element] = {}
         for index, finding in self.findings.items():
+            if finding.verdict is Verdict.INCOMPLETE:
+                continue
             zero = self.right(index).ring.zero
             element = zero if finding.verdict.passes else finding.difference
             if element is None:
@@ -79,8 +92,25 @@ class JudgedQuantity:
         return found
 
 
-def judge_quantity(name: str, given: tuple[Given, ...], truth: Truth, task: Task, digits: int = 4) -> JudgedQuantity:
+def judge_quantity(
+    name: str, given: tuple[Given, ...], truth: Truth, task: Task, digits: int = 4, seed: int = 0
+) -> JudgedQuantity:
     """Judge a quantity, with its parameters as symbols or, where it has none of one, with the file's number.
+
+    Parameters
+    ----------
+    name
+        Which.
+    given
+        All its entries.
+    truth
+        What is right.
+    task
+        What was asked for.
+    digits
+        Significant digits from which a decimal may have been rounded.
+    seed
+        Of the random states that answers outside the ring are tried at.
 
     Raises
     ------
@@ -89,17 +119,42 @@ def judge_quantity(name: str, given: tuple[Given, ...], truth: Truth, task: Task
     """
     arm = truth.arm(name)
     right = truth.of("h" if name == "C" else name)
-    by = Comparison(arm, Reading(arm.ring, others=truth.others(name)), digits, residuals=_residuals(name, task))
-    judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth.coordinates), right)
+    reading = Reading(arm.ring, others=truth.others(name))
+    up_to_constant = None if name == "L" and task.total_derivative else name in ("V", "L")
+    by = Comparison(arm, reading, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
+    judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth), right)
     missing = _missing(truth, right, given)
     all_numbers = bool(missing) and missing == parameters_in(right, truth)
     likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
     if judged.wrong and (all_numbers or likely or (missing and name == "C")):
         in_numbers = _at_numbers(truth, name, right, missing)
-        findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth.coordinates)
+        findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth)
         other = JudgedQuantity(name, given, findings, in_numbers, missing)
         judged = other if all_numbers or other.wrong < judged.wrong else judged
-    return judged if name == "C" or not judged.wrong else _with_mixed_numbers(judged, missing, truth, by)
+    if name != "C" and judged.wrong:
+        judged = _with_mixed_numbers(judged, missing, truth, by)
+    differing = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
+    return replace(judged, contradictions=differing)
+
+
+def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
+    """Whether an earlier side of a chain differs from its last one."""
+    if entry.tree is None or judged.name == "C":
+        return False
+    verdict = judged.findings[entry.index].verdict
+    for side in entry.earlier:
+        try:
+            if by.reading.read(side).equals(by.reading.read(entry.tree)):
+                continue
+            right = compare(side, judged.right(entry.index), replace(by, numbers=judged.numbers))
+            if not (right.verdict.passes and verdict.passes):
+                return True
+        except (OutsideTheRingError, AnswerError, RingError):
+            values = {**by.arm.parameters, **general_state(by.arm.n)}
+            first, last = float(doubles(side, values)), float(doubles(entry.tree, values))
+            if not abs(first - last) <= NEAR * max(abs(first), abs(last), 1e-9):
+                return True
+    return False
 
 
 def _is_near(judged: JudgedQuantity, entry: Given, arm: ExactArm) -> bool:
@@ -149,38 +204,55 @@ def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:
     return frozenset().union(*map(names_in, array.flat)) & frozenset(truth.description.parameters)
 
 
-def _findings(
-    name: str, given: Sequence[Given], right: Elements, by: Comparison, coordinates: Coordinates
-) -> dict[Index, Finding]:
+def _findings(name: str, given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
     if name == "C":
-        return _row_findings(given, right, by, coordinates)
+        return _row_findings(given, right, by, truth)
     return {entry.index: _finding(entry.tree, entry.error, right[entry.index], by) for entry in given}
 
 
 def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> Finding:
     if tree is None:
-        return Finding(Verdict.WRONG if error == LEFT_EMPTY else Verdict.UNREADABLE, error)
+        return Finding(Verdict.INCOMPLETE if error == LEFT_EMPTY else Verdict.UNREADABLE, error)
     try:
         return compare(tree, right, by)
     except AnswerError as refusal:
         return Finding(Verdict.UNREADABLE, str(refusal))
 
 
-def _row_findings(
-    given: Sequence[Given], right: Elements, by: Comparison, coordinates: Coordinates
-) -> dict[Index, Finding]:
+def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
     """Judge C by C qd: each row's entries share what is found of their sum with the rates."""
     found: dict[Index, Finding] = {}
     for i in range(len(right)):
         row = [entry for entry in given if entry.index[0] == i]
+        if any(entry.is_missing for entry in row):
+            found |= _part_of_row(row, by, truth)
+            continue
         error = next((entry.error for entry in row if entry.tree is None), "")
-        terms = tuple((True, Product(((True, e.tree), (True, _rate(coordinates, e.index[1]))))) for e in row if e.tree)
+        terms = tuple(
+            (True, Product(((True, e.tree), (True, _rate(truth.coordinates, e.index[1]))))) for e in row if e.tree
+        )
         finding = _finding(None if error else Sum(terms), error, right[i], by)
         if finding.verdict is Verdict.WRONG:
             finding = replace(
                 finding, statement=f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
             )
         found |= {entry.index: finding for entry in row}
+    return found
+
+
+def _part_of_row(row: Sequence[Given], by: Comparison, truth: Truth) -> dict[Index, Finding]:
+    """Judge a row of C that lacks entries: what is there is right if it is the Christoffel factorization's.
+
+    Another factorization may be right too, but its row alone would show that.
+    """
+    christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
+    lacking = ", ".join(f"C{entry.index[0] + 1}{entry.index[1] + 1}" for entry in row if entry.is_missing)
+    found: dict[Index, Finding] = {}
+    for entry in row:
+        finding = _finding(entry.tree, entry.error, christoffel[entry.index], by)
+        if finding.verdict is Verdict.WRONG:
+            finding = Finding(Verdict.INCOMPLETE, f"not judged: C is judged by rows of C qd, and {lacking} is missing")
+        found[entry.index] = finding
     return found
 
 
@@ -203,15 +275,17 @@ def _residuals(name: str, task: Task) -> Residuals:
 
 
 def _slopes(answer: Quotient, truth: Element) -> Sequence[Element]:
-    """Return the derivatives of the difference by the state, times the square of what stands below the bar."""
-    above, below = answer.less(truth), answer.below
-    if _accelerates(above) or _accelerates(below):
-        return [above]
+    """Return the derivatives of the difference by the state, times the square of the denominator."""
+    numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
+    if _accelerates(numerator) or _accelerates(denominator):
+        return [numerator]
     slopes = []
     for derivative in ("by_position", "by_rate"):
         for i in range(truth.ring.n):
-            change = getattr(above, derivative)(i)
-            slopes.append(change if answer.is_polynomial else change * below - above * getattr(below, derivative)(i))
+            change = getattr(numerator, derivative)(i)
+            if not answer.is_polynomial:
+                change = change * denominator - numerator * getattr(denominator, derivative)(i)
+            slopes.append(change)
     return slopes
 
 

@@ -11,50 +11,58 @@ from dhkit.expressions import CONSTANTS, Budget, Expression, exact_angle
 from dhkit.expressions.exact import Atom
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.grading.judging.numeric import parts_of
 from dhkit.symbolic.ring import Element, Ring, RingError
 
-__all__ = ["OutsideTheRingError", "Quotient", "Reading", "decimals_in"]
+__all__ = ["OutsideTheRingError", "Quotient", "Reading"]
 
 MAX_EXPONENT = 64
-MAX_WORK = 3_000_000
-"""Pairs of terms that all products of an entry may have together: seconds."""
+MAX_WORK = 300_000
+"""Work that reading one entry may take: pairs of terms in products, weighted by the size of their coefficients. A
+PUMA's longest entry takes 60,000; the bound is about a second on sympy's rings."""
+WEIGHED_BITS = 256
+"""Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
 MAX_TERMS = 60_000
 MAX_BITS = 8_192
-"""Of a coefficient: beyond the range of a double by far, and still fast."""
+"""Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
 CHECKED = 64
-"""Terms of a sum after which its coefficients are looked at."""
+"""Terms of a sum after which its coefficients' size is measured."""
 TOO_LONG = "a number too long to be kept exactly"
+TOO_MUCH = "it multiplies out to too many terms"
 
 
 class OutsideTheRingError(Exception):
-    """An answer with half angles, roots of what depends on the state, or cases: it cannot be decided exactly."""
+    """An answer that cannot be decided exactly: half angles, roots of the state, cases, or too long to multiply out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quotient:
     """An answer as a quotient; its denominator is not zero."""
 
-    above: Element
-    below: Element
+    numerator: Element
+    denominator: Element
     bits: int = 1
-    """At most so many bits have its coefficients."""
+    """Bound on the size of its coefficients in bits."""
 
     @property
     def is_polynomial(self) -> bool:
-        """Whether nothing stands below the bar but 1."""
-        return self.below == 1
+        """Whether the denominator is 1."""
+        return self.denominator == 1
 
-    def less(self, truth: Element) -> Element:
+    def numerator_of_difference(self, truth: Element) -> Element:
         """Return the numerator of the difference from an element: zero if and only if both are equal."""
-        return self.above - truth * self.below
+        return self.numerator - truth * self.denominator
+
+    def equals(self, other: Quotient) -> bool:
+        """Whether two answers are the same quotient."""
+        return (self.numerator * other.denominator - other.numerator * self.denominator).is_zero
 
     def element(self) -> Element | None:
         """Return the element that this is, where the division leaves no remainder."""
         if self.is_polynomial:
-            return self.above
-        polynomial = self.above.ring.polynomials.quotient(self.above.polynomial, self.below.polynomial)
-        return None if polynomial is None else Element(self.above.ring, polynomial).reduced()
+            return self.numerator
+        ring = self.numerator.ring
+        polynomial = ring.polynomials.quotient(self.numerator.polynomial, self.denominator.polynomial)
+        return None if polynomial is None else Element(ring, polynomial).reduced()
 
 
 class Reading:
@@ -73,7 +81,7 @@ class Reading:
     Raises
     ------
     AnswerError
-        Too much work, a division by zero, an exponent out of bounds.
+        A division by zero.
     """
 
     def __init__(
@@ -89,30 +97,23 @@ class Reading:
         self._names = [f"q{i + 1}" for i in range(ring.n)]
         self._constants = set(ring.constants)
 
-    def read(self, tree: Tree, moved: Mapping[int, Fraction] | None = None) -> Quotient:
-        """Return what a tree is.
-
-        Parameters
-        ----------
-        tree
-            In the robot's own names.
-        moved
-            How much numbers are moved, by the identity of their nodes; never those in angles or exponents.
+    def read(self, tree: Tree) -> Quotient:
+        """Return what a tree in the robot's own names is.
 
         Raises
         ------
         OutsideTheRingError
-            It cannot be written in the ring.
+            It cannot be written in the ring, or only with too much work.
         AnswerError
-            Too much work, a division by zero, an exponent out of bounds.
+            A division by zero.
         """
-        self.moved = moved or {}
         self._work = 0
         self._shared = {}
+        self.divisors = []
         try:
             return self._quotient(tree)
-        except RingError as error:
-            raise AnswerError(f"too long to be multiplied out: {error}") from None
+        except RingError:
+            raise OutsideTheRingError(TOO_MUCH) from None
 
     def _quotient(self, tree: Tree) -> Quotient:
         # CasADi's graphs share what is used twice.
@@ -125,7 +126,7 @@ class Reading:
         match tree:
             case Number(value=value):
                 bits = value.numerator.bit_length() + value.denominator.bit_length()
-                return Quotient(self.ring.number(value + self.moved.get(id(tree), 0)), self.ring.one, bits)
+                return Quotient(self.ring.number(value), self.ring.one, bits)
             case Name(text):
                 return self._whole(self._name(text))
             case Sum(terms):
@@ -133,7 +134,7 @@ class Reading:
             case Product(factors):
                 return self._product(factors)
             case Power(base, exponent):
-                return self._power(base, self._exponent(exponent))
+                return self._power(base, self.exponent(exponent))
             case Call(function, arguments):
                 return self._call(function, arguments)
 
@@ -168,51 +169,63 @@ class Reading:
         total: Quotient | None = None
         for k, (added, term) in enumerate(terms, start=1):
             quotient = self._quotient(term)
-            above = quotient.above if added else -quotient.above
-            if quotient.below is one:
+            above = quotient.numerator if added else -quotient.numerator
+            if quotient.denominator is one:
                 whole.append(above)
-                over_one = Quotient(over_one.above, one, over_one.bits + quotient.bits)
+                over_one = Quotient(over_one.numerator, one, over_one.bits + quotient.bits)
             elif total is None:
-                total = Quotient(above, quotient.below, quotient.bits)
-            elif total.below.polynomial == quotient.below.polynomial:
-                total = Quotient(total.above + above, total.below, total.bits + quotient.bits)
+                total = Quotient(above, quotient.denominator, quotient.bits)
+            elif total.denominator.polynomial == quotient.denominator.polynomial:
+                total = Quotient(total.numerator + above, total.denominator, total.bits + quotient.bits)
             else:
-                above = self._times(total.above, quotient.below) + self._times(above, total.below)
-                below = self._times(total.below, quotient.below)
+                above = self._times(total.numerator, quotient.denominator) + self._times(above, total.denominator)
+                below = self._times(total.denominator, quotient.denominator)
                 total = self._bounded(Quotient(above, below, total.bits + quotient.bits))
             if k % CHECKED == 0 or k == len(terms):
-                over_one = self._bounded(Quotient(self.ring.sum([over_one.above, *whole]), one, over_one.bits))
+                over_one = self._bounded(Quotient(self.ring.sum([over_one.numerator, *whole]), one, over_one.bits))
                 whole = []
         if total is None:
             return over_one
-        above = total.above + self._times(over_one.above, total.below)
-        return self._bounded(Quotient(above, total.below, total.bits + over_one.bits))
+        above = total.numerator + self._times(over_one.numerator, total.denominator)
+        return self._bounded(Quotient(above, total.denominator, total.bits + over_one.bits))
 
     def _product(self, factors: tuple[tuple[bool, Tree], ...]) -> Quotient:
         product = Quotient(self.ring.one, self.ring.one)
         for multiplied, factor in factors:
             quotient = self._quotient(factor)
-            top, bottom = (quotient.above, quotient.below) if multiplied else (quotient.below, quotient.above)
-            above, below = self._times(product.above, top), self._times(product.below, bottom)
+            if not multiplied:
+                self._divides_by(quotient.numerator)
+            top, bottom = (
+                (quotient.numerator, quotient.denominator) if multiplied else (quotient.denominator, quotient.numerator)
+            )
+            above, below = self._times(product.numerator, top), self._times(product.denominator, bottom)
             product = self._bounded(Quotient(above, below, product.bits + quotient.bits))
-        return self._divided(product.above, product.below, product.bits)
+        return self._divided(product.numerator, product.denominator, product.bits)
 
-    def _divided(self, above: Element, below: Element, bits: int = 1) -> Quotient:
-        if below.is_zero:
+    def _divided(self, numerator: Element, denominator: Element, bits: int = 1) -> Quotient:
+        if denominator is self.ring.one:
+            return Quotient(numerator, denominator, bits)
+        if denominator.is_zero:
             raise AnswerError("divides by zero")
-        number = _rational(below)
+        number = _rational(denominator)
         if number is None:
-            return Quotient(above, below, bits)
-        return Quotient(above * (1 / number), self.ring.one, bits)
+            return Quotient(numerator, denominator, bits)
+        return Quotient(numerator * (1 / number), self.ring.one, bits)
+
+    def _divides_by(self, element: Element) -> None:
+        """Note a divisor that is no number."""
+        if _rational(element) is None and not any(element == other for other in self.divisors):
+            self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:
         quotient = self._quotient(base)
         if quotient.bits * abs(exponent) > MAX_BITS:
-            quotient = self._bounded(Quotient(quotient.above, quotient.below, MAX_BITS + 1))
+            quotient = self._bounded(Quotient(quotient.numerator, quotient.denominator, MAX_BITS + 1))
             if quotient.bits * abs(exponent) > 4 * MAX_BITS:
-                raise AnswerError(TOO_LONG)
-        above, below = self._raised(quotient.above, abs(exponent)), self._raised(quotient.below, abs(exponent))
+                raise OutsideTheRingError(TOO_LONG)
+        above, below = (self._raised(part, abs(exponent)) for part in (quotient.numerator, quotient.denominator))
         if exponent < 0:
+            self._divides_by(quotient.numerator)
             above, below = below, above
         return self._bounded(self._divided(above, below, max(1, quotient.bits * abs(exponent))))
 
@@ -220,10 +233,10 @@ class Reading:
         """Refuse coefficients of thousands of digits, whose arithmetic nobody waits for."""
         if quotient.bits <= MAX_BITS:
             return quotient
-        bits = max((_bits(element) for element in (quotient.above, quotient.below)), default=1)
+        bits = max((_bits(element) for element in (quotient.numerator, quotient.denominator)), default=1)
         if bits > MAX_BITS:
-            raise AnswerError(TOO_LONG)
-        return Quotient(quotient.above, quotient.below, bits)
+            raise OutsideTheRingError(TOO_LONG)
+        return Quotient(quotient.numerator, quotient.denominator, bits)
 
     def _raised(self, element: Element, exponent: int) -> Element:
         result = self.ring.one
@@ -238,15 +251,23 @@ class Reading:
             return right
         if right is self.ring.one:
             return left
-        self._work += len(left) * len(right)
+        pairs = len(left) * len(right)
+        self._work += pairs + (pairs * _bits(right) // WEIGHED_BITS if pairs > CHECKED else 0)
         if self._work > MAX_WORK:
-            raise AnswerError("multiplies out to too many terms")
+            raise OutsideTheRingError(TOO_MUCH)
         product = left * right
         if len(product) > MAX_TERMS:
-            raise AnswerError(f"an expression of {len(product)} terms; expected at most {MAX_TERMS}")
+            raise OutsideTheRingError(TOO_MUCH)
         return product
 
-    def _exponent(self, tree: Tree) -> int:
+    def exponent(self, tree: Tree) -> int:
+        """Return the whole number that an exponent is.
+
+        Raises
+        ------
+        OutsideTheRingError
+            It is none, or too large to multiply out.
+        """
         try:
             number = value_of(tree, ()).rational
         except ExpressionError:
@@ -254,13 +275,14 @@ class Reading:
         if number is None or number.denominator != 1:
             raise OutsideTheRingError("an exponent that is no whole number")
         if abs(number) > MAX_EXPONENT:
-            raise AnswerError(f"an exponent of {str(number)[:20]}; expected at most {MAX_EXPONENT}")
+            raise OutsideTheRingError(f"an exponent of {str(number)[:20]}, beyond {MAX_EXPONENT}")
         return int(number)
 
     def _call(self, function: str, arguments: tuple[Tree, ...]) -> Quotient:
         if function in ("sin", "cos", "tan"):
             cosine, sine = self._direction(arguments[0])
             if function == "tan":
+                self._divides_by(cosine)
                 return self._divided(sine, cosine)
             return self._whole(cosine if function == "cos" else sine)
         if function in ("sign", "abs", "sqrt", "asin", "acos", "atan", "atan2"):
@@ -319,7 +341,7 @@ class Reading:
                 f"an angle of {times} q{i + 1}" if i in self.ring.angles else f"an angle of q{i + 1}"
             )
         if abs(times) > MAX_EXPONENT:
-            raise AnswerError(f"an angle of {str(times)[:20]} q{i + 1}; expected at most {MAX_EXPONENT} times")
+            raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {MAX_EXPONENT} times")
         one = (self.ring.cosine(i), self.ring.sine(i))
         turn = (self.ring.one, self.ring.zero)
         for _ in range(abs(int(times))):
@@ -329,25 +351,6 @@ class Reading:
     def _turn(self, a: tuple[Element, Element], b: tuple[Element, Element]) -> tuple[Element, Element]:
         times = self._times
         return times(a[0], b[0]) - times(a[1], b[1]), times(a[1], b[0]) + times(a[0], b[1])
-
-
-def decimals_in(tree: Tree, least: int) -> dict[int, Fraction]:
-    """Return half a unit of the last digit of every decimal of so many significant digits, by its node's identity.
-
-    Those in angles and exponents are not rounded: they are left out.
-    """
-    found: dict[int, Fraction] = {}
-    for part in parts_of(tree, coefficients=True):
-        if isinstance(part, Number) and ("." in part.text or "e" in part.text.lower()):
-            digits = part.text.lower().partition("e")[0].replace(".", "").lstrip("0")
-            if len(digits) >= least:
-                found[id(part)] = _half_unit(part.text)
-    return found
-
-
-def _half_unit(text: str) -> Fraction:
-    mantissa, _, exponent = text.lower().partition("e")
-    return Fraction(1, 2) * Fraction(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
 
 
 def _rational(element: Element) -> Fraction | None:

@@ -82,6 +82,14 @@ class Overlay:
         words = self.words()
         return len(words), sum(word.startswith("q") for word in words)
 
+    @property
+    def moves_zero(self) -> bool:
+        """Whether a joint variable counts from another zero, or the other way round."""
+        return any(
+            sense < 0 or abs(_wrapped(offset) if kind == "R" else offset) > SAME
+            for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True)
+        )
+
     def words(self) -> tuple[str, ...]:
         """Say which frames and joint variables differ, and how."""
         said = [word for i, D in enumerate(self.differences) for word in _frame_words(i, D)]

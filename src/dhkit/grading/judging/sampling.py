@@ -22,6 +22,8 @@ __all__ = ["DIGITS", "SAMPLES", "Sample", "checked", "differ", "element_value", 
 SAMPLES = 1_000
 DIGITS = 50
 TOLERANCE = 1e-25
+NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
+"""Sizes of the states that are tried within one turn; rad or m, and seconds."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +42,18 @@ class Sample:
     generators: Sequence[Any]
 
 
-def samples(arm: ExactArm, numbers: frozenset[str], every: int = 1, count: int = SAMPLES) -> list[Sample]:
-    """Return random states.
+def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = SAMPLES) -> list[Sample]:
+    """Return random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
 
     Parameters
     ----------
     arm
         The robot.
     numbers
-        Parameters that keep the file's values; others come within a factor of two of them.
+        Parameters that keep the file's values; others come within a factor of four of them.
+    seed
+        Of the random numbers. It must not be known to who writes answers: one that is wrong only far from the states
+        that are tried would pass.
     every
         After how many states parameters change.
     count
@@ -56,16 +61,18 @@ def samples(arm: ExactArm, numbers: frozenset[str], every: int = 1, count: int =
     """
     import mpmath
 
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     found = []
     parameters: dict[str, Any] = {name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()}
     for k in range(count):
         if k % every == 0:
             for name, value in arm.parameters.items():
-                parameters[name] = mpmath.mpf(value if name in numbers else value * rng.uniform(0.5, 2.0))
+                parameters[name] = mpmath.mpf(value if name in numbers else value * 4.0 ** rng.uniform(-1.0, 1.0))
         names = dict(parameters)
+        common = 10.0 ** rng.uniform(-3.0, 3.0)
         for i in range(arm.n):
-            for kind, size in (("q", 3.0), ("qd", 2.0), ("qdd", 2.0)):
+            for kind, near in NEAR_SIZES.items():
+                size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
         found.append(Sample(names, _generators(arm, names)))
     return found

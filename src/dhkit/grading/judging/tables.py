@@ -8,7 +8,7 @@ tables are one arm in different frames is numerical, to 1e-9: their joint axes a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
@@ -22,7 +22,7 @@ from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.numeric import doubles, names_of
-from dhkit.grading.judging.same_arm import STATES, overlaid
+from dhkit.grading.judging.same_arm import STATES, Overlay, overlaid
 from dhkit.grading.judging.table_arms import (
     ROUNDING,
     Row,
@@ -32,46 +32,18 @@ from dhkit.grading.judging.table_arms import (
     parameter_values,
     row_numbers,
 )
+from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Verdict
 from dhkit.symbolic import Element, Elements, ExactArm, RingError, exact_arm
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring
-from dhkit.symbolic.textbook_kinematics import LINK_MISTAKES, with_massless_links
+from dhkit.symbolic.textbook_kinematics import with_massless_links
 
-__all__ = ["TABLE_MISTAKES", "TableExplanation", "TableJudgement", "judge_table"]
+__all__ = ["TableExplanation", "TableJudgement", "judge_table"]
 
 MOST = 8
 """The largest multiple of a joint variable in an angle that is compared exactly."""
 COLUMNS = ("theta", "d", "a", "alpha")
-
-TABLE_MISTAKES: Mapping[str, str] = {
-    **{
-        name: LINK_MISTAKES[name]
-        for name in (
-            "a_d_exchanged",
-            "a_forgotten",
-            "d_forgotten",
-            "alpha_sign",
-            "alpha_forgotten",
-            "theta_offset_forgotten",
-            "theta_offset_sign",
-            "theta_sign",
-            "variable_forgotten",
-        )
-    },
-    "other_convention": "this is the arm's table in the other convention: rows hold a and alpha of another link",
-    "rows_exchanged": "two rows are exchanged",
-    "variable_column": "the joint's variable stands in the wrong column: a turning joint's adds to theta, a sliding "
-    "joint's to d",
-    "variable_of_another_joint": "the variable is that of another joint",
-    "degrees_for_radians": "an angle in degrees is used as if it were in radians",
-    "millimetres_for_metres": "a length in millimetres is used as if it were in metres",
-    "length_sign": "a length has the wrong sign",
-    "wrong_length": "a length is wrong",
-    "wrong_theta": "theta is wrong",
-    "wrong_twist": "the twist alpha is wrong",
-}
-"""What goes wrong in tables, by stable names."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +53,7 @@ class TableExplanation:
     Attributes
     ----------
     mistake
-        A name of :data:`TABLE_MISTAKES`; None where the entries are only described.
+        The identity of a mistake of the library; None where the entries are only described.
     sentence
         What a student learns from it.
     row
@@ -110,7 +82,13 @@ class TableJudgement:
         How frames and joint variables differ from the file's where the table is the same arm in other frames; empty
         otherwise.
     notes
-        What a reader should know: numbers in place of parameters, the other convention.
+        What a reader should know: the other convention.
+    judged_at
+        Values of the parameters that rows hold as numbers.
+    moves_zero
+        Whether, in other frames, a joint variable counts from another zero or the other way round.
+    moved_rows
+        Rows, from 0, that are undecided because the whole table is the same arm in other frames.
     """
 
     rows: tuple[Verdict, ...]
@@ -118,15 +96,22 @@ class TableJudgement:
     explanations: tuple[TableExplanation, ...] = ()
     other_frames: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    judged_at: Mapping[str, float] = field(default_factory=dict)
+    moves_zero: bool = False
+    moved_rows: tuple[int, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """The worst of the rows."""
         return max(self.rows, key=lambda verdict: verdict.severity)
 
+    def is_in_other_frames(self, i: int) -> bool:
+        """Whether row i, from 0, is undecided because the whole table is the same arm in other frames."""
+        return i in self.moved_rows
+
 
 def judge_table(
-    description: Description, rows: Sequence[Sequence[Tree]], convention: Convention | str
+    description: Description, rows: Sequence[Sequence[Tree]], convention: Convention | str, seed: int = 0
 ) -> TableJudgement:
     """Judge a table against a robot's.
 
@@ -139,6 +124,8 @@ def judge_table(
         joint variables q1 ... qn, the robot's parameters, pi, deg, mm, cm and inch.
     convention
         What the answer says that its table is.
+    seed
+        Of the random states that entries outside the exact ring are tried at.
 
     Raises
     ------
@@ -156,7 +143,7 @@ def judge_table(
     >>> [verdict.value for verdict in judgement.rows], judgement.explanations[0].mistake
     (['correct', 'wrong'], 'a_d_exchanged')
     """
-    judge = _Judge(description, _Answer.of(description, rows), Convention(convention))
+    judge = _Judge(description, _Answer.of(description, rows), Convention(convention), seed)
     with np.errstate(all="ignore"):
         return judge.judgement()
 
@@ -197,6 +184,15 @@ def _entry(tree: Tree, names: Sequence[str], where: str) -> Expression | None:
         return None
 
 
+@dataclass(frozen=True)
+class _JudgedRow:
+    """What is found of a row, and the names that its numbers stand for."""
+
+    verdict: Verdict
+    statement: str
+    numbers: frozenset[str] = frozenset()
+
+
 @dataclass(frozen=True, eq=False)
 class _Judge:
     """One table against the file's."""
@@ -204,6 +200,7 @@ class _Judge:
     description: Description
     answer: _Answer
     convention: Convention
+    seed: int = 0
 
     @property
     def n(self) -> int:
@@ -215,44 +212,50 @@ class _Judge:
         return self.convention is not self.description.convention
 
     def judgement(self) -> TableJudgement:
-        verdicts, statements = zip(*(self.row(i) for i in range(self.n)), strict=True)
-        notes = []
-        if any("file's numbers" in statement for statement in statements):
-            notes.append("numbers were taken in place of parameters, with the file's values")
+        judged = [self.row(i) for i in range(self.n)]
+        verdicts, statements = tuple(row.verdict for row in judged), tuple(row.statement for row in judged)
+        in_numbers = frozenset().union(*(row.numbers for row in judged))
+        at = {name: self.states[0][name] for name in self.description.parameters if name in in_numbers}
+        notes: tuple[str, ...] = ()
         if self.converted:
-            notes.append(
+            notes = (
                 f"the file's table is {self.description.convention.value}: held against it in the "
-                f"{self.convention.value} convention; base and tool take up what is left over at the ends"
+                f"{self.convention.value} convention; base and tool take up what is left over at the ends",
             )
-        if all(verdict is Verdict.CORRECT for verdict in verdicts):
-            return TableJudgement(verdicts, statements, notes=tuple(notes))
-        explanations = self.explanations([i for i in range(self.n) if verdicts[i] is not Verdict.CORRECT])
-        words = self.other_frames()
+        wrong = [i for i in range(self.n) if verdicts[i] is Verdict.WRONG]
+        if not wrong:
+            return TableJudgement(verdicts, statements, notes=notes, judged_at=at)
+        explanations = self.explanations(wrong)
+        overlay = self.overlay()
         # Without words all frames are the file's, within 1e-9: a number is off by less, which is another arm's.
-        if words and Verdict.WRONG in verdicts:
+        if overlay and (words := overlay.words()):
             said = "the same arm in other frames, numerically"
-            statements = tuple(s if v is not Verdict.WRONG else said for v, s in zip(verdicts, statements, strict=True))
-            verdicts = tuple(v if v is not Verdict.WRONG else Verdict.UNDECIDED for v in verdicts)
-            return TableJudgement(verdicts, statements, _likely(explanations), words, tuple(notes))
-        if Verdict.WRONG in verdicts and self.is_table_of_other_convention():
-            sentence = TABLE_MISTAKES["other_convention"]
+            statements = tuple(said if i in wrong else s for i, s in enumerate(statements))
+            verdicts = tuple(Verdict.UNDECIDED if i in wrong else v for i, v in enumerate(verdicts))
+            likely = _likely(explanations)
+            return TableJudgement(verdicts, statements, likely, words, notes, at, overlay.moves_zero, tuple(wrong))
+        if self.is_table_of_other_convention():
+            sentence = LIBRARY["other_convention"].sentence
             other = _other(self.convention).value
             said = f"{sentence}; it is the {other} one, and was handed in as {self.convention.value}"
             explanations = (TableExplanation("other_convention", said),)
-        return TableJudgement(verdicts, statements, explanations, notes=tuple(notes))
+        return TableJudgement(verdicts, statements, explanations, notes=notes, judged_at=at)
 
     # One row
 
-    def row(self, i: int) -> tuple[Verdict, str]:
+    def row(self, i: int) -> _JudgedRow:
         """Judge A_i, i from 0."""
         entries = self.answer.entries[i]
         if None not in entries:
-            for numbers in (False, True) if self.has_numbers(i) else (False,):
-                if self.proved(i, numbers):
-                    return Verdict.CORRECT, f"A{i + 1} is proved" + (" with the file's numbers" if numbers else "")
+            if self.proved(i, numbers=False):
+                return _JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved")
+            if self.has_numbers(i) and self.proved(i, numbers=True):
+                used = frozenset().union(*(entry.symbols for entry in self.reference.rows[i]))
+                return _JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", used)
         if self.agrees(i):
-            return Verdict.UNDECIDED, f"A{i + 1} agrees in {STATES} states to {ROUNDING:g}, without a proof"
-        return Verdict.WRONG, f"A{i + 1} differs"
+            statement = f"A{i + 1} agrees at {STATES} random states to {ROUNDING:g}, without a proof"
+            return _JudgedRow(Verdict.UNDECIDED, statement)
+        return _JudgedRow(Verdict.WRONG, f"A{i + 1} differs")
 
     def has_numbers(self, i: int) -> bool:
         """Whether row i has numbers where the file has parameters."""
@@ -297,11 +300,11 @@ class _Judge:
     @cached_property
     def states(self) -> list[dict[str, float]]:
         """Values of joint variables, parameters and units; the first with the file's parameters."""
-        random = np.random.default_rng(0)
+        random = np.random.default_rng(self.seed)
         states = []
         for k in range(STATES):
-            q = random.uniform(-1, 1, self.n)
-            factors = 1 + (k > 0) * random.uniform(0.05, 0.4, len(self.description.parameters))
+            q = random.uniform(-3, 3, self.n)
+            factors = 4.0 ** ((k > 0) * random.uniform(-1, 1, len(self.description.parameters)))
             states.append(
                 parameter_values(self.description, factors) | {f"q{i + 1}": float(x) for i, x in enumerate(q)}
             )
@@ -309,32 +312,24 @@ class _Judge:
 
     # The whole arm
 
-    def other_frames(self, convention: Convention | None = None) -> tuple[str, ...] | None:
-        """Return how the frames differ where the table is the same arm; None where it is another arm.
-
-        Parameters
-        ----------
-        convention
-            What to read the table as; what it says that it is unless given.
-        """
-        read_as = convention or self.convention
-        reference = _Reference.of(self.description, read_as)
-        strict = read_as is self.description.convention
-        words: tuple[str, ...] | None = None
+    def overlay(self) -> Overlay | None:
+        """Return how the frames lie on the file's where the table is the same arm; None where it is another arm."""
+        strict = not self.converted
+        found: Overlay | None = None
         symbolic = self.description.parameters and not any(self.has_numbers(i) for i in range(self.n))
         for values in self.states[: 2 if symbolic else 1]:
-            answer = TableArm.of_trees(self.answer.trees, self.description.kinds, read_as, values)
-            truth = TableArm.of_rows(reference.rows, self.description.kinds, read_as, values)
+            answer = TableArm.of_trees(self.answer.trees, self.description.kinds, self.convention, values)
+            truth = TableArm.of_rows(self.reference.rows, self.description.kinds, self.convention, values)
             overlay = None if answer is None else overlaid(answer, truth, strict)
             if overlay is None:
                 return None
-            words = words or overlay.words()
-        return words
+            found = found if found is not None and found.words() else overlay
+        return found
 
     def is_table_of_other_convention(self) -> bool:
         """Return whether the rows, read in the other convention, are this arm."""
         other = replace(self, convention=_other(self.convention))
-        return all(other.row(i)[0] is Verdict.CORRECT for i in range(self.n)) or other.other_frames() is not None
+        return all(other.row(i).verdict is Verdict.CORRECT for i in range(self.n)) or other.overlay() is not None
 
     # What went wrong
 
@@ -380,7 +375,7 @@ class _Judge:
         column = (theta - q, d + q, a, alpha) if turning else (theta + q, d - q, a, alpha)
         for name, row in (("a_d_exchanged", exchanged), ("variable_column", column)):
             if all(self.equal(i, k, entry) for k, entry in enumerate(row)):
-                yield TableExplanation(name, TABLE_MISTAKES[name], i)
+                yield TableExplanation(name, LIBRARY[name].sentence, i)
                 return
         for k, truth in enumerate(self.reference.rows[i]):
             if not self.equal(i, k, truth):
@@ -391,9 +386,9 @@ class _Judge:
         subject = f"row {i + 1}: {COLUMNS[k]} is {given}"
         for name, entry in self.wrong_entries(i, k, truth):
             if self.equal(i, k, entry):
-                return TableExplanation(name, f"{subject}: {TABLE_MISTAKES[name]}", i)
+                return TableExplanation(name, f"{subject}: {LIBRARY[name].sentence}", i)
         name = {"theta": "wrong_theta", "alpha": "wrong_twist"}.get(COLUMNS[k], "wrong_length")
-        return TableExplanation(name, f"{subject}: {TABLE_MISTAKES[name]}", i)
+        return TableExplanation(name, f"{subject}: {LIBRARY[name].sentence}", i)
 
     def wrong_entries(self, i: int, k: int, truth: Expression) -> Iterator[tuple[str, Expression]]:
         """Yield what an entry would be with each mistake."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from dhkit.description import Description
 from dhkit.description.parameters import resolved
-from dhkit.expressions import ZERO, exact, substitute
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.symbolic import ExactArm, Lagrangian, lagrangian
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
@@ -101,15 +100,10 @@ class Truth:
 
     @cached_property
     def viscous(self) -> Elements:
-        """Friction torques B qd on the joints' side, shape (n,)."""
-        ring = self.lagrangian.arm.ring
-        torques = np.empty(self.description.n, dtype=object)
-        for i, joint in enumerate(self.description.joints):
-            drive = joint.drive
-            friction = drive.gear * drive.gear * drive.viscous if drive else ZERO
-            values = {name: exact(exact_number(self.description, name)) for name in friction.symbols}
-            torques[i] = ring.rate(i) * substitute(friction, values).value()
-        return torques
+        """Friction torques gear^2 B qd on the joints' side, shape (n,)."""
+        arm = self.lagrangian.arm
+        pairs = zip(arm.gear, arm.viscous, strict=True)
+        return element_array([gear * gear * B * arm.ring.rate(i) for i, (gear, B) in enumerate(pairs)])
 
 
 @lru_cache(maxsize=32)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import combinations
@@ -14,23 +13,26 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.truth import DYNAMICS, Truth, exact_number, kinematic_quantity, substituted
-from dhkit.grading.mistakes.variants import Variant, kinematic_variants, variants
-from dhkit.symbolic.mistakes import MISTAKES
+from dhkit.grading.mistakes.energy_variants import energy_variants
+from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
+from dhkit.grading.mistakes.parameter_variants import parameter_variants
+from dhkit.grading.mistakes.variants import Variant
+from dhkit.symbolic.mistakes import MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import derive
-from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, derive_kinematics
+from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, LINK_MISTAKES, TextbookKinematics, derive_kinematics
 
-__all__ = ["Differences", "Variants", "variants_of"]
+__all__ = ["Differences", "Index", "Variants", "variants_of"]
 
 Index: TypeAlias = tuple[int, ...]
 Differences: TypeAlias = Mapping[Index, Element]
-"""Of a quantity's entries answer less truth; zero where it is right."""
-Key: TypeAlias = tuple[Any, ...]
+"""Of a quantity's entries answer less truth, zero where it is right; entries that were not handed in are left out."""
+Key: TypeAlias = frozenset[Any]
 TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
 NEAR = 2e-3
 """Share of the largest entry: decimals of four digits are off by less."""
-PAIR_SECONDS = 0.4
-"""Time for pairs of mistakes at one link, for a quantity."""
+MAX_DERIVED_PAIRS = 150
+"""Pairs of mistakes at one link that are derived for a quantity: their effects do not add up."""
 
 
 class Variants:
@@ -47,24 +49,34 @@ class Variants:
     def __init__(self, truth: Truth, numbers: frozenset[str] = frozenset()) -> None:
         self.truth = truth
         self.numbers = numbers
-        self._wholes: dict[str, dict[Key, list[Variant]]] = {}
-        self._entries: dict[str, dict[tuple[Index, Any], list[Variant]]] = {}
+        self._changes: dict[str, list[_Changed]] = {}
+        self._by_entry: dict[str, dict[tuple[Index, Key], list[_Changed]]] = {}
         self._pairs: dict[str, _Pairs] = {}
         self._values: dict[str, list[Array]] = {}
 
     @cached_property
     def dynamic(self) -> list[Variant]:
-        """The mistakes that there are in the robot's equations."""
-        return variants(self.truth)
+        """The mistakes that there are in the robot's equations, the least rare first."""
+        found = [
+            lagrangian_sum(self.truth),
+            *energy_variants(self.truth),
+            *equation_variants(self.truth),
+            *parameter_variants(self.truth),
+        ]
+        return sorted(found, key=lambda variant: variant.rarity)
 
     @cached_property
     def kinematic(self) -> list[Variant]:
-        """The mistakes that there are in the robot's transforms."""
-        return kinematic_variants(self.truth)
+        """The mistakes that there are in the robot's transforms and Jacobian."""
+        n = self.truth.description.n
+        made = [(MadeAt(name), "") for name in KINEMATIC_MISTAKES]
+        if n > 1:
+            made += [(MadeAt(name, i), f"link {i}") for name in LINK_MISTAKES for i in range(1, n + 1)]
+        return [Variant(mistake, _KinematicChange(self.truth, mistake), place) for mistake, place in made]
 
     def change(self, variant: Variant, quantity: str) -> Elements:
         """Return what a mistake adds to a quantity, with numbers in place of parameters."""
-        return self.in_numbers(quantity, variant.adds_to(_judged(quantity), self.truth.coordinates))
+        return self.in_numbers(quantity, variant.adds_to(judged_by(quantity), self.truth.coordinates))
 
     def in_numbers(self, quantity: str, array: Elements) -> Elements:
         """Put the file's numbers in place of the parameters that answers have as numbers."""
@@ -78,68 +90,109 @@ class Variants:
 
     def prepare(self, quantity: str) -> None:
         """Make a quantity's tables."""
-        if quantity in self._wholes:
+        if quantity in self._changes:
             return
-        whole: dict[Key, list[Variant]] = {}
-        entries: dict[tuple[Index, Any], list[Variant]] = {}
+        changes: list[_Changed] = []
+        by_entry: dict[tuple[Index, Key], list[_Changed]] = {}
         for variant in self.dynamic if quantity in DYNAMICS else self.kinematic:
-            change = self.change(variant, quantity)
-            keys = {place: _key(quantity, element) for place, element in np.ndenumerate(change)}
+            keys = {place: key_of(quantity, x) for place, x in np.ndenumerate(self.change(variant, quantity))}
             if not any(keys.values()):
                 continue
-            whole.setdefault(tuple(keys.values()), []).append(variant)
+            changed = _Changed(variant, keys)
+            changes.append(changed)
             for place, key in keys.items():
                 if key:
-                    entries.setdefault((place, key), []).append(variant)
-        self._wholes[quantity], self._entries[quantity] = whole, entries
+                    by_entry.setdefault((place, key), []).append(changed)
+        self._changes[quantity], self._by_entry[quantity] = changes, by_entry
 
     def whole(self, quantity: str, differences: Differences) -> list[Variant]:
-        """Return the mistakes that change a quantity exactly so."""
+        """Return the mistakes that change the entries of a quantity that are there exactly so."""
         self.prepare(quantity)
-        return self._wholes[quantity].get(_keys(quantity, differences), [])
+        wanted = keys_of(quantity, differences)
+        wrong = [(place, key) for place, key in wanted.items() if key]
+        if not wrong:
+            return []
+        candidates = min((self._by_entry[quantity].get(one, []) for one in wrong), key=len)
+        return [
+            changed.variant
+            for changed in candidates
+            if all(changed.keys[place] == key for place, key in wanted.items())
+        ]
+
+    def changes_none(self, variant: Variant, quantity: str, places: Sequence[Index]) -> bool:
+        """Whether a mistake leaves entries as they are."""
+        change = self.change(variant, quantity)
+        return all(not key_of(quantity, change[place]) for place in {place_of(quantity, index) for index in places})
 
     def entry(self, quantity: str, index: Index, difference: Element) -> list[Variant]:
         """Return the mistakes that change an entry exactly so."""
         self.prepare(quantity)
-        place = index[:1] if quantity == "C" else index
-        return self._entries[quantity].get((place, _key(quantity, difference)), [])
+        found = self._by_entry[quantity].get((place_of(quantity, index), key_of(quantity, difference)), [])
+        return [changed.variant for changed in found]
 
-    def near(self, quantity: str, right: Elements, answer: Mapping[Index, float]) -> list[Variant]:
+    def near(self, quantity: str, truth: Elements, answer: Mapping[Index, float]) -> list[Variant]:
         """Return the mistakes whose results are near an answer in one state: those worth an exact look.
 
         Parameters
         ----------
         quantity
             Which.
-        right
-            Its truth.
+        truth
+            Its right value.
         answer
-            The answer's values at :func:`general_state`, parameters as in the file.
+            The answer's values at :func:`general_state`, parameters as in the file, of the entries that are there.
         """
         self.prepare(quantity)
         arm = self.truth.arm(quantity)
         q, qd, qdd = state_arrays(general_state(arm.n), arm.n)
         if quantity not in self._values:
-            changes = [self.change(found[0], quantity) for found in self._wholes[quantity].values()]
-            self._values[quantity] = [arm.evaluate(change, q, qd, qdd).ravel() for change in changes]
-        wanted = np.array([answer[index] for index in np.ndindex(right.shape)])
-        truth = arm.evaluate(right, q, qd, qdd).ravel()
-        tolerance = NEAR * np.max(np.abs(truth), initial=0.0)
+            changes = [self.change(changed.variant, quantity) for changed in self._changes[quantity]]
+            self._values[quantity] = [arm.evaluate(change, q, qd, qdd) for change in changes]
+        here = arm.evaluate(truth, q, qd, qdd)
+        tolerance = NEAR * np.max(np.abs(here), initial=0.0)
         return [
-            variant
-            for variants, change in zip(self._wholes[quantity].values(), self._values[quantity], strict=True)
-            if np.all(np.abs(truth + change - wanted) <= tolerance)
-            for variant in variants
+            changed.variant
+            for changed, values in zip(self._changes[quantity], self._values[quantity], strict=True)
+            if all(abs(here[index] + values[index] - value) <= tolerance for index, value in answer.items())
         ]
 
-    def pair(
-        self, quantity: str, differences: Differences, seconds: float = PAIR_SECONDS
-    ) -> tuple[Variant, Variant] | None:
-        """Return two mistakes that together change a quantity exactly so."""
+    def pair(self, quantity: str, differences: Differences) -> tuple[Variant, Variant] | None:
+        """Return two of the textbook's mistakes that together change a quantity exactly so."""
         self.prepare(quantity)
         if quantity not in self._pairs:
             self._pairs[quantity] = _Pairs(self, quantity)
-        return self._pairs[quantity].find(differences, seconds)
+        return self._pairs[quantity].find(differences)
+
+    def textbook(self, quantity: str) -> list[Variant]:
+        """Return the textbook's mistakes that change a quantity, one of those that change it alike."""
+        self.prepare(quantity)
+        distinct: dict[tuple[Any, ...], Variant] = {}
+        for changed in self._changes[quantity]:
+            if changed.variant.identity in TEXTBOOK:
+                distinct.setdefault(tuple(changed.keys.items()), changed.variant)
+        return list(distinct.values())
+
+
+@dataclass(frozen=True, eq=False)
+class _Changed:
+    """A mistake with the normal forms of what it adds to each entry of a quantity; empty where it adds nothing."""
+
+    variant: Variant
+    keys: Mapping[Index, Key]
+
+
+@dataclass(eq=False)
+class _KinematicChange:
+    """What a mistake adds to A1 ... An, T and J."""
+
+    truth: Truth
+    made: MadeAt
+    _wrong: TextbookKinematics | None = None
+
+    def __call__(self, quantity: str) -> Elements:
+        if self._wrong is None:
+            self._wrong = derive_kinematics(self.truth.description, {self.made})
+        return kinematic_quantity(self._wrong, quantity) - kinematic_quantity(self.truth.kinematics, quantity)
 
 
 @dataclass(eq=False)
@@ -148,53 +201,57 @@ class _Pairs:
 
     tables: Variants
     quantity: str
-    found: dict[Key, tuple[Variant, Variant]] = field(default_factory=dict)
+    found: dict[tuple[Any, ...], tuple[Variant, Variant]] = field(default_factory=dict)
+    derived: int = 0
 
-    def find(self, differences: Differences, seconds: float) -> tuple[Variant, Variant] | None:
-        return self._summed(differences) or self._derived(differences, seconds)
+    def find(self, differences: Differences) -> tuple[Variant, Variant] | None:
+        return self._summed(differences) or self._derived(differences)
 
     def _summed(self, differences: Differences) -> tuple[Variant, Variant] | None:
         """Look up what a mistake leaves of the difference."""
-        for whole in list(self.tables._wholes[self.quantity].values()):
-            first = whole[0]
-            if not _is_textbook(first):
-                continue
+        for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
-            rest = {place: element - change[_place(self.quantity, place)] for place, element in differences.items()}
+            rest = {index: x - change[place_of(self.quantity, index)] for index, x in differences.items()}
             for second in self.tables.whole(self.quantity, rest):
-                if _is_textbook(second) and self._together(first, second, differences):
+                if second.identity in TEXTBOOK and self._fits(self._both(first, second), differences):
                     return first, second
         return None
 
-    def _together(self, first: Variant, second: Variant, differences: Differences) -> bool:
-        return self._both(first, second) == _keys(self.quantity, differences)
+    def _fits(self, keys: Mapping[Index, Key], differences: Differences) -> bool:
+        return all(keys[place] == key for place, key in keys_of(self.quantity, differences).items())
 
-    def _both(self, first: Variant, second: Variant) -> Key:
+    def _both(self, first: Variant, second: Variant) -> dict[Index, Key]:
         """Derive with two mistakes, and return what both change together."""
-        truth, judged, names = self.tables.truth, _judged(self.quantity), {first.name, second.name}
+        truth, judged, made = self.tables.truth, judged_by(self.quantity), {first.made, second.made}
         array: Elements
         if self.quantity in DYNAMICS:
-            array = element_array(getattr(derive(truth.description, names), judged))
+            array = element_array(getattr(derive(truth.description, made), judged))
         else:
-            array = kinematic_quantity(derive_kinematics(truth.description, names), judged)
+            array = kinematic_quantity(derive_kinematics(truth.description, made), judged)
         change = element_array(truth.coordinates.in_y(judged, array) - truth.of(judged))
-        change = self.tables.in_numbers(self.quantity, change)
-        return tuple(_key(self.quantity, element) for element in element_array(change).flat)
+        change = element_array(self.tables.in_numbers(self.quantity, change))
+        return {place: key_of(self.quantity, x) for place, x in np.ndenumerate(change)}
 
     @cached_property
     def _todo(self) -> Iterator[tuple[Variant, Variant]]:
-        textbook = [whole[0] for whole in self.tables._wholes[self.quantity].values() if _is_textbook(whole[0])]
         additive = self.quantity in DYNAMICS
-        return ((a, b) for a, b in combinations(textbook, 2) if not (additive and _apart(a, b)))
+        pairs = combinations(self.tables.textbook(self.quantity), 2)
+        return ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
 
-    def _derived(self, differences: Differences, seconds: float) -> tuple[Variant, Variant] | None:
-        wanted, until = _keys(self.quantity, differences), time.monotonic() + seconds
-        while wanted not in self.found and time.monotonic() < until:
-            pair = next(self._todo, None)
-            if pair is None:
+    def _derived(self, differences: Differences) -> tuple[Variant, Variant] | None:
+        for keys, pair in self.found.items():
+            if self._fits(dict(keys), differences):
+                return pair
+        while self.derived < MAX_DERIVED_PAIRS:
+            following = next(self._todo, None)
+            if following is None:
                 break
-            self.found.setdefault(self._both(*pair), pair)
-        return self.found.get(wanted)
+            self.derived += 1
+            keys_of_both = self._both(*following)
+            self.found.setdefault(tuple(keys_of_both.items()), following)
+            if self._fits(keys_of_both, differences):
+                return following
+        return None
 
 
 @lru_cache(maxsize=32)
@@ -203,22 +260,22 @@ def variants_of(truth: Truth, numbers: frozenset[str] = frozenset()) -> Variants
     return Variants(truth, numbers)
 
 
-def _judged(quantity: str) -> str:
+def judged_by(quantity: str) -> str:
     """Return what a quantity is judged by: C by C qd."""
     return "h" if quantity == "C" else quantity
 
 
-def _place(quantity: str, index: Index) -> Index:
+def place_of(quantity: str, index: Index) -> Index:
+    """Return where an entry's difference stands in what the quantity is judged by."""
     return index[:1] if quantity == "C" else index
 
 
-def _keys(quantity: str, differences: Differences) -> Key:
+def keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
     """Return the normal forms of a quantity's differences, of C's row by row."""
-    rows = {_place(quantity, index): element for index, element in sorted(differences.items())}
-    return tuple(_key(quantity, element) for element in rows.values())
+    return {place_of(quantity, index): key_of(quantity, element) for index, element in differences.items()}
 
 
-def _key(quantity: str, element: Element) -> Any:
+def key_of(quantity: str, element: Element) -> Key:
     """Return a normal form to be looked up by; of energies without what does not depend on the state."""
     terms = element.terms
     if quantity in ("V", "L"):
@@ -227,10 +284,6 @@ def _key(quantity: str, element: Element) -> Any:
     return frozenset(terms.items())
 
 
-def _is_textbook(variant: Variant) -> bool:
-    return variant.name.partition("@")[0] in TEXTBOOK
-
-
-def _apart(a: Variant, b: Variant) -> bool:
+def _apart(a: MadeAt, b: MadeAt) -> bool:
     """Whether two mistakes are at different links, so that their changes add up."""
-    return "@" in a.name and "@" in b.name and a.name.partition("@")[2] != b.name.partition("@")[2]
+    return a.link is not None and b.link is not None and a.link != b.link

@@ -1,8 +1,13 @@
-"""From wrong answers to sentences: which mistakes give them, or what their terms show."""
+"""From wrong answers to sentences: which mistakes give them, or what their terms show.
+
+What explains most quantities comes first, then what leaves the sheet's right answers right, then what is made more
+often: mistakes of a derivation, slips in single terms, changed parameters, pairs of mistakes. What nothing explains is
+described by its terms.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -12,10 +17,12 @@ from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.findings import Comparison, equal, readable
 from dhkit.grading.judging.numeric import doubles, general_state
 from dhkit.grading.judging.quantities import JudgedQuantity
-from dhkit.grading.judging.quotients import OutsideTheRingError, Reading, decimals_in
+from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
+from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
-from dhkit.grading.mistakes.diagnosis import Differences, Variants, variants_of
-from dhkit.grading.mistakes.library import hint_of, sentence_of
+from dhkit.grading.mistakes.diagnosis import Differences, Index, Variants, place_of, variants_of
+from dhkit.grading.mistakes.library import FACTORS, LIBRARY, hint_of, sentence_of
+from dhkit.grading.mistakes.slips import Slip, slip_in
 from dhkit.grading.mistakes.terms import describe
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.report import Diagnosis, Entry, Verdict
@@ -24,9 +31,6 @@ from dhkit.symbolic.ring import Element
 
 __all__ = ["explain"]
 
-Index = tuple[int, ...]
-FACTORS = {"entry_sign": Fraction(-2), "entry_halved": Fraction(-1, 2), "entry_doubled": Fraction(1)}
-"""Of the truth, what the difference then is."""
 PARTS = {
     "M": "in the terms with accelerations",
     "h": "in the terms with products of rates",
@@ -35,10 +39,21 @@ PARTS = {
     "V": "in the potential energy",
 }
 IN_DEGREES = (Fraction(1, 180), Fraction(180))
+LIKELY = 1
+"""The largest rarity of a mistake that is named before slips in single terms are looked for."""
+MAX_ALTERNATIVES = 3
+"""Mistakes that give the same answers and are named in one sentence."""
+LEAST_DIGITS = 2
+"""Significant digits of decimals that are told to be too few rather than wrong."""
+LEAST_TERMS_OF_A_PAIR = 3
+"""Terms in which an answer must differ for two mistakes at once to be likelier than a slip."""
 
 
 def explain(
-    truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int = 4, seconds: float = 0.4
+    truth: Truth,
+    judged: Mapping[str, JudgedQuantity],
+    digits: int = 4,
+    follows: Mapping[str, Mapping[Index, str]] | None = None,
 ) -> list[Diagnosis]:
     """Return what went wrong in quantities, those that one mistake explains together.
 
@@ -50,20 +65,23 @@ def explain(
         Quantities by name.
     digits
         Significant digits from which a decimal may have been rounded.
-    seconds
-        Time for pairs of mistakes, for each quantity.
+    follows
+        Of each quantity the wrong entries that follow from other answers of the sheet: nothing else is wrong in them.
     """
-    wrong = {name: quantity for name, quantity in judged.items() if quantity.wrong}
+    left = {name: quantity for name, quantity in judged.items() if quantity.wrong}
     found: list[Diagnosis] = []
-    left = dict(wrong)
-    _take(left, found, _degrees(truth, wrong))
-    _take(left, found, _single(truth, left))
+    _take(left, found, _degrees(truth, left))
+    _take(left, found, _single(truth, judged, left, lambda rarity: rarity <= LIKELY))
     _take(left, found, _nearly(truth, left, digits))
-    for name, quantity in list(left.items()):
-        explained = _parts(truth, quantity) or _pair(truth, quantity, seconds)
-        if explained:
-            found += explained
+    for name in list(left):
+        if all(index in (follows or {}).get(name, {}) for index in _wrong_entries(left[name])):
             del left[name]
+    for explained in (_too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
+        for name, quantity in list(left.items()):
+            diagnoses = explained(truth, judged, quantity)
+            if diagnoses:
+                found += diagnoses
+                del left[name]
     for quantity in left.values():
         found += _entries(truth, quantity)
     return _merged(found)
@@ -102,22 +120,29 @@ def _names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...
 
 
 def _diagnosis(
-    variant: Variant,
-    quantities: Sequence[JudgedQuantity],
-    others: Sequence[Variant] = (),
-    indices: Sequence[Index] = (),
+    variants: Sequence[Variant], quantities: Sequence[JudgedQuantity], indices: Sequence[Index] = ()
 ) -> Diagnosis:
+    """Return what is said of mistakes that all give the same answers, the likeliest first."""
+    first = variants[0]
     entries = tuple(name for quantity in quantities for name in _names(quantity, indices or _wrong_entries(quantity)))
-    name = variant.name.partition("@")[0]
     places = [quantity.name for quantity in quantities] if not indices else entries
-    where = ", ".join([*places, *([variant.where] if variant.where else [])])
-    equivalent = tuple(dict.fromkeys(_called(other) for other in others if _called(other) != _called(variant)))
-    return Diagnosis(name, sentence_of(name, variant.where), where, entries, hint_of(name), equivalent)
+    where = ", ".join([*places, *([first.place] if first.place else [])])
+    distinct: dict[str, Variant] = {}
+    for variant in variants:
+        if variant.rarity == first.rarity:
+            distinct.setdefault(variant.identity, variant)
+    if 1 < len(distinct) <= MAX_ALTERNATIVES:
+        listed = "; or: ".join(_clause(variant) for variant in distinct.values())
+        sentence = f"One of these: {listed}."
+    else:
+        sentence = sentence_of(first.identity, first.place)
+    equivalent = tuple(dict.fromkeys(v.called for v in variants if v.called != first.called))
+    return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
 
 
-def _called(variant: Variant) -> str:
-    name = variant.name.partition("@")[0]
-    return f"{name} ({variant.where})" if variant.where else name
+def _clause(variant: Variant) -> str:
+    sentence = LIBRARY[variant.identity].sentence
+    return f"{variant.place}: {sentence}" if variant.place else sentence
 
 
 # Degrees
@@ -140,7 +165,8 @@ def _is_right_in(truth: Truth, quantity: JudgedQuantity, factor: Fraction) -> bo
         if quantity.findings[entry.index].verdict is not Verdict.WRONG:
             continue
         try:
-            if entry.tree is None or not reading.read(entry.tree).less(quantity.right(entry.index)).is_zero:
+            right = quantity.right(entry.index)
+            if entry.tree is None or not reading.read(entry.tree).numerator_of_difference(right).is_zero:
                 return False
         except (OutsideTheRingError, AnswerError):
             return False
@@ -154,32 +180,60 @@ def _tables(truth: Truth, quantity: JudgedQuantity) -> Variants:
     return variants_of(truth, quantity.numbers)
 
 
-def _single(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+def _single(
+    truth: Truth,
+    judged: Mapping[str, JudgedQuantity],
+    wrong: Mapping[str, JudgedQuantity],
+    allowed: Callable[[int], bool],
+) -> dict[tuple[str, ...], Diagnosis]:
     """Find mistakes that explain quantities entirely, each as many of them as it can."""
     candidates: dict[str, list[Variant]] = {}
     for name, quantity in wrong.items():
         differences = quantity.differences
-        if differences is not None:
+        if differences:
             candidates[name] = _tables(truth, quantity).whole(name, differences)
+    ranked = _greedily(candidates, lambda variant: _contradicted(truth, judged, variant))
     return {
-        names: _diagnosis(variants[0], [wrong[name] for name in names], variants)
-        for names, variants in _greedily(candidates).items()
+        names: _diagnosis(variants, [wrong[name] for name in names])
+        for names, variants in ranked.items()
+        if allowed(variants[0].rarity)
     }
 
 
-def _greedily(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], list[Variant]]:
+def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> int:
+    """Return how many quantities are right on the sheet that a mistake would have changed."""
+    count = 0
+    for name, quantity in judged.items():
+        right = [index for index, finding in quantity.findings.items() if finding.verdict.passes]
+        same_kind = (name in DYNAMICS) == (variant in variants_of(truth).dynamic)
+        if quantity.wrong or not right or not same_kind:
+            continue
+        count += not _tables(truth, quantity).changes_none(variant, name, right)
+    return count
+
+
+def _greedily(
+    candidates: Mapping[Any, list[Variant]], contradicted: Callable[[Variant], int]
+) -> dict[tuple[Any, ...], list[Variant]]:
     """Return the fewest mistakes that explain all that can be, each with what it explains and what is equivalent."""
-    left, found = dict(candidates), {}
+    left, found = dict(candidates), dict[tuple[Any, ...], list[Variant]]()
+    against: dict[tuple[str, str], int] = {}
     while any(left.values()):
         explains: dict[tuple[str, str], list[Any]] = {}
         listed: dict[tuple[str, str], Variant] = {}
         for name, variants in left.items():
             for variant in variants:
-                explains.setdefault((variant.name, variant.where), []).append(name)
-                listed[variant.name, variant.where] = variant
-        best = max(explains, key=lambda key: len(explains[key]))
-        names = explains[best]
-        found[tuple(names)] = [listed[key] for key in explains if explains[key] == names]
+                key = (variant.identity, variant.place)
+                explains.setdefault(key, []).append(name)
+                listed[key] = variant
+        several = len(listed) > 1
+        for key, variant in listed.items() if several else ():
+            if key not in against:
+                against[key] = contradicted(variant)
+        ranked = sorted(listed, key=lambda key: (-len(explains[key]), against.get(key, 0), listed[key].rarity))
+        names = explains[ranked[0]]
+        alike = [key for key in ranked if explains[key] == names and against.get(key) == against.get(ranked[0])]
+        found[tuple(names)] = [listed[key] for key in alike]
         left = {name: variants for name, variants in left.items() if name not in names}
     return found
 
@@ -188,59 +242,132 @@ def _nearly(truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int) -> d
     """Find mistakes that explain quotients, and answers whose decimals were rounded besides."""
     found: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        in_ring = all(finding.answer is not None for finding in quantity.findings.values())
-        rounded = any(entry.tree is not None and decimals_in(entry.tree, digits) for entry in quantity.given)
+        there = [entry for entry in quantity.given if entry.tree is not None]
+        in_ring = all(quantity.findings[entry.index].answer is not None for entry in there)
+        rounded = any(entry.tree is not None and has_decimals(entry.tree, digits) for entry in there)
         if name in ("C", "V", "L") or not in_ring or not (rounded or quantity.differences is None):
             continue
-        by = Comparison(truth.arm(name), Reading(truth.arm(name).ring), digits)
+        by = Comparison(truth.arm(name), Reading(truth.arm(name).ring, others=truth.others(name)), digits)
         likely = _tables(truth, quantity).near(name, quantity.truth, _numbers(truth, quantity))
         variants = [variant for variant in likely if _gives(truth, variant, quantity, by)]
         if variants:
-            found[(name,)] = _diagnosis(variants[0], [quantity], variants)
+            found[(name,)] = _diagnosis(variants, [quantity])
     return found
 
 
 def _numbers(truth: Truth, quantity: JudgedQuantity) -> Mapping[Index, float]:
-    """Return a wrong answer's values at the state that :meth:`Variants.near` looks at; NaN where it has none."""
+    """Return an answer's values at the state that :meth:`Variants.near` looks at."""
     arm = truth.arm(quantity.name)
-    return {
-        entry.index: float(doubles(entry.tree, {**arm.parameters, **general_state(arm.n)}))
-        if entry.tree
-        else float("nan")
-        for entry in quantity.given
-    }
+    values = {**arm.description.numbers.values, **general_state(arm.n)}
+    return {entry.index: float(doubles(entry.tree, values)) for entry in quantity.given if entry.tree is not None}
 
 
 def _gives(truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Comparison) -> bool:
     """Whether a mistake gives an answer exactly, or within the rounding of its decimals."""
     change = _tables(truth, quantity).change(variant, quantity.name)
     return all(
-        entry.tree is not None and equal(entry.tree, quantity.truth[entry.index] + change[entry.index], by)
+        equal(entry.tree, quantity.truth[entry.index] + change[entry.index], by)
         for entry in quantity.given
+        if entry.tree is not None
     )
 
 
-def _parts(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
+def _too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+    """Find decimals that would be right within rounding if fewer digits were allowed."""
+    name = quantity.name
+    if name in ("C", "V", "L"):
+        return []
+    by = Comparison(truth.arm(name), Reading(truth.arm(name).ring, others=truth.others(name)), LEAST_DIGITS)
+    wrong = set(_wrong_entries(quantity))
+    for entry in quantity.given:
+        if entry.index in wrong:
+            if entry.tree is None or not has_decimals(entry.tree, LEAST_DIGITS):
+                return []
+            if not equal(entry.tree, quantity.truth[entry.index], by):
+                return []
+    mistake = "too_few_digits"
+    return [Diagnosis(mistake, sentence_of(mistake), name, _names(quantity, sorted(wrong)), hint_of(mistake))]
+
+
+# Slips in single terms
+
+
+def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+    """Find the one slip in a term of each wrong entry; nothing where an entry has none."""
+    found: list[Diagnosis] = []
+    for index in _distinct(quantity):
+        slip = _slip(truth, quantity, index)
+        if slip is None or _mirrored(quantity, index) or _factor(quantity, index):
+            return []
+        found.append(_of_slip(quantity, index, slip))
+    differences = quantity.differences
+    alike = _tables(truth, quantity).whole(quantity.name, differences) if differences else []
+    equivalent = tuple(dict.fromkeys(variant.called for variant in alike))
+    return [replace(one, equivalent=equivalent) for one in found]
+
+
+def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
+    difference, right = quantity.findings[index].difference, quantity.right(index)
+    if difference is None or difference.is_zero:
+        return None
+    arm = truth.arm(quantity.name)
+    if quantity.name == "g" and not right and _is_weight(truth, difference):
+        return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
+    return slip_in(arm, right + difference, right)
+
+
+def _is_weight(truth: Truth, difference: Element) -> bool:
+    """Whether a torque holds the parameter that gravity is given by, or there is none."""
+    names = {name for x in truth.description.gravity for name in x.symbols}
+    places = [k for k, g in enumerate(difference.ring.generators) if g.text in names]
+    return not places or all(any(monomial[k] for k in places) for monomial in difference.terms)
+
+
+def _of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Diagnosis:
+    (entry,) = _names(quantity, [index])
+    sentence = sentence_of(slip.identity, "", slip.detail)
+    return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
+
+
+# Rarer mistakes
+
+
+def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+    """Find the single mistakes that are possible, and seldom made."""
+    return list(_single(truth, judged, {quantity.name: quantity}, lambda rarity: rarity > LIKELY).values())
+
+
+def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+    """Find a factor that all entries, all of them wrong, share."""
+    wrong = _distinct(quantity)
+    found = [_factor(quantity, index) for index in wrong]
+    names = {one.mistake for one in found if one is not None}
+    if None in found or len(names) != 1:
+        return []
+    return [one for one in found if one is not None]
+
+
+def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Explain torques, and the Lagrangian, part by part: those of accelerations, of rates, and of neither."""
     differences = quantity.differences
-    if quantity.name not in ("tau", "L") or differences is None:
+    if quantity.name not in ("tau", "L") or not differences:
         return []
     tables = _tables(truth, quantity)
-    parts = {
-        part: whole
-        for part, whole in _split(truth, quantity.name, differences).items()
-        if not all(element.is_zero for element in whole.values())
+    split = _split(truth, quantity.name, differences)
+    parts = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
+    right = {part: whole for part, whole in split.items() if part not in parts}
+
+    def leaves_the_rest(variant: Variant) -> int:
+        return sum(not tables.changes_none(variant, part, list(whole)) for part, whole in right.items())
+
+    candidates = {
+        part: [variant for variant in tables.whole(part, whole) if not leaves_the_rest(variant)]
+        for part, whole in parts.items()
     }
-    candidates = {part: tables.whole(part, whole) for part, whole in parts.items()}
-    explained = _greedily(candidates)
-    found = [_diagnosis(variants[0], [quantity], variants) for variants in explained.values()]
+    explained = _greedily(candidates, lambda variant: 0)
+    found = [_diagnosis(variants, [quantity]) for variants in explained.values()]
     left = [part for part in parts if not any(part in names for names in explained)]
-    for part in list(left):
-        pair = tables.pair(part, parts[part])
-        if pair:
-            found += [_diagnosis(variant, [quantity]) for variant in pair]
-            left.remove(part)
-    if not found:
+    if not found and len(parts) == len(split):
         return []
     for part in left:
         found += _part_entries(truth, quantity, part, parts[part])
@@ -253,14 +380,15 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
     for index, difference in whole.items():
         if difference.is_zero:
             continue
-        variants = _tables(truth, quantity).entry(part, index, difference)
-        if variants:
-            found.append(_diagnosis(variants[0], [quantity], variants, [index[: len(quantity.truth.shape)]]))
+        place = index[: len(quantity.truth.shape)]
+        (entry,) = _names(quantity, [place])
+        right = truth.of(part)[index]
+        slip = slip_in(truth.arm(part), right + difference, right)
+        if slip is not None:
+            found.append(_of_slip(quantity, place, slip))
             continue
-        (entry,) = _names(quantity, [index[: len(quantity.truth.shape)]])
         excess = plain_text(readable(truth.arm(quantity.name), difference))
-        sentence = f"Too much {PARTS[part]}: {excess}."
-        found.append(Diagnosis(None, sentence, entry, (entry,), hint_of(None)))
+        found.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
     return found
 
 
@@ -290,10 +418,15 @@ def _coefficient(element: Element, place: int) -> Element:
     return element.ring.from_terms(terms)
 
 
-def _pair(truth: Truth, quantity: JudgedQuantity, seconds: float) -> list[Diagnosis]:
+def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+    """Find two of a derivation's mistakes that together explain what no single one does."""
     differences = quantity.differences
-    pair = None if differences is None else _tables(truth, quantity).pair(quantity.name, differences, seconds)
-    return [_diagnosis(variant, [quantity]) for variant in pair or ()]
+    if not differences or len({x for d in differences.values() for x in d.terms}) < LEAST_TERMS_OF_A_PAIR:
+        return []
+    pair = _tables(truth, quantity).pair(quantity.name, differences)
+    if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):
+        return []
+    return [_diagnosis([variant], [quantity]) for variant in pair]
 
 
 # Entry by entry
@@ -305,17 +438,20 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
     candidates: dict[Index, list[Variant]] = {}
     for index in _distinct(quantity):
         plain = _mirrored(quantity, index) or _factor(quantity, index)
+        slip = None if plain else _slip(truth, quantity, index)
         difference = quantity.findings[index].difference
         if plain is not None:
             found.append(plain)
+        elif slip is not None:
+            found.append(_of_slip(quantity, index, slip))
         elif difference is not None:
             candidates[index] = _tables(truth, quantity).entry(quantity.name, index, difference)
         else:
             candidates[index] = []
-    for indices, variants in _greedily(candidates).items():
+    for indices, variants in _greedily(candidates, lambda variant: 0).items():
         if len(indices) == 1 and quantity.name not in DYNAMICS:
             continue  # of transforms' entries many look alike
-        diagnosis = _diagnosis(variants[0], [quantity], variants, indices)
+        diagnosis = _diagnosis(variants, [quantity], indices)
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
         found.append(replace(diagnosis, sentence=alone))
         candidates = {index: v for index, v in candidates.items() if index not in indices}
@@ -325,7 +461,10 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
 def _distinct(quantity: JudgedQuantity) -> list[Index]:
     """Return wrong entries, of C one a row."""
     wrong = _wrong_entries(quantity)
-    return [index for index in wrong if index[1] == 0] or wrong[:1] if quantity.name == "C" else wrong
+    if quantity.name != "C":
+        return wrong
+    rows = {place_of("C", index): index for index in reversed(wrong)}
+    return sorted(rows.values())
 
 
 def _mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
@@ -341,7 +480,7 @@ def _factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
     if difference is None or not right:
         return None
     for name, factor in FACTORS.items():
-        if difference == right * factor:
+        if difference == right * (factor - 1):
             (entry,) = _names(quantity, [index])
             return Diagnosis(name, sentence_of(name), entry, (entry,), hint_of(name))
     return None
@@ -350,13 +489,6 @@ def _factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 def _described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
     finding, right = quantity.findings[index], quantity.right(index)
     (entry,) = _names(quantity, [index])
-    tree = next((given.tree for given in quantity.given if given.index == index), None)
-    ring = truth.arm(quantity.name).ring
-    by = Comparison(truth.arm(quantity.name), Reading(ring), 1)
-    is_rounded = tree is not None and quantity.name not in ("C", "V", "L") and bool(decimals_in(tree, 1))
-    if is_rounded and tree is not None and equal(tree, right, by):
-        name = "too_few_digits"
-        return Diagnosis(name, sentence_of(name), entry, (entry,), hint_of(name))
     element = finding.answer.element() if finding.answer is not None else None
     words = describe(truth.arm(quantity.name), element, right) if element is not None else finding.statement
     return Diagnosis(None, capitalised(f"{words}."), entry, (entry,), hint_of(None))

@@ -1,4 +1,4 @@
-"""The library of mistakes: stable names, what a student learns from each, and where to look."""
+"""The library of mistakes: every mistake that a report may name, by its identity."""
 
 from __future__ import annotations
 
@@ -6,100 +6,258 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from dhkit.grading.capitals import capitalised
-from dhkit.grading.judging.inverse import INVERSE_MISTAKES
-from dhkit.grading.judging.tables import TABLE_MISTAKES
-from dhkit.symbolic.mistakes import MISTAKES
-from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES
+from dhkit.symbolic.mistakes import MISTAKES, Mistake, Subject, catalogue
+from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, ROW
 
-__all__ = ["LIBRARY", "PARAMETER_MISTAKES", "hint_of", "of_links", "sentence_of"]
+__all__ = ["FACTORS", "INVERSE", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "hint_of", "sentence_of"]
 
-PARAMETER_MISTAKES = {
-    "parameter_forgotten": Fraction(0),
+UNNAMED_HINT = "Look again at the entries that are marked as wrong."
+"""Where to look where no mistake is named."""
+
+PARAMETER_FACTORS = {
     "parameter_halved": Fraction(1, 2),
     "parameter_doubled": Fraction(2),
+    "parameter_forgotten": Fraction(0),
     "parameter_sign": Fraction(-1),
 }
 """What a parameter is multiplied by."""
-
-OTHER_MISTAKES: Mapping[str, str] = {
-    "gravity_torque_relative_angle": (
-        "the gravity torques use the joint's own angle in place of the sum of the angles up to it"
-    ),
-    "zero_shifted": "the zero pose is a quarter turn off: the joint's sine stands for its cosine, with a sign",
-    "zero_shifted_back": "the zero pose is a quarter turn off, the other way: cosine for sine, with a sign",
-    "coriolis_transposed": "C is transposed: C_ij belongs to torque i and rate j",
-    "equations_exchanged": "rows are exchanged: one joint's equation stands in another's place",
-    "centrifugal_index": "the squares of rates have the wrong index: one joint's rate stands for another's",
-    "parameter_forgotten": "a parameter is missing, as if it were zero",
-    "parameter_halved": "a parameter counts by half: was a full length meant, or half of it?",
-    "parameter_doubled": "a parameter counts twice: was half a length meant, or the full one?",
-    "parameter_sign": "a parameter has the wrong sign",
-    "parameter_for_another": "one parameter stands where another belongs",
-    "parameters_exchanged": "two parameters are exchanged",
-    "links_exchanged": "two links are exchanged: each has the other's parameters",
-    "friction_forgotten": "friction is missing from the joint torques",
-    "friction_sign": "friction has the wrong sign: it must be overcome, so it adds to the torque of the motion",
-    "degrees_for_radians": "degrees are used where radians belong: sine and cosine take radians",
-    "mass_matrix_not_symmetric": "M is symmetric, and its mirrored entry is right",
-    "velocity_torques_sign": "all Coriolis and centrifugal torques have the wrong sign",
-    "lagrangian_sum": "L is K + V; the Lagrangian is K - V",
-    "motor_torques": (
-        "these are the motors' torques; generalised forces of absolute angles are others, S^-T tau for y = S q"
-    ),
-    "too_few_digits": "the decimals have too few digits: four or more are asked for",
-    "entry_sign": "the whole entry has the wrong sign",
-    "entry_halved": "the whole entry is half of what it should be",
-    "entry_doubled": "the whole entry is twice what it should be",
+FACTORS = {
+    "entry_sign": Fraction(-1),
+    "entry_halved": Fraction(1, 2),
+    "entry_doubled": Fraction(2),
 }
+"""What a whole entry is multiplied by."""
 
-LIBRARY: Mapping[str, str] = {
-    **INVERSE_MISTAKES,
-    **TABLE_MISTAKES,
-    **KINEMATIC_MISTAKES,
-    **MISTAKES,
-    **OTHER_MISTAKES,
-    "other_frames": "the table describes the same arm, in other frames",
-}
-"""Mistakes by stable name, each with what is then the case."""
 
-_HINTS = (
-    (
-        ("gravity", "height", "potential"),
-        "Look again at the potential energy: which way does it grow, and of which point?",
+def _of(subject: Subject, hint: str, **sentences: str) -> list[Mistake]:
+    return [Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()]
+
+
+WRITING = catalogue(
+    _of(
+        Subject.WRITING,
+        "Look again at the units.",
+        degrees_for_radians="angles in degrees are used as if they were in radians",
+        millimetres_for_metres="lengths in millimetres are used as if they were in metres",
     ),
-    (("velocity", "com", "steiner"), "Look again at the velocity of the centre of mass."),
-    (("omega",), "Look again at the angular velocity: which joints turn this link?"),
-    (("inertia",), "Look again at the inertia: about which point, and about which axes?"),
-    (("half", "translation", "rotation_half"), "Look again at the factors in the kinetic energy."),
-    (("rotor",), "Look again at the drives' inertia."),
-    (
-        ("mass_rate", "kinetic_gradient", "christoffel", "coriolis", "centrifugal"),
-        "Look again at the terms with rates.",
+    _of(
+        Subject.WRITING,
+        "Look again at how many digits are asked for.",
+        too_few_digits="the decimals have too few digits: four or more are asked for",
     ),
-    (("equations", "links", "parameter"), "Look again at the indices and at which parameter stands where."),
-    (("friction",), "Look again at friction."),
-    (("degrees",), "Look again at the units of angles."),
-    (("zero",), "Look again at where each joint's angle is zero."),
-    (("mass",), "Look again at the masses."),
-    (("entry",), "Look again at this entry's factor and sign."),
+    _of(
+        Subject.WRITING,
+        "Look again at this entry's factor and sign.",
+        entry_sign="the whole entry has the wrong sign",
+        entry_halved="the whole entry is half of what it should be",
+        entry_doubled="the whole entry is twice what it should be",
+    ),
 )
 
+TABLE = catalogue(
+    _of(
+        Subject.TABLE,
+        "Look again at the convention: which link do the a and alpha of a row belong to?",
+        other_convention="this is the arm's table in the other convention: rows hold a and alpha of another link",
+    ),
+    _of(
+        Subject.TABLE,
+        ROW,
+        rows_exchanged="two rows are exchanged",
+        variable_column="the joint's variable stands in the wrong column: a turning joint's adds to theta, a sliding "
+        "joint's to d",
+        variable_of_another_joint="the variable is that of another joint",
+        length_sign="a length has the wrong sign",
+        wrong_length="a length is wrong",
+        wrong_theta="theta is wrong",
+        wrong_twist="the twist alpha is wrong",
+    ),
+    _of(
+        Subject.TABLE,
+        "Look again at which frames and which zero pose the task gives.",
+        other_frames="the table describes the same arm, in other frames",
+    ),
+)
 
-def of_links() -> list[str]:
-    """Return the mistakes of the textbook's derivation, in the order in which they are tried."""
-    return list(MISTAKES)
+INVERSE = catalogue(
+    _of(
+        Subject.INVERSE,
+        "Look again at this joint: in which quadrant is the angle?",
+        atan2_arguments="the arguments of atan2 are exchanged: it is atan2(y, x)",
+        quadrant="the angle is in the wrong quadrant for some poses: atan, asin and acos know only half a turn, "
+        "atan2 knows all of it",
+        sign_lost="the sign is wrong for some poses: acos and sqrt know only one",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at this branch: which sign belongs to it?",
+        elbow_sign="a root or an arc cosine has the wrong sign: it belongs to another branch",
+        joint_sign="the joint value has the wrong sign",
+        duplicate_branch="this branch gives the same solutions as another",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at where this angle or length is counted from.",
+        missing_offset="the joint value is off by a constant: an offset of the table is missing",
+        supplement="the angle inside the triangle is given in place of the joint's, which is 180 degrees less it",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at the triangle of the links: what does the law of cosines say?",
+        cosine_law_factor="the law of cosines lacks its factor 2: c^2 = a^2 + b^2 - 2 a b cos(C)",
+        cosine_law_sign="a square in the law of cosines has the wrong sign",
+        cosine_law_squares="lengths in the law of cosines are not squared",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at the tool's rotation: rows are the base's axes, columns the tool's.",
+        rotation_matrix_transposed="the rotation matrix is transposed: r_ij stands where r_ji belongs",
+    ),
+)
+
+EQUATION = catalogue(
+    _of(
+        Subject.ENERGY,
+        "Look again at the inertia: of which body is this the formula, and about which point?",
+        inertia_halved="the link's inertia about its centre of mass counts by half",
+        disc_for_rod="the inertia is that of a disc, m r^2/2, in place of a rod's, m l^2/12",
+        point_mass_for_rod="the inertia is that of a point mass, m l^2, in place of a rod's",
+        rod_about_end="the inertia is that of a rod about its end, m l^2/3, in place of about its centre, m l^2/12",
+        sphere_for_rod="the inertia is that of a sphere, 2 m r^2/5, in place of a rod's, m l^2/12",
+        inertia_quarter_for_rod="the inertia is m l^2/4 in place of a rod's m l^2/12",
+        rod_with_half_length="the inertia is that of a rod of half the length, m l^2/48, in place of m l^2/12",
+        inertia_moments_exchanged="two principal moments of the inertia are exchanged",
+    ),
+    _of(
+        Subject.ENERGY,
+        "Look again at the drives: which rotor and which gear belong to which joint?",
+        drives_exchanged="two drives are exchanged: each rotor has the other's gear and inertia",
+        gear_inverted="the rotor's inertia is divided by the gear ratio's square in place of multiplied",
+    ),
+    _of(
+        Subject.ENERGY,
+        "Look again at the table behind the dynamics: convention, twists and lengths.",
+        convention_in_dynamics="the table is read in the other convention: a and alpha belong to another link",
+        twist_sign_in_dynamics="a twist alpha has the wrong sign in the positions of the links",
+    ),
+    _of(
+        Subject.ENERGY,
+        "Look again at the squares in the kinetic energy.",
+        square_of_sum="the square of a sum lacks its mixed term: (a + b)^2 = a^2 + 2 a b + b^2",
+        exponent_dropped="an exponent is missing: m r stands where m r^2 belongs",
+        slide_forgotten="the variable of a sliding joint is missing in the position of a link",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the formulas for sines and cosines of sums.",
+        sum_of_angles_split="sines and cosines of a sum of angles are split up: cos(a + b) is not cos(a) + cos(b)",
+        sum_formula_sign="a sum formula has the wrong sign: cos(a + b) = cos(a) cos(b) - sin(a) sin(b)",
+        angle_difference="the difference of two angles stands where their sum belongs",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the time derivatives: d/dt cos(q) = -sin(q) dq/dt.",
+        rate_of_cosine_sign="d/dt of M has the wrong sign: the derivative of a cosine is minus the sine",
+        chain_rule_forgotten="d/dt of M lacks the chain rule: the derivative of cos(q) is -sin(q) times q's rate",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at whether each joint's angle counts from the link before or from a fixed direction.",
+        gravity_torque_relative_angle=(
+            "the gravity torques use the joint's own angle in place of the sum of the angles up to it"
+        ),
+        relative_for_absolute="the answer is one for angles from the link before, and was declared absolute",
+        absolute_for_relative="the answer is one for angles from a fixed direction, and was handed in as relative",
+        motor_torques="these are the motors' torques; generalised forces of absolute angles are others, S^-T tau for "
+        "y = S q",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at where each joint's angle is zero, and from which axis it counts.",
+        zero_shifted="the zero pose is a quarter turn off: the joint's sine stands for its cosine, with a sign",
+        zero_shifted_back="the zero pose is a quarter turn off, the other way: cosine for sine, with a sign",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the indices and at which parameter stands where.",
+        coriolis_transposed="C is transposed: C_ij belongs to torque i and rate j",
+        equations_exchanged="rows are exchanged: one joint's equation stands in another's place",
+        centrifugal_index="the squares of rates have the wrong index: one joint's rate stands for another's",
+        parameter_forgotten="a parameter is missing, as if it were zero",
+        parameter_halved="a parameter counts by half: was a full length meant, or half of it?",
+        parameter_doubled="a parameter counts twice: was half a length meant, or the full one?",
+        parameter_sign="a parameter has the wrong sign",
+        parameter_for_another="one parameter stands where another belongs",
+        parameters_exchanged="two parameters are exchanged",
+        links_exchanged="two links are exchanged: each has the other's parameters",
+        mass_matrix_not_symmetric="M is symmetric, and this entry is not its mirror image",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at friction: which way does it act, and on which side of the gear is it measured?",
+        friction_forgotten="viscous friction is missing",
+        friction_sign="viscous friction has the wrong sign: it is part of what the drives have to give",
+        friction_gear="viscous friction lacks a gear ratio: on the joint's side it is the motor's times its square",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the signs: the Lagrangian is K - V, and torques are d/dt dL/dqd - dL/dq.",
+        velocity_torques_sign="the terms with products of rates have the wrong sign",
+        lagrangian_sum="the energies are added: the Lagrangian is K - V",
+        gravity_torque_sign="the gravity torques have the wrong sign",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at which way gravity acts on this joint.",
+        weight_on_vertical_axis="a gravity torque stands at a joint that gravity does not turn or push",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the terms one by one.",
+        inertial_torques_missing="the terms with accelerations are missing",
+        velocity_torques_missing="all terms with products of rates are missing",
+        gravity_torques_missing="the terms of gravity are missing",
+        term_missing="a term is missing",
+        term_sign="a term has the wrong sign",
+        term_factor="a term has the wrong factor",
+        term_extra="there is a term too much",
+        term_function="sine and cosine are exchanged in a term",
+        term_angle="a term has the wrong angle",
+        term_rate="a term has the rate or acceleration of another joint",
+        term_parameter="a term has another parameter than it should",
+        term_replaced="one term stands in place of another",
+    ),
+)
+
+LIBRARY: Mapping[str, Mistake] = catalogue(
+    INVERSE.values(),
+    TABLE.values(),
+    KINEMATIC_MISTAKES.values(),
+    MISTAKES.values(),
+    EQUATION.values(),
+    WRITING.values(),
+)
+"""Mistakes by identity."""
 
 
-def sentence_of(name: str, where: str = "") -> str:
-    """Return what a student learns from a mistake, with the link or the parameters that it concerns."""
-    sentence = LIBRARY[name.partition("@")[0]]
+def sentence_of(identity: str, where: str = "", detail: str = "") -> str:
+    """Return what a student learns from a mistake.
+
+    Parameters
+    ----------
+    identity
+        Of the mistake.
+    where
+        The link, joint or parameters that it concerns.
+    detail
+        What exactly: the term, or the entry.
+    """
+    sentence = LIBRARY[identity].sentence
     text = f"{where}: {sentence}" if where else sentence
+    text = f"{text.rstrip('?')}: {detail}" if detail else text
     return capitalised(text if text.endswith("?") else f"{text}.")
 
 
-def hint_of(name: str | None) -> str:
+def hint_of(identity: str | None) -> str:
     """Return where to look, without saying what is wrong."""
-    for beginnings, hint in _HINTS:
-        if name and name.startswith(beginnings):
-            return hint
-    return "Look again at the entries that are marked as wrong."
+    return LIBRARY[identity].hint if identity else UNNAMED_HINT

@@ -35,8 +35,12 @@ def _table(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
         numbers = [f"{points(sheet.points)} of {points(sheet.most)}", *(reached.get(name, "") for name in quantities)]
         cells = "".join(f'<td class="number">{cell}</td>' for cell in numbers)
         link = f'<a href="#sheet-{number}">{_name(report, number)}</a>'
-        rows.append(f"<tr><td>{link}</td><td>{badge(report.verdict)}</td>{cells}</tr>")
+        rows.append(f"<tr><td>{link}</td><td>{badge(report.verdict)} {_at(report)}</td>{cells}</tr>")
     return '<div class="wide"><table>' + "\n".join(rows) + "</table></div>"
+
+
+def _at(report: GradeReport) -> str:
+    return text(report.conclusion.removeprefix(report.verdict.value).removeprefix(", ")) if not report.error else ""
 
 
 def _mistakes(reports: Sequence[GradeReport]) -> Iterator[str]:

@@ -7,7 +7,7 @@ from typing import Any
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport
 from dhkit.grading.reports.plain import plain
-from dhkit.grading.reports.sentences import found, provenance, summary, told
+from dhkit.grading.reports.sentences import found, provenance, remarks, summary, told
 
 __all__ = ["gradescope"]
 
@@ -22,7 +22,7 @@ def gradescope(report: GradeReport, marks: Marks) -> dict[str, Any]:
     return {
         "score": marks.points,
         "execution_time": round(report.seconds, 3),
-        "output": "\n".join([summary(report, marks), *found(report), *map(plain, report.notes), provenance(report)]),
+        "output": "\n".join([summary(report, marks), *found(report), *remarks(report), provenance(report)]),
         "output_format": "text",
         "test_output_format": "text",
         "visibility": "visible",

@@ -9,7 +9,7 @@ from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.plain import plain, points
-from dhkit.grading.reports.sentences import found, provenance, witness_sentence
+from dhkit.grading.reports.sentences import found, provenance, remarks, witness_sentence
 from dhkit.grading.reports.style import STYLE
 
 __all__ = ["badge", "html_report", "page", "sections", "text"]
@@ -18,6 +18,7 @@ SIGNS = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
     Verdict.UNDECIDED: ("open", "?"),
+    Verdict.INCOMPLETE: ("open", "…"),
     Verdict.WRONG: ("wrong", "✗"),
     Verdict.UNREADABLE: ("unread", "!"),
 }
@@ -44,7 +45,9 @@ def page(title: str, body: str) -> str:
 
 def sections(report: GradeReport, marks: Marks) -> Iterator[str]:
     """Yield what a page shows of a sheet, below its heading."""
-    yield f'<p class="sum">{badge(report.verdict)} {points(marks.points)} of {points(marks.most)} points</p>'
+    rest = report.conclusion.removeprefix(report.verdict.value).removeprefix(", ")
+    said = f" {text(rest)};" if rest and not report.error else ""
+    yield f'<p class="sum">{badge(report.verdict)}{said} {points(marks.points)} of {points(marks.most)} points</p>'
     if report.error:
         yield f'<p class="error">{text(report.error)}</p>'
     if marks.quantities:
@@ -56,7 +59,7 @@ def sections(report: GradeReport, marks: Marks) -> Iterator[str]:
     right = [_entry(entry, mark) for entry, mark in pairs if entry.verdict in settled]
     if right:
         yield f"<details><summary>{len(right)} correct</summary>\n" + "\n".join(right) + "\n</details>"
-    yield from (f'<p class="note">{text(note)}</p>' for note in report.notes)
+    yield from (f'<p class="note">{text(line)}</p>' for line in remarks(report))
     yield f'<p class="note">{text(provenance(report))}</p>'
 
 
@@ -78,8 +81,10 @@ def _entry(entry: Entry, mark: Mark) -> str:
     worth = f"{points(mark.points)} of {points(mark.most)} points"
     rule = f": {text(mark.rule)}" if mark.rule and mark.rule != entry.verdict.value else ""
     lines = [f'<h3>{text(entry.name)} {badge(entry.verdict)} <span class="note">{worth}{rule}</span></h3>']
-    if entry.answer or entry.latex:
-        lines.append(f"<p>answer</p>{_equation(entry.latex, entry.answer)}")
+    if entry.answer:
+        lines.append(f'<p>answer</p><div class="wide"><code>{text(entry.answer)}</code></div>')
+    if entry.latex:
+        lines.append(f"<p>read as</p>{_equation(entry.latex, entry.read)}")
     if entry.difference is not None:
         lines.append(f"<p>answer less the truth</p>{_equation(entry.difference_latex, entry.difference)}")
     if entry.witness is not None:

@@ -12,7 +12,12 @@ from dhkit.grading.reports.sentences import found, summary, told
 
 __all__ = ["junit"]
 
-OUTCOMES = {Verdict.WRONG: "failure", Verdict.UNREADABLE: "error", Verdict.UNDECIDED: "skipped"}
+OUTCOMES = {
+    Verdict.WRONG: "failure",
+    Verdict.INCOMPLETE: "failure",
+    Verdict.UNREADABLE: "error",
+    Verdict.UNDECIDED: "skipped",
+}
 """What a case holds that did not simply pass."""
 
 
@@ -34,6 +39,9 @@ def _suite(root: Element, report: GradeReport, marks: Marks) -> None:
         "robot": report.robot,
         "digest": report.digest,
         "version": report.version,
+        "verdict": report.conclusion,
+        "missing": ", ".join(report.missing),
+        "left out": "; ".join(report.left_out),
         "points": points(marks.points),
         "most": points(marks.most),
     }
@@ -57,6 +65,8 @@ def _suite(root: Element, report: GradeReport, marks: Marks) -> None:
 def _case(suite: Element, report: GradeReport, entry: Entry, mark: Mark) -> None:
     case = SubElement(suite, "testcase", classname=plain(entry.quantity), name=plain(entry.name), time="0")
     outcome = OUTCOMES.get(entry.verdict)
+    if entry.verdict is Verdict.UNDECIDED and report.proof_required:
+        outcome = "failure"
     if outcome is None:
         return
     lines = [*told(entry, mark), *found(report, entry)]

@@ -35,7 +35,21 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     names = [cell(plain(quantity)) for quantity in quantities]
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(["student", "points", "most", *names, "verdict", "mistakes", "error", *ORIGIN])
+    writer.writerow(
+        [
+            "student",
+            "points",
+            "most",
+            *names,
+            "verdict",
+            "judged at",
+            "missing",
+            "left out",
+            "mistakes",
+            "error",
+            *ORIGIN,
+        ]
+    )
     for report, sheet in zip(reports, marks, strict=True):
         reached = {mark.name: points(mark.points) for mark in sheet.quantities}
         mistakes = dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)
@@ -45,6 +59,9 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             points(sheet.most),
             *(reached.get(quantity, "") for quantity in quantities),
             report.verdict.value,
+            ", ".join(f"{name} = {value:g}" for name, value in report.judged_at.items()),
+            " ".join(report.missing),
+            "; ".join(report.left_out),
             " ".join(mistakes),
             report.fault,
             *(getattr(report, name) or "" for name in ORIGIN),

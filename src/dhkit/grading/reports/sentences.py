@@ -6,15 +6,25 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Witness
+from dhkit.grading.report import Entry, GradeReport, Verdict, Witness
 from dhkit.grading.reports.plain import plain, points
 
-__all__ = ["fault_of", "found", "mistakes_of", "provenance", "summary", "told", "witness_sentence"]
+__all__ = [
+    "fault_of",
+    "found",
+    "mistakes_of",
+    "provenance",
+    "reading",
+    "remarks",
+    "summary",
+    "told",
+    "witness_sentence",
+]
 
 
 def summary(report: GradeReport, marks: Marks) -> str:
     """Return a sheet's verdict and points in a line, or why it could not be judged."""
-    verdict = f"unreadable: {plain(report.error)}" if report.error else report.verdict.value
+    verdict = f"unreadable: {plain(report.error)}" if report.error else plain(report.conclusion)
     return f"{verdict} ({points(marks.points)} of {points(marks.most)} points)"
 
 
@@ -40,6 +50,22 @@ def told(entry: Entry, mark: Mark) -> Iterator[str]:
         yield f"points: {plain(mark.rule)}"
 
 
+def reading(report: GradeReport) -> Iterator[str]:
+    """Yield how each entry was read, in the robot's own names, and what was not read."""
+    for entry in report.entries:
+        if entry.answer and (entry.read or entry.verdict is Verdict.UNREADABLE):
+            was = plain(entry.read) if entry.read else f"not read: {plain(entry.statement)}"
+            yield f"{plain(entry.name)}: {plain(entry.answer)} was read as {was}"
+
+
+def remarks(report: GradeReport) -> Iterator[str]:
+    """Yield what a reader should know beside verdicts: what is missing, what was left out, notes."""
+    if report.missing:
+        yield f"missing: {', '.join(map(plain, report.missing))}"
+    yield from (f"left out: {plain(line)}" for line in report.left_out)
+    yield from (f"note: {plain(note)}" for note in report.notes)
+
+
 def witness_sentence(witness: Witness) -> str:
     """Return in words where an answer and the truth differ."""
     state = ", ".join(f"{plain(name, 40)} = {value:.6g}" for name, value in witness.state.items())
@@ -58,8 +84,9 @@ def found(report: GradeReport, entry: Entry | None = None) -> Iterator[str]:
 
 
 def provenance(report: GradeReport) -> str:
-    """Return which dhkit judged by which robot."""
-    return f"dhkit {plain(report.version, 40)}, {plain(report.robot, 80)}, digest {plain(report.digest, 80)}"
+    """Return which dhkit judged by which robot, and the seed of its random states."""
+    seed = "" if report.seed is None else f", seed {report.seed}"
+    return f"dhkit {plain(report.version, 40)}, {plain(report.robot, 80)}, digest {plain(report.digest, 80)}{seed}"
 
 
 def mistakes_of(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:

@@ -12,7 +12,16 @@ from rich.text import Text
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.reports.plain import plain, points
-from dhkit.grading.reports.sentences import fault_of, found, mistakes_of, provenance, summary, told
+from dhkit.grading.reports.sentences import (
+    fault_of,
+    found,
+    mistakes_of,
+    provenance,
+    reading,
+    remarks,
+    summary,
+    told,
+)
 
 __all__ = ["terminal_class", "terminal_report"]
 
@@ -20,6 +29,7 @@ STYLES = {
     Verdict.CORRECT: "green",
     Verdict.ROUNDED: "green",
     Verdict.UNDECIDED: "yellow",
+    Verdict.INCOMPLETE: "yellow",
     Verdict.WRONG: "red",
     Verdict.UNREADABLE: "magenta",
 }
@@ -27,19 +37,29 @@ BAR = 40
 """Columns of a bar for all sheets."""
 
 
-def terminal_report(report: GradeReport, marks: Marks) -> RenderableType:
-    """Return a sheet's report: nothing in it is read as markup, or commands the terminal."""
+def terminal_report(report: GradeReport, marks: Marks, read: bool = False) -> RenderableType:
+    """Return a sheet's report: nothing in it is read as markup, or commands the terminal.
+
+    Parameters
+    ----------
+    report, marks
+        Of the sheet.
+    read
+        Whether to show, before the verdicts, how each entry was read.
+    """
     title = ", ".join(plain(part) for part in (report.student, report.sheet or "", report.robot) if part)
     parts: list[RenderableType] = [
         Text.assemble((title or "answers", "bold"), ": ", (summary(report, marks), STYLES[report.verdict]))
     ]
+    if read:
+        parts += [Text(line, style="blue") for line in reading(report)]
     if report.entries:
         parts.append(_quantities(report, marks))
     for entry, mark in zip(report.entries, marks.entries, strict=False):
-        if entry.verdict not in (Verdict.CORRECT, Verdict.ROUNDED):
+        if entry.verdict not in (Verdict.CORRECT, Verdict.ROUNDED, Verdict.INCOMPLETE):
             parts += _entry(entry, mark)
     parts += [Text(line, style="cyan") for line in found(report)]
-    parts += [Text(f"note: {plain(note)}") for note in report.notes]
+    parts += [Text(line) for line in remarks(report)]
     return Group(*parts, Text(provenance(report), style="dim"))
 
 
@@ -72,11 +92,20 @@ def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> Re
     for report, mark in zip(reports, marks, strict=True):
         table.add_row(
             Text(plain(report.student, 60)),
-            Text(report.verdict.value, STYLES[report.verdict]),
+            Text(plain(report.conclusion), STYLES[report.verdict]),
             Text(f"{points(mark.points)} of {points(mark.most)}"),
             Text(fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
-    return Group(table, *_bars(mistakes_of(reports), len(reports)))
+    lines = [Text(line, style="yellow") for line in _robots(reports)]
+    return Group(*lines, table, *_bars(mistakes_of(reports), len(reports)))
+
+
+def _robots(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield a warning where the sheets named their own robots: a student may choose an easier one."""
+    digests = {report.digest: report.robot for report in reports if report.digest}
+    if any(report.own_robot for report in reports):
+        listed = ", ".join(sorted({plain(name, 40) for name in digests.values()}))
+        yield f"each sheet named its own robot ({listed}): give the task's by --robot or --task"
 
 
 def _bars(mistakes: Sequence[tuple[str, int]], sheets: int) -> Iterator[RenderableType]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import INERTIA_PLACES, Array, Convention, Description, joint_array, require_bodies
-from dhkit.expressions import Expression, exact_angle
+from dhkit.expressions import ZERO, Expression, exact_angle
 from dhkit.symbolic.exact.naming import LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
@@ -56,8 +56,8 @@ class ExactArm:
         Where its elements are.
     rows, bodies
         One a joint.
-    gear, rotor
-        Gear ratio and rotor inertia of each joint's drive; 1 and 0 without one.
+    gear, rotor, viscous
+        Gear ratio, rotor inertia and motor-side viscous friction of each joint's drive; 1, 0 and 0 without one.
     base
         Rotation of frame 0 in the world, shape (3, 3).
     gravity
@@ -83,6 +83,7 @@ class ExactArm:
     bodies: tuple[ExactBody, ...]
     gear: tuple[Element, ...]
     rotor: tuple[Element, ...]
+    viscous: tuple[Element, ...]
     base: Elements
     gravity: Elements
     origin: Elements
@@ -182,7 +183,8 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
 
     tool = [naming.known(x) for x in description.tool.placement.xyz]
-    expressions = [*gravity, *xyz, *tool, *needed]
+    viscous = [naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints]
+    expressions = [*gravity, *xyz, *tool, *viscous, *needed]
     angles = [*rpy]
     for link in links:
         expressions += [
@@ -205,6 +207,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         tuple(_body(ring, link) for link in links),
         tuple(ring.read(link.gear) for link in links),
         tuple(ring.read(link.rotor) for link in links),
+        tuple(ring.read(x) for x in viscous),
         rotation,
         rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
         rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),

@@ -1,0 +1,512 @@
+"""Python programs as bindings: a closed list of statements is understood, and every other one is noted as a change."""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+
+from dhkit.errors import AnswerError
+from dhkit.grading.answers.bindings import (
+    Formula,
+    FunctionNamed,
+    ModuleNamed,
+    NotUnderstood,
+    Program,
+    Read,
+    Returned,
+    Scope,
+    Symbol,
+    Use,
+    Value,
+)
+from dhkit.grading.answers.python_effects import Effects, bound_names
+from dhkit.grading.answers.python_formulas import VECTORS, PythonFormulas, constant_index, spelled
+from dhkit.grading.answers.tokens import dotted
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
+
+__all__ = ["python_program"]
+
+MAX_STATEMENTS = 5_000
+MAX_SYMBOLS = 1_000
+MODULES = frozenset(
+    ("numpy", "sympy", "math", "cmath", "mpmath", "casadi", "jax.numpy", "autograd.numpy", "numpy.lib.scimath")
+    + ("sympy.physics.mechanics", "sympy.physics.vector", "sympy.matrices", "sympy.abc", "symengine", "pylab")
+)
+"""Modules whose sin is the sine, and whose other functions mean what their names say."""
+SYMBOL_CALLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
+LATER = frozenset("EINOQSe")
+"""Names of one letter that modules export."""
+
+
+def python_program(text: str, file: str, line_name: Callable[[int], str], n: int) -> Program:
+    """Read a program of Python's; nothing in it is run.
+
+    Parameters
+    ----------
+    text
+        The program.
+    file
+        What messages begin with.
+    line_name
+        How messages name a line.
+    n
+        The number of joints: ``q1, q2 = q`` takes a vector of them apart.
+
+    Raises
+    ------
+    AnswerError
+        No Python, more statements than are read, or one that may change any name.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    for line in text.split("\n")[:2]:
+        coding = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line)
+        if coding and coding[1].lower().replace("_", "-") not in ("utf-8", "utf8", "utf-8-sig", "ascii", "us-ascii"):
+            raise AnswerError(f"{file}: {line_name(1)}: written in {coding[1][:20]!r}; expected UTF-8")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, filename=file or "program")
+    except SyntaxError as error:
+        at = line_name(error.lineno) if error.lineno else "the program"
+        raise AnswerError(f"{file}: {at}: no Python: {str(error.msg)[:100]}") from None
+    except (RecursionError, MemoryError):
+        raise AnswerError(f"{file}: brackets or sums nested too deep to be read; write long sums in parts") from None
+    except ValueError as error:
+        raise AnswerError(f"{file}: no Python: {str(error)[:100]}") from None
+    try:
+        return _Reader(text, file, line_name, n).read(tree)
+    except RecursionError:
+        raise AnswerError(f"{file}: statements nested too deep to be read") from None
+
+
+class _Reader:
+    def __init__(self, text: str, file: str, line_name: Callable[[int], str], n: int) -> None:
+        self.n = n
+        self.formulas = PythonFormulas(text)
+        self.file = file
+        self.line_name = line_name
+        self.program = Program()
+        self.effects = Effects()
+        self.statements = 0
+
+    def read(self, tree: ast.Module) -> Program:
+        self.effects.own |= {spelled(name) for name in bound_names(tree.body)}
+        self._block(tree.body, self.program.main)
+        for scope in self.program.functions:
+            self._changes_outside(scope)
+        return self.program
+
+    def _line(self, node: ast.stmt | ast.expr) -> str:
+        return self.line_name(node.lineno)
+
+    def _bind(self, scope: Scope, name: str, node: ast.stmt | ast.expr, value: Value) -> None:
+        self.program.bind(scope, spelled(name), self._line(node), value)
+
+    def _not_understood(self, scope: Scope, names: Iterable[str], node: ast.stmt | ast.expr, what: str) -> None:
+        for name in names:
+            reason = f"{spelled(name)[:40]} is changed by {what} in {self._line(node)}"
+            self._bind(scope, name, node, NotUnderstood(reason))
+
+    def _changes_outside(self, scope: Scope) -> None:
+        """Take what a function changes of the program's matrices to the program."""
+        for name, bindings in list(scope.bindings.items()):
+            whole = [b for b in bindings if b.index is None and not isinstance(b.value, NotUnderstood)]
+            if whole or not bindings or name == "return":
+                continue
+            outer = scope.outer
+            for binding in bindings:
+                reason = f"{name} is changed inside a function, in {binding.line}"
+                value = binding.value if isinstance(binding.value, NotUnderstood) else NotUnderstood(reason)
+                if outer is not None and (binding.index is not None or isinstance(binding.value, NotUnderstood)):
+                    self.program.bind(outer, name, binding.line, value)
+
+    # Statements
+
+    def _block(self, statements: Sequence[ast.stmt], scope: Scope) -> None:
+        for statement in statements:
+            self.statements += 1
+            if self.statements > MAX_STATEMENTS:
+                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            self._side_effects(statement, scope)
+            self._statement(statement, scope)
+
+    def _side_effects(self, statement: ast.stmt, scope: Scope) -> None:
+        """Note what the calls of a statement may change."""
+        found = self.effects.of(statement)
+        if found.anything:
+            what = self._line(found.anything)
+            raise AnswerError(
+                f"{self.file}: {what}: found {self._shown(found.anything)}, which may change any name; "
+                "a program is read, not run"
+            )
+        for name, node in found.changed.items():
+            reason = f"{spelled(name)[:40]} may be changed by {self._shown(node)} in {self._line(node)}"
+            self.program.bind(scope, spelled(name), self._line(node), NotUnderstood(reason, only_matrices=True))
+        if not isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            self._not_understood(scope, found.walrus, statement, ":=")
+
+    def _shown(self, node: ast.expr) -> str:
+        return repr(self.formulas.segment(node)[:40])
+
+    def _statement(self, statement: ast.stmt, scope: Scope) -> None:
+        match statement:
+            case ast.Expr() | ast.Pass() | ast.Assert() | ast.Raise() | ast.Return() | ast.Global() | ast.Nonlocal():
+                return
+            case ast.Assign(targets, value):
+                for target in targets:
+                    self._assign(target, value, statement, scope, shared=len(targets) > 1)
+            case ast.AnnAssign(target, _, value):
+                if value is not None:
+                    self._assign(target, value, statement, scope)
+            case ast.AugAssign():
+                self._augmented(statement, scope)
+            case ast.Import() | ast.ImportFrom():
+                self._imported(statement, scope)
+            case ast.FunctionDef() if scope is self.program.main:
+                self._function(
+                    statement.name, statement.args, statement.body, statement, bool(statement.decorator_list)
+                )
+            case ast.ClassDef():
+                self._not_understood(scope, [statement.name], statement, "a class of this name")
+                self._not_understood(scope, _globals(statement.body), statement, "'global'")
+                if scope is self.program.main and any(isinstance(x, ast.FunctionDef) for x in statement.body):
+                    self.program.left_out.append(f"{self._line(statement)}: class {statement.name[:40]}")
+            case _:
+                names = bound_names([statement])
+                kind = {"FunctionDef": "a function of this name", "Delete": "'del'"}.get(type(statement).__name__)
+                self._not_understood(scope, names, statement, kind or f"{type(statement).__name__.lower()!r}")
+
+    # Assignments
+
+    def _assign(
+        self, target: ast.expr, value: ast.expr, statement: ast.stmt, scope: Scope, shared: bool = False
+    ) -> None:
+        match target:
+            case ast.Name(name):
+                self._assign_name(name, value, statement, scope)
+                if shared and not isinstance(value, ast.Constant):
+                    self.effects.alias(name, [other for t in getattr(statement, "targets", []) for other in _names(t)])
+            case ast.Tuple(elements) | ast.List(elements):
+                self._assign_several(elements, value, statement, scope)
+            case ast.Subscript(ast.Name(name), index):
+                self._assign_entry(name, [index], value, statement, scope)
+            case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
+                self._assign_entry(name, [first, second], value, statement, scope)
+            case _:
+                self._not_understood(scope, bound_names([statement]), statement, "an assignment to a part of it")
+
+    def _assign_name(self, name: str, value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
+        if self._is_same(name, value):
+            return
+        self.effects.alias(name, self.effects.parts(value))
+        if isinstance(value, ast.Lambda) and scope is self.program.main:
+            self._function(name, value.args, value.body, statement, False)
+            return
+        found = self._symbols(value)
+        if found is not None:
+            if len(found) == 1:
+                self._bind(scope, name, statement, Symbol(found[0]))
+            else:
+                entries = {(k,): Formula(plain_name(symbol)) for k, symbol in enumerate(found)}
+                self._bind(scope, name, statement, Formula(f"[{', '.join(found)}]", entries=entries))
+            return
+        if isinstance(value, ast.Name) and value.id in FUNCTION_NAMES and len(value.id) > 1:
+            if value.id not in self.effects.own or value.id in self.effects.imported:
+                self._bind(scope, name, statement, FunctionNamed(value.id))
+                return
+        if isinstance(value, ast.Attribute) and isinstance(value.value, ast.Name) and value.attr in FUNCTION_NAMES:
+            if value.value.id in self.effects.modules and len(value.attr) > 1:
+                self._bind(scope, name, statement, FunctionNamed(value.attr))
+                return
+        self._bind(scope, name, statement, self.formulas.formula(value))
+
+    def _is_same(self, name: str, value: ast.expr) -> bool:
+        """Whether a value is the name itself, simplified, or as an array."""
+        formula = self.formulas.formula(value)
+        inner = value
+        while isinstance(inner, ast.Call):
+            called = inner.func.id if isinstance(inner.func, ast.Name) else getattr(inner.func, "attr", "")
+            is_module = isinstance(inner.func, ast.Name) or (
+                isinstance(inner.func, ast.Attribute)
+                and isinstance(inner.func.value, ast.Name)
+                and inner.func.value.id in self.effects.modules
+            )
+            if (
+                called in ("flatten", "ravel", "squeeze", "copy")
+                and not inner.args
+                and isinstance(inner.func, ast.Attribute)
+            ):
+                inner = inner.func.value
+                continue
+            if (
+                called not in VECTORS
+                or not is_module
+                or len(inner.args) != 1
+                or called in self.effects.own - self.effects.imported
+            ):
+                break
+            inner = inner.args[0]
+        if isinstance(inner, ast.Name) and spelled(inner.id) == spelled(name):
+            return True
+        reads = [read for read in formula.reads if read.use is Use.VALUE]
+        return formula.text == name and len(reads) == 1 and not formula.problem and formula.entries is None
+
+    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
+        names = [target.id for target in targets if isinstance(target, ast.Name)]
+        everything = bound_names([statement])
+        if len(names) != len(targets):
+            self._not_understood(scope, everything, statement, "an unpacking that is not read")
+            return
+        found = self._symbols(value)
+        if found is not None and len(found) == len(names):
+            for name, symbol in zip(names, found, strict=True):
+                self._bind(scope, name, statement, Symbol(symbol))
+            return
+        match value:
+            case ast.Tuple(values) | ast.List(values) if len(values) == len(names) and not _starred(values):
+                self._assign_pairwise(names, values, statement, scope)
+                return
+            case ast.Call(ast.Attribute(ast.Name(module), "broadcast_arrays"), values) if (
+                len(values) == len(names) and module in self.effects.modules
+            ):
+                self._assign_pairwise(names, values, statement, scope)
+                return
+            case ast.Name(vector) if found is None and len(names) == self.n:
+                for k, name in enumerate(names):
+                    text = f"{spelled(vector)}[{k}]"
+                    entry = Formula(text, (Read(spelled(vector), 0, len(text), (k,)),))
+                    self._bind(scope, name, statement, entry)
+                return
+        self._not_understood(scope, everything, statement, "an unpacking that is not read")
+
+    def _assign_pairwise(
+        self, names: Sequence[str], values: Sequence[ast.expr], statement: ast.stmt, scope: Scope
+    ) -> None:
+        """Bind several names at once: what is read on the right was bound before."""
+        place = self.program.place
+        for name, value in zip(names, values, strict=True):
+            self.program.place = place
+            self._assign_name(name, value, statement, scope)
+        self.program.place = place + 1
+
+    def _assign_entry(
+        self,
+        name: str,
+        indices: Sequence[ast.expr],
+        value: ast.expr,
+        statement: ast.stmt,
+        scope: Scope,
+        is_added: bool = False,
+    ) -> None:
+        numbers = [constant_index(index) for index in indices]
+        formula = self.formulas.formula(value)
+        self._alias_changed(name, statement, scope)
+        self.effects.alias(name, self.effects.parts(value) if not isinstance(value, ast.Subscript) else ())
+        if any(index is None for index in numbers) or formula.is_matrix:
+            self._not_understood(scope, [name], statement, "an assignment to a part of it")
+            return
+        index = tuple(k for part in numbers if part is not None for k in part)
+        self.program.bind(scope, spelled(name), self._line(statement), formula, index, is_added)
+
+    def _alias_changed(self, name: str, statement: ast.stmt, scope: Scope) -> None:
+        """Note that other names of a matrix change with it."""
+        for other in self.effects.others(name):
+            reason = f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {self._line(statement)}"
+            self._bind(scope, other, statement, NotUnderstood(reason, only_matrices=True))
+
+    def _augmented(self, statement: ast.AugAssign, scope: Scope) -> None:
+        match statement.target:
+            case ast.Subscript(ast.Name(name), index) if isinstance(statement.op, ast.Add):
+                self._assign_entry(name, [index], statement.value, statement, scope, is_added=True)
+            case _:
+                names = bound_names([statement])
+                for name in names:
+                    self._alias_changed(name, statement, scope)
+                    reason = f"{spelled(name)[:40]} is changed after it is assigned, in {self._line(statement)}"
+                    self._bind(scope, name, statement, NotUnderstood(reason))
+
+    def _symbols(self, value: ast.expr) -> list[str] | None:
+        """Return the names of symbols('q1 q2'), Symbol('m1'), Function('q1')(t) and dynamicsymbols('q1', 1)."""
+        if not isinstance(value, ast.Call):
+            return None
+        function = value.func
+        if isinstance(function, ast.Call):
+            inner = self._symbol_call(function, frozenset(("Function",)))
+            of_time = len(value.args) == 1 and isinstance(value.args[0], ast.Name) and value.args[0].id == "t"
+            return inner if inner is not None and of_time and not value.keywords else None
+        found = self._symbol_call(value, SYMBOL_CALLS)
+        if found is None or len(value.args) == 1:
+            return found
+        order = value.args[1].value if len(value.args) == 2 and isinstance(value.args[1], ast.Constant) else None
+        called = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+        if called != "dynamicsymbols" or order not in (0, 1, 2):
+            return None
+        return found if order == 0 else [dotted(plain_name(name), ("dot", "ddot")[int(order) - 1]) for name in found]
+
+    def _symbol_call(self, call: ast.Call, names: frozenset[str]) -> list[str] | None:
+        match call:
+            case ast.Call(ast.Name(name), [ast.Constant(str(text)), *_]) if name in names:
+                if name in self.effects.own - self.effects.imported:
+                    return None
+            case ast.Call(ast.Attribute(_, name), [ast.Constant(str(text)), *_]) if name in names:
+                base = call.func.value if isinstance(call.func, ast.Attribute) else None
+                while isinstance(base, ast.Attribute):
+                    base = base.value
+                if not isinstance(base, ast.Name) or base.id not in self.effects.modules:
+                    return None
+            case _:
+                return None
+        found: list[str] = []
+        for piece in re.split(r"[\s,]+", text.strip().strip(",")):
+            span = re.fullmatch(r"(\w*?)\(?(\d*):(\d+)\)?", piece)
+            if span and int(span[3][:6]) <= MAX_SYMBOLS:
+                found += [f"{span[1]}{k}" for k in range(int(span[2] or 0), int(span[3]))]
+            else:
+                found.append(piece)
+        return found if found and all(re.fullmatch(r"[\w\\{}]+", name) for name in found) else None
+
+    # Imports
+
+    def _imported(self, statement: ast.Import | ast.ImportFrom, scope: Scope) -> None:
+        if isinstance(statement, ast.Import):
+            for alias in statement.names:
+                name = alias.asname or alias.name.split(".")[0]
+                module = alias.name if alias.asname else alias.name.split(".")[0]
+                known = module in MODULES
+                if known:
+                    self.effects.modules.add(name)
+                value = (
+                    ModuleNamed(module)
+                    if known
+                    else NotUnderstood(f"{name[:40]} is the module {module[:40]} since {self._line(statement)}")
+                )
+                self._bind(scope, name, statement, value)
+            return
+        module = statement.module or "."
+        for alias in statement.names:
+            name = alias.asname or alias.name
+            if alias.name == "*":
+                self._star(module, statement)
+            elif module == "sympy.abc":
+                self._bind(scope, name, statement, Symbol(alias.name))
+            elif module in MODULES or module in ("sympy.functions", "sympy.core"):
+                self.effects.imported.add(name)
+                if alias.name == "pi":
+                    self._bind(scope, name, statement, Symbol("pi"))
+                else:
+                    self._bind(scope, name, statement, FunctionNamed(alias.name))
+            elif f"{module}.{alias.name}" in MODULES:
+                self.effects.modules.add(name)
+                self._bind(scope, name, statement, ModuleNamed(f"{module}.{alias.name}"))
+            else:
+                reason = f"{name[:40]} comes from {module[:40]} in {self._line(statement)}"
+                self._bind(scope, name, statement, NotUnderstood(reason))
+
+    def _star(self, module: str, statement: ast.ImportFrom) -> None:
+        """Take the names of a known module for what they are; those assigned before may be replaced by it."""
+        if module not in MODULES or module == "sympy.abc":
+            raise AnswerError(
+                f"{self.file}: {self._line(statement)}: found 'from {module[:40]} import *', which may change any name; "
+                "expected numpy, sympy or math"
+            )
+        main = self.program.main
+        for name, bindings in list(main.bindings.items()):
+            is_exported = name in LATER if len(name) == 1 else not any(c.isdigit() for c in name)
+            if is_exported and name not in ("tau", "KE", "PE", "Tau", "Jac"):
+                if any(isinstance(b.value, Formula | Symbol) for b in bindings):
+                    self._not_understood(main, [name], statement, f"'from {module} import *'")
+
+    # Functions
+
+    def _function(
+        self,
+        name: str,
+        arguments: ast.arguments,
+        body: Sequence[ast.stmt] | ast.expr,
+        statement: ast.stmt,
+        is_decorated: bool,
+    ) -> None:
+        main = self.program.main
+        self._bind(main, name, statement, FunctionNamed(""))
+        scope = Scope(outer=main)
+        self.program.functions.append(scope)
+        for argument in [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]:
+            own = argument.arg in ("self", "cls")
+            value: Value = Symbol(spelled(argument.arg), is_argument=True)
+            if own:
+                value = NotUnderstood(f"{argument.arg} is an object, in {self._line(statement)}")
+            self._bind(scope, argument.arg, statement, value)
+        for rest in (arguments.vararg, arguments.kwarg):
+            if rest is not None:
+                self._not_understood(scope, [rest.arg], statement, "'*'")
+        if isinstance(body, ast.expr):
+            self._side_effects(ast.copy_location(ast.Expr(body), body), scope)
+            self._returned(name, body, statement, scope)
+            return
+        global_names = _globals(body)
+        self._not_understood(main, global_names, statement, "'global' in a function")
+        *before, last = body
+        returns = [x for s in before for x in ast.walk(s) if isinstance(x, ast.Return | ast.Yield | ast.YieldFrom)]
+        self._block(body, scope)
+        for name_ in global_names:
+            scope.bindings.pop(spelled(name_), None)
+        if is_decorated or returns or not isinstance(last, ast.Return) or last.value is None:
+            if isinstance(last, ast.Return) or returns:
+                reason = "a decorator" if is_decorated else "several 'return'" if returns else "'return'"
+                where = self._line(returns[0] if returns and isinstance(returns[0], ast.stmt) else statement)
+                value = NotUnderstood(f"{name} has {reason}, in {where}")
+                self.program.bind(scope, "return", self._line(statement), value)
+                scope.returned.append(Returned(name, "return"))
+            return
+        self._returned(name, last.value, last, scope)
+
+    def _returned(self, name: str, value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
+        """Note what a function returns: local names, or a formula."""
+        values = value.elts if isinstance(value, ast.Tuple) else [value]
+        locals_ = [self._local(x, scope) for x in values]
+        if all(locals_):
+            scope.returned += [Returned(name, local, is_only=len(values) == 1) for local in locals_]
+            return
+        self.program.bind(scope, "return", self._line(statement), self.formulas.formula(value))
+        scope.returned.append(Returned(name, "return"))
+
+    def _local(self, value: ast.expr, scope: Scope) -> str:
+        """Return the local name that a value is, as it is or as an array; nothing for another value."""
+        while True:
+            match value:
+                case ast.Name(name):
+                    return spelled(name) if spelled(name) in scope.bindings else ""
+                case ast.Subscript(inner, ast.Tuple([])):
+                    value = inner
+                case ast.Call(ast.Name(function), [inner]) if function in VECTORS and not value.keywords:
+                    value = inner
+                case ast.Call(ast.Attribute(ast.Name(module), function), [inner]) if (
+                    module in self.effects.modules and function in (*VECTORS, "simplify")
+                ):
+                    value = inner
+                case ast.Call(ast.Name("simplify"), [inner]) if (
+                    "simplify" not in self.effects.own - self.effects.imported
+                ):
+                    value = inner
+                case _:
+                    return ""
+
+
+def _globals(statements: Sequence[ast.stmt]) -> list[str]:
+    return [
+        name
+        for statement in statements
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Global | ast.Nonlocal)
+        for name in node.names
+    ]
+
+
+def _names(target: ast.expr) -> list[str]:
+    return [x.id for x in ast.walk(target) if isinstance(x, ast.Name)]
+
+
+def _starred(nodes: Sequence[ast.expr]) -> bool:
+    return any(isinstance(node, ast.Starred) for node in nodes)

@@ -1,0 +1,442 @@
+r"""Statements of formulas, ``M_{12} = M_{21} = f``, in LaTeX and in plain text: rows that go on, chains, systems."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from dhkit.grading.answers.latex import is_latex
+from dhkit.grading.answers.latex_rows import Row, rows_of
+from dhkit.grading.answers.sheet import ALIASES
+from dhkit.grading.answers.vocabulary import plain_name
+
+__all__ = ["STARTS", "STARTS_WITH_RELATION", "Statement", "has_relation", "latex_statements", "left_hand_name", "statements_of"]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Names and formulas that are said to be equal.
+
+    Attributes
+    ----------
+    line
+        From 1, where it begins.
+    targets
+        Names on its sides, without marks of typesetting and without arguments: M12, tau1, g, theta1.
+    formulas
+        The other sides, in order, as typed.
+    problem
+        Why it cannot be read; empty where it can.
+    text
+        The whole, for messages.
+    """
+
+    line: int
+    targets: tuple[str, ...]
+    formulas: tuple[str, ...]
+    problem: str = ""
+    text: str = ""
+
+
+def statements_of(text: str, suffix: str = ".tex") -> list[Statement]:
+    """Return the statements of an answer's entry, or of lines of ``name = formula``.
+
+    Parameters
+    ----------
+    text
+        LaTeX with or without environments, or plain text as programs and `dhkit equations` write it.
+    suffix
+        ``.tex`` of LaTeX; of other suffixes, text without a backslash or a brace is plain.
+
+    Returns
+    -------
+    list
+        One without targets where the text is a formula alone.
+    """
+    if is_latex(text):
+        return list(latex_statements(text, 1))
+    if suffix == ".tex" and "&" in text:
+        return list(latex_statements(text, 1))
+    return list(_plain_statements(text))
+
+
+# LaTeX
+
+EQUAL = re.compile(
+    r":=|=:|=(?!=)|\\(?:equiv|approx|coloneqq|triangleq|doteq|simeq|cong|eqqcolon|colonequals)(?![A-Za-z])"
+    r"|\\(?:stackrel|overset)\{[^{}]*\}\{=\}"
+)
+OTHER_RELATIONS = re.compile(
+    r"\\(?:neq|ne|leq|le|geq|ge|ll|gg|in|subset|propto|sim|to|rightarrow|mapsto|succ|prec|perp|mid|pm|mp)(?![A-Za-z])"
+    r"|[<>]"
+)
+THEREFORE = re.compile(
+    r"\\(?:Rightarrow|implies|iff|Leftrightarrow|therefore|Longrightarrow|because|land|wedge|and)(?![A-Za-z])"
+)
+WORDS = re.compile(
+    r"\\(?:text|textrm|mbox|textit|textbf|intertext|shortintertext|textnormal)\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
+)
+DROPPED = re.compile(
+    r"\\(?:label|tag\*?|ref|eqref|cite|vspace\*?|hspace\*?|phantom|vphantom|hphantom|color|textcolor)\s*\{[^{}]*\}"
+    r"|\\(?:nonumber|notag|IEEEnonumber|IEEEyesnumber|yesnumber|displaystyle|textstyle|allowbreak|centering|noindent|hfill|smallskip|medskip|bigskip)(?![A-Za-z])"
+)
+SPACE = r"(?:\s|~|\\[,;:!> ]|\\q?quad(?![A-Za-z])|\\(?:enspace|thinspace|space)(?![A-Za-z])|\{\})"
+LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;.])")
+TRAILING = (
+    *(
+        "\\,",
+        "\\;",
+        "\\:",
+        "\\!",
+        "\\>",
+        "\\ ",
+        "\\quad",
+        "\\qquad",
+        "\\enspace",
+        "\\thinspace",
+        "\\space",
+        "\\therefore",
+    ),
+    *("{}", " ", "\t", "\n", "~", ",", ";", "."),
+)
+"""What stands behind a formula and is no part of it."""
+STARTS = re.compile(
+    rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_=']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast|equiv|approx|coloneqq|simeq)(?![A-Za-z])"
+    r"|\\bigr|\\Bigr|\\biggr|\\Biggr|:=)"
+)
+STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:=|:=|\\(?:equiv|approx|coloneqq|simeq)(?![A-Za-z]))")
+ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
+PIECE = re.compile(
+    r"\\begin\s*\{(\w+)\*?\}|\\end\s*\{(\w+)\*?\}|\\(left|right)(?![A-Za-z])\s*(?:\\?.)?|\\[{}]|\\.|[(){}\[\]]",
+    re.DOTALL,
+)
+OPENS, CLOSES = ("(", "[", "{"), (")", "]", "}")
+
+
+def latex_statements(text: str, line: int) -> Iterator[Statement]:
+    """Yield the statements of one display: rows that go on belong together.
+
+    Parameters
+    ----------
+    text
+        The inside of a display, environments and all, without comments.
+    line
+        Its first line.
+    """
+    held: list[Row] = []
+    problem, depth = "", 0
+    for row in rows_of(text, line):
+        plain = re.sub(r"\s+", " ", _without_words(row.text))
+        if not _bare(plain):
+            continue
+        row = replace(row, text=plain)
+        goes_on = bool(held) and _goes_on(held[-1].text, depth, row)
+        if goes_on and _is_ambiguous(row):
+            problem = "a row that begins with a sign and has an = of its own"
+        if held and not goes_on:
+            if not has_relation(plain) and not _ends_statement(held[-1].text):
+                problem = problem or "a row that neither begins with an operator nor has an ="
+            else:
+                yield from _statements_in(held, problem)
+                held, problem, depth = [], "", 0
+        held.append(row)
+        depth += _depth(plain)
+    if held:
+        yield from _statements_in(held, problem)
+
+
+def _without_words(text: str) -> str:
+    """Take labels and words away; words between formulas part them."""
+    text = DROPPED.sub(" ", text)
+
+    def worded(match: re.Match[str]) -> str:
+        inside = match[1].strip()
+        joins = re.fullmatch(r"[A-Za-z]{1,3}\d*", inside) and not inside.lower() in ("and", "or", "for", "if", "as")
+        return match[0] if joins else r" \quad\therefore "
+
+    return WORDS.sub(worded, text)
+
+
+def _bare(text: str) -> str:
+    """Return text without the spaces and punctuation at its ends."""
+    start, end = 0, len(text)
+    while match := LEADING.match(text, start, end):
+        start = match.end()
+    while end > start:
+        found = next((mark for mark in TRAILING if text.endswith(mark, start, end)), "")
+        is_part = found in (",", ";", ".", ":", "!", ">") and text.endswith(("\\left.", "\\right."), start, end)
+        if not found or is_part:
+            break
+        end -= len(found)
+    return text[start:end]
+
+
+def _goes_on(last: str, depth: int, row: Row) -> bool:
+    if STARTS.match(row.text) and not (row.before and has_relation(row.text)):
+        return True
+    return depth > 0 or ENDS.search(last[-200:]) is not None
+
+
+def _is_ambiguous(row: Row) -> bool:
+    """Whether a row may go on or be a statement of its own: - b = c."""
+    return (
+        STARTS.match(row.text) is not None
+        and not STARTS_WITH_RELATION.match(row.text)
+        and not row.after_mark
+        and has_relation(row.text)
+    )
+
+
+def _ends_statement(text: str) -> bool:
+    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-200:]) is not None
+
+
+def _depth(text: str) -> int:
+    """Return how many brackets are open at the end of a text."""
+    depth = 0
+    for match in PIECE.finditer(text):
+        piece = match[0]
+        if match[1] or match[3] == "left" or piece in OPENS or piece == r"\{":
+            depth += 1
+        elif match[2] or match[3] == "right" or piece in CLOSES or piece == r"\}":
+            depth -= 1
+    return depth
+
+
+def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
+    """Return where a pattern stands outside all brackets and environments."""
+    depth = 0
+    found: list[tuple[int, int]] = []
+    nested = [(m.start(), m.end(), m) for m in PIECE.finditer(text)]
+    k = 0
+    for match in pattern.finditer(text):
+        while k < len(nested) and nested[k][0] < match.start():
+            piece = nested[k][2]
+            if piece[1] or piece[3] == "left" or piece[0] in OPENS or piece[0] == r"\{":
+                depth += 1
+            elif piece[2] or piece[3] == "right" or piece[0] in CLOSES or piece[0] == r"\}":
+                depth -= 1
+            k += 1
+        if depth == 0:
+            found.append(match.span())
+    return found
+
+
+def has_relation(text: str) -> bool:
+    """Whether an = stands in a text outside all brackets."""
+    return bool(_places(text, EQUAL))
+
+
+def _statements_in(held: Sequence[Row], problem: str) -> Iterator[Statement]:
+    """Yield the statements of rows that belong together: parted by words, arrows, and commas between equations."""
+    line, text = held[0].line, re.sub(r"\s+", " ", " ".join(row.text for row in held))
+    for piece in _parted(text):
+        bare = _bare(piece)
+        if bare:
+            yield _statement(bare, line, problem)
+
+
+def _parted(text: str) -> Iterator[str]:
+    pieces = _split(text, _places(text, THEREFORE))
+    for piece in pieces:
+        commas = _places(piece, re.compile(r"(?<!\\)[,;]"))
+        parts = _split(piece, commas)
+        joined = [parts[0]]
+        for part in parts[1:]:
+            if has_relation(part) and has_relation(joined[-1]) and not STARTS_WITH_RELATION.match(part):
+                joined.append(part)
+            elif not _bare(part):
+                continue
+            else:
+                joined[-1] += "," + part
+        yield from joined
+
+
+def _split(text: str, places: Sequence[tuple[int, int]]) -> list[str]:
+    pieces, at = [], 0
+    for start, end in places:
+        pieces.append(text[at:start])
+        at = end
+    return [*pieces, text[at:]]
+
+
+def _statement(text: str, line: int, problem: str) -> Statement:
+    sides = [_bare(side) for side in _split(text, _places(text, EQUAL))]
+    if _depth(text) != 0:
+        problem = problem or "brackets that do not close"
+    if len(sides) > 1 and _places(text, OTHER_RELATIONS):
+        problem = problem or "another relation than ="
+    if len(sides) == 1:
+        return Statement(line, (), (sides[0],), problem, text)
+    if not all(sides):
+        problem = problem or "an = with nothing on one side"
+    targets = [left_hand_name(side) for side in sides]
+    if not targets[0]:
+        return Statement(line, (), tuple(sides), problem, text)
+    return _sorted(line, sides, targets, problem, text)
+
+
+def _sorted(line: int, sides: Sequence[str], names: Sequence[str], problem: str, text: str) -> Statement:
+    """Tell the names that a statement is about from its formulas: M12 = M21 = f is about both, V = a = f about V."""
+    last = len(sides) - 1
+    about = [k < last and _is_also(name, names[0]) for k, name in enumerate(names)]
+    targets = tuple(dict.fromkeys(name for name, is_target in zip(names, about, strict=True) if is_target))
+    formulas = tuple(side for side, is_target in zip(sides, about, strict=True) if not is_target)
+    return Statement(line, targets, formulas, problem, text)
+
+
+def _is_also(name: str, first: str) -> bool:
+    """Whether a name is that of another entry, or another name of the quantity."""
+    if not name or name == first:
+        return bool(name)
+    letters = name.rstrip("0123456789_")
+    return letters == first.rstrip("0123456789_") or (name in QUANTITIES and first in QUANTITIES)
+
+
+LONGEST_NAME = 200
+"""Characters of a side that may be a name."""
+QUANTITIES = frozenset(("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", *ALIASES))
+STYLES = re.compile(
+    r"\\(?:mathbf|mathrm|mathit|mathsf|mathcal|mathscr|boldsymbol|bm|textbf|textrm|text|vec|operatorname|mathnormal|pmb|bf|rm)(?![A-Za-z])"
+)
+NAME = re.compile(
+    r"\[?(?P<letters>\\?[A-Za-z]+)\]?(?:_(?:(?P<one>[A-Za-z0-9])|\{(?P<below>[\\A-Za-z0-9, ]*)\}))?", re.ASCII
+)
+ARGUMENT = re.compile(
+    r"(?:\\d?dot|dot)?\{?(?:q|\\theta|\\vartheta|\\phi|\\varphi|\\Theta|theta|phi|x|y|z|t|d|r|qd|dq|qdd|th|qdot)\}?"
+    r"(?:_\{?\d*\}?|\d*)(?:\(t\))?",
+    re.ASCII,
+)
+
+
+def left_hand_name(side: str) -> str:
+    r"""Return the name that a side is, with arguments such as (q, \dot q) left out; empty where it is none.
+
+    ``M_{12}(q)`` is M12, ``\mathbf{g}(\theta)`` g, ``M_{10,2}`` M10_2; ``\dot V``, ``V'`` and ``M^{-1}`` are no names.
+    """
+    if len(side) > LONGEST_NAME:
+        return ""
+    text = re.sub(r"\\(?:left|right|bigl?|bigr|Bigl?|Bigr)(?![A-Za-z])", "", side)
+    text = re.sub(rf"{SPACE}+", " ", text)
+    while True:
+        opened = STYLES.sub("", text).strip()
+        opened = re.sub(r"^\{\s*([^{}]*?)\s*\}", r"\1", opened) if opened.startswith("{") else opened
+        if opened == text:
+            break
+        text = opened
+    text = re.sub(r"\s+", "", re.sub(r"\{\s*(\\?[A-Za-z]+)\s*\}", r"{\1}", text))
+    match = NAME.match(text)
+    if match is None or (text.startswith("[") != text[: match.end()].count("]")):
+        return ""
+    letters = match["letters"]
+    if letters.startswith("\\") and plain_name(letters) not in _GREEK:
+        return ""
+    below = match["one"] or match["below"] or ""
+    rest = text[match.end() :]
+    if rest.startswith("("):
+        inside, closes, behind = rest[1:].partition(")")
+        while inside.count("(") > inside.count(")"):
+            more, closes, behind = behind.partition(")")
+            inside += ")" + more
+            if not closes:
+                return ""
+        arguments = inside.split(",")
+        if not closes:
+            return ""
+        if all(argument.isdecimal() for argument in arguments) and not below:
+            below = ",".join(arguments)
+        elif not all(ARGUMENT.fullmatch(argument) for argument in arguments):
+            return ""
+        rest = behind
+    if rest and not below and (under := re.fullmatch(r"_(?:(\w)|\{([\w,]*)\})", rest)):
+        below, rest = under[1] or under[2], ""
+    if rest:
+        return ""
+    below = below.replace("\\", "")
+    is_pair = re.fullmatch(r"(\d+),(\d+)", below)
+    if is_pair:
+        one_digit = len(is_pair[1]) == len(is_pair[2]) == 1
+        below = is_pair[1] + ("" if one_digit else "_") + is_pair[2]
+    return plain_name(letters) + below.replace(",", "")
+
+
+_GREEK = frozenset(
+    ("alpha", "beta", "gamma", "delta", "epsilon", "varepsilon", "zeta", "eta", "theta", "vartheta", "iota", "kappa")
+    + ("lambda", "mu", "nu", "xi", "rho", "varrho", "sigma", "tau", "upsilon", "phi", "varphi", "chi", "psi", "omega")
+    + ("Gamma", "Delta", "Theta", "Lambda", "Xi", "Sigma", "Upsilon", "Phi", "Psi", "Omega", "ell", "Tau", "mathbf")
+)
+
+
+# Plain text
+
+
+def _plain_statements(text: str) -> Iterator[Statement]:
+    """Yield the statements of plain text: one a line, or between semicolons outside brackets."""
+    line, start, depth = 1, 1, 0
+    piece: list[str] = []
+    for character in f"{text}\n":
+        depth += (character in "([{") - (character in ")]}")
+        if depth <= 0 and (character in "\n;"):
+            whole = "".join(piece).strip()
+            if whole:
+                yield from _plain_line(whole, start)
+            piece = []
+            line += character == "\n"
+            start = line
+            continue
+        line += character == "\n"
+        piece.append(" " if character == "\n" else character)
+    whole = "".join(piece).strip()
+    if whole:
+        yield Statement(start, (), (whole,), "brackets that do not close", whole)
+
+
+def _plain_line(text: str, line: int) -> Iterator[Statement]:
+    text = re.sub(r"^where\s+", "", text)
+    parts = [text]
+    pieces = _plain_split(text, ",")
+    if len(pieces) > 1 and all(len(_plain_split(piece, "=")) > 1 for piece in pieces):
+        parts = pieces
+    for part in parts:
+        sides = [side.strip() for side in _plain_split(part, "=")]
+        if len(sides) == 1:
+            yield Statement(line, (), (sides[0],), "", part)
+            continue
+        problem = "" if all(sides) else "an = with nothing on one side"
+        names = [_plain_target(side) for side in sides]
+        if re.search(r"[<>~!]|[-+*/]=", part):
+            problem = "another relation than ="
+        if not names[0]:
+            yield Statement(line, (), tuple(sides), problem, part)
+            continue
+        yield _sorted(line, sides, names, problem, part)
+
+
+def _plain_split(text: str, sign: str) -> list[str]:
+    pieces: list[list[str]] = [[]]
+    depth = 0
+    for character in text:
+        depth += (character in "([{") - (character in ")]}")
+        if depth == 0 and character == sign:
+            pieces.append([])
+        else:
+            pieces[-1].append(character)
+    return ["".join(piece) for piece in pieces]
+
+
+def _plain_target(side: str) -> str:
+    match = re.fullmatch(r"([A-Za-z]\w*)\s*(?:\(([^()]*)\)|\[(\d+)\]\[(\d+)\]|\[([\d,\s]+)\])?", side, re.ASCII)
+    if match is None:
+        return ""
+    name, arguments, i, j, inside = match.groups()
+    if arguments is not None:
+        parts = [part.strip() for part in arguments.split(",")]
+        if all(part.isdecimal() for part in parts):
+            return name + "_".join(parts)
+        usual = all(re.fullmatch(r"(?:d|dd)?(?:q|th|theta|t|x)(?:d|dd|dot|ddot)?\d*", part) for part in parts)
+        return name if usual else ""
+    if i is not None or inside is not None:
+        numbers = [i, j] if i is not None else inside.split(",")
+        return name + "_".join(str(int(k) + 1) for k in numbers if k.strip())
+    return name

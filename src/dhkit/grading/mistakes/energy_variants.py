@@ -1,0 +1,232 @@
+"""Mistakes that change a link's energies, or a rotor's, and through them all equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from fractions import Fraction
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+
+from dhkit.description import Convention, Description
+from dhkit.errors import DhkitError
+from dhkit.grading.judging.truth import Truth
+from dhkit.grading.mistakes.variants import Change, Variant
+from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
+from dhkit.symbolic.ring import Element, Elements, translated
+from dhkit.symbolic.textbook import LinkMotion, TextbookDerivation, derive
+
+__all__ = ["energy_variants"]
+
+HALF = Fraction(1, 2)
+SHAPES = {
+    "disc_for_rod": (6,),
+    "rod_about_end": (4,),
+    "point_mass_for_rod": (12, 9),
+    "sphere_for_rod": (Fraction(24, 5),),
+    "inertia_quarter_for_rod": (3,),
+    "rod_with_half_length": (Fraction(1, 4),),
+}
+"""What m l^2/12 about the centre is multiplied by: m l^2/2, m l^2/3, m l^2 about the centre and about the end, ..."""
+EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
+
+
+def energy_variants(truth: Truth) -> Iterator[Variant]:
+    """Yield the mistakes that change energies: those made throughout before those made at one link."""
+    textbook = derive(truth.description)
+    yield from _textbook(textbook)
+    yield from _shapes(textbook)
+    yield from _drives(textbook)
+    yield from _slides(textbook)
+    yield from _tables(textbook)
+
+
+def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
+    """Yield the mistakes that the textbook's derivation knows."""
+    n = textbook.arm.n
+    names = [name for name in MISTAKES if name in LINK_MISTAKES | ROTOR_MISTAKES]
+    for name in names:
+        yield Variant(MadeAt(name), _derived(textbook, MadeAt(name)))
+    for name in names:
+        for i in range(1, n + 1) if n > 1 else ():
+            yield Variant(MadeAt(name, i), _derived(textbook, MadeAt(name, i)), f"link {i}")
+
+
+def _derived(textbook: TextbookDerivation, made: MadeAt) -> Callable[[str], Elements]:
+    def change() -> Change:
+        wrong = derive(textbook.arm.description, {made}, textbook.arm.symbols)
+        return Change(wrong.K - textbook.K, wrong.V - textbook.V)
+
+    return _lazily(change)
+
+
+def _lazily(change: Callable[[], Change]) -> Callable[[str], Elements]:
+    """Return what a change adds to a quantity; the change is made once."""
+    made: list[Change] = []
+
+    def make(quantity: str) -> Elements:
+        if not made:
+            made.append(change())
+        return made[0].of(quantity)
+
+    return make
+
+
+# Shapes of bodies
+
+
+def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
+    """Yield the inertia of another body, or of another point, at all links alike or at one."""
+    n = textbook.arm.n
+    rods = [i for i in range(n) if _is_rod(textbook, i)]
+    for identity, factors in SHAPES.items():
+        for factor in factors:
+            yield from _scaled_inertia(textbook, identity, Fraction(factor), rods)
+    yield from _scaled_inertia(textbook, "inertia_halved", HALF, range(n))
+    for i in range(n):
+        for a, b in EXCHANGED_AXES:
+            place = f"link {i + 1}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
+            change = partial(_exchanged_moments, textbook, i, a, b)
+            yield Variant(MadeAt("inertia_moments_exchanged", i + 1), _lazily(change), place, 1)
+
+
+def _scaled_inertia(
+    textbook: TextbookDerivation, identity: str, factor: Fraction, links: Iterable[int]
+) -> Iterator[Variant]:
+    listed = list(links)
+    if len(listed) > 1:
+        yield Variant(MadeAt(identity), _lazily(partial(_more_inertia, textbook, listed, factor - 1)), rarity=1)
+    for i in listed:
+        place = f"link {i + 1}" if textbook.arm.n > 1 else ""
+        yield Variant(MadeAt(identity, i + 1), _lazily(partial(_more_inertia, textbook, [i], factor - 1)), place, 1)
+
+
+def _is_rod(textbook: TextbookDerivation, i: int) -> bool:
+    """Whether a link's inertia is m l^2/12 of a rod whose centre of mass is half its length from the frame."""
+    body = textbook.arm.bodies[i]
+    square = body.com @ body.com
+    moment = body.mass * square * 4
+    return bool(square) and any((body.inertia[k, k] * 12 - moment).is_zero for k in range(3))
+
+
+def _more_inertia(textbook: TextbookDerivation, links: Iterable[int], share: Fraction) -> Change:
+    ring = textbook.arm.ring
+    energies = [
+        textbook.links[i].omega @ textbook.arm.bodies[i].inertia @ textbook.links[i].omega * HALF * share for i in links
+    ]
+    return Change(ring.sum(energies), ring.zero)
+
+
+def _exchanged_moments(textbook: TextbookDerivation, i: int, a: int, b: int) -> Change:
+    tensor, omega = textbook.arm.bodies[i].inertia, textbook.links[i].omega
+    order = list(range(3))
+    order[a], order[b] = b, a
+    moments = tensor.diagonal()
+    difference = moments[order] - moments
+    ring = textbook.arm.ring
+    return Change(ring.sum(omega[k] * omega[k] * difference[k] * HALF for k in range(3)), ring.zero)
+
+
+# Drives
+
+
+def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
+    arm = textbook.arm
+    for i, j in combinations(range(arm.n), 2):
+        if arm.rotor[i] or arm.rotor[j]:
+            place = f"joints {i + 1} and {j + 1}"
+            yield Variant(MadeAt("drives_exchanged"), _lazily(partial(_exchanged_drives, textbook, i, j)), place, 1)
+    driven = [i for i in range(arm.n) if arm.rotor[i] and _inverse(arm.gear[i]) is not None]
+    if driven:
+        yield Variant(MadeAt("gear_inverted"), _lazily(partial(_inverted_gears, textbook, driven)), rarity=1)
+    for i in driven if arm.n > 1 else ():
+        made = MadeAt("gear_inverted", i + 1)
+        yield Variant(made, _lazily(partial(_inverted_gears, textbook, [i])), f"joint {i + 1}", 1)
+
+
+def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
+    arm = textbook.arm
+    difference = arm.armature[j] - arm.armature[i]
+    squares = [arm.ring.rate(k) * arm.ring.rate(k) for k in (i, j)]
+    return Change(difference * (squares[0] - squares[1]) * HALF, arm.ring.zero)
+
+
+def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Change:
+    arm, energies = textbook.arm, []
+    for i in joints:
+        inverse = _inverse(arm.gear[i])
+        if inverse is not None:
+            rate = arm.ring.rate(i)
+            energies.append(arm.rotor[i] * (inverse * inverse - arm.gear[i] * arm.gear[i]) * rate * rate * HALF)
+    return Change(arm.ring.sum(energies), arm.ring.zero)
+
+
+def _inverse(gear: Element) -> Element | None:
+    """Return one over a gear ratio that is a number."""
+    terms = gear.terms
+    if len(terms) != 1 or any(any(monomial) for monomial in terms):
+        return None
+    return gear.ring.number(1 / next(iter(terms.values())))
+
+
+# Positions
+
+
+def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
+    """Yield positions of links that lack the variable of one sliding joint."""
+    ring = textbook.arm.ring
+    for k in range(ring.n):
+        if ring.kinds[k] == "R":
+            continue
+        for i in range(k, ring.n):
+            place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
+            change = partial(_without_slide, textbook, textbook.links[i], i, k)
+            yield Variant(MadeAt("slide_forgotten", i + 1), _lazily(change), place, 1)
+
+
+def _without_slide(textbook: TextbookDerivation, link: LinkMotion, i: int, k: int) -> Change:
+    """Take a slide for fixed at zero where a link's centre of mass is placed; it may still turn with its joints."""
+    arm, ring = textbook.arm, textbook.arm.ring
+    place = np.array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in link.com], dtype=object)
+    velocity = np.array([x.by_time() for x in place], dtype=object)
+    mass = arm.bodies[i].mass
+    K = mass * (velocity @ velocity - link.velocity @ link.velocity) * HALF
+    V = -mass * (arm.gravity @ (place - link.com))
+    return Change(K, V)
+
+
+# The table behind the dynamics
+
+
+def _tables(textbook: TextbookDerivation) -> Iterator[Variant]:
+    description = textbook.arm.description
+    standard = description.convention is Convention.STANDARD
+    other = replace(description, convention=Convention.MODIFIED if standard else Convention.STANDARD)
+    yield Variant(MadeAt("convention_in_dynamics"), _lazily(partial(_of_description, textbook, other)), rarity=1)
+    turned = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
+    for links in ([turned] if len(turned) > 1 else []) + [[i] for i in turned]:
+        made = MadeAt("twist_sign_in_dynamics", links[0] + 1 if len(links) == 1 else None)
+        place = f"row {links[0] + 1}" if len(links) == 1 else ""
+        wrong = _with_twists_turned(description, links)
+        yield Variant(made, _lazily(partial(_of_description, textbook, wrong)), place, 1)
+
+
+def _with_twists_turned(description: Description, links: Iterable[int]) -> Description:
+    changed = set(links)
+    joints = tuple(
+        replace(joint, alpha=-joint.alpha) if i in changed else joint for i, joint in enumerate(description.joints)
+    )
+    return replace(description, joints=joints)
+
+
+def _of_description(textbook: TextbookDerivation, description: Description) -> Change:
+    """Return by how much the energies of another description differ; nothing where its ring has other constants."""
+    ring = textbook.arm.ring
+    try:
+        wrong = derive(description, symbols=textbook.arm.symbols)
+        K, V = translated(wrong.K, ring, {}), translated(wrong.V, ring, {})
+    except (KeyError, DhkitError):
+        return Change(ring.zero, ring.zero)
+    return Change(K - textbook.K, V - textbook.V)

@@ -1,0 +1,313 @@
+"""Mistakes in Euler and Lagrange's equation, in what is done with right energies, and in coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from functools import partial
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from dhkit.grading.judging.coordinates import Coordinates
+from dhkit.grading.judging.truth import DYNAMICS, Truth
+from dhkit.grading.mistakes.variants import Make, Variant, changed_only, nothing, right, translated_array
+from dhkit.symbolic import ExactArm, Lagrangian
+from dhkit.symbolic.exact.compact import parallel_runs
+from dhkit.symbolic.mistakes import MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt
+from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
+from dhkit.symbolic.textbook import TextbookDerivation, derive, scaled, velocity_torques
+
+__all__ = ["equation_variants", "lagrangian_sum"]
+
+
+def equation_variants(truth: Truth) -> Iterator[Variant]:
+    """Yield the mistakes that leave the energies right."""
+    yield from _signs(truth)
+    yield from _steps(truth)
+    yield from _gravity_torques(truth)
+    yield from _matrices(truth)
+    yield from _sums_of_angles(truth)
+    yield from _other_coordinates(truth)
+    yield from _zero_poses(truth)
+    yield from _friction(truth) if truth.friction else ()
+
+
+def lagrangian_sum(truth: Truth) -> Variant:
+    """Return the Lagrangian as the sum of energies: of L alone likelier than a sign of gravity."""
+    lag = truth.lagrangian
+    return Variant(MadeAt("lagrangian_sum"), _of_one(lag, "L", lambda: element_array(2 * lag.V)))
+
+
+def _signs(truth: Truth) -> Iterator[Variant]:
+    """Yield what is wrong with whole parts of the equation: their sign, or that they are missing."""
+    lag = truth.lagrangian
+    yield Variant(MadeAt("velocity_torques_sign"), changed_only(lag, "h", lambda: -2 * lag.h))
+    yield Variant(MadeAt("velocity_torques_missing"), _of_one(lag, "tau", lambda: -lag.h))
+    yield Variant(MadeAt("gravity_torques_missing"), _of_one(lag, "tau", lambda: -lag.g))
+    yield Variant(MadeAt("gravity_torque_sign"), _of_one(lag, "tau", lambda: -2 * lag.g))
+    yield Variant(MadeAt("inertial_torques_missing"), _of_one(lag, "tau", lambda: lag.h + lag.g - lag.tau), rarity=1)
+    if not truth.coordinates.is_relative:
+        yield Variant(MadeAt("motor_torques"), _motor_torques(truth))
+
+
+def _of_one(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Make:
+    """Return what adds to one quantity alone."""
+    return lambda quantity: change() if quantity == changed else nothing(lag, quantity)
+
+
+# Steps of Euler and Lagrange's equation
+
+
+def _steps(truth: Truth) -> Iterator[Variant]:
+    """Yield the mistakes that change h or g alone."""
+    lag, n = truth.lagrangian, truth.description.n
+    momenta = element_array([lag.K.by_rate(i) for i in range(n)])
+    yield Variant(MadeAt("potential_gradient_sign"), changed_only(lag, "g", lambda: -2 * lag.g))
+    for name in MISTAKES:
+        if name in STEP_FACTORS or name in VELOCITY_FACTORS:
+            yield Variant(MadeAt(name), _velocity_change(truth, momenta, name))
+    yield Variant(MadeAt("rate_of_cosine_sign"), changed_only(lag, "h", lambda: _mass_rate(lag, momenta) * -2))
+    yield Variant(MadeAt("chain_rule_forgotten"), changed_only(lag, "h", lambda: _without_chain_rule(lag, momenta)))
+
+
+def _mass_rate(lag: Lagrangian, momenta: Elements) -> Elements:
+    """Return dM/dt qd."""
+    ring = lag.arm.ring
+    return element_array([ring.sum(p.by_position(k) * ring.rate(k) for k in range(ring.n)) for p in momenta])
+
+
+def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
+    """Return what changes where d/dt of cos(q) is taken for -sin(q), without q's rate."""
+    ring = lag.arm.ring
+    bare = element_array([ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta])
+    return bare - _mass_rate(lag, momenta)  # type: ignore[no-any-return]
+
+
+def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
+    lag = truth.lagrangian
+    wrong = partial(velocity_torques, lag.arm.ring, lag.K, momenta, frozenset({MadeAt(name)}))
+    if name not in VELOCITY_FACTORS or truth.coordinates.is_relative:
+        return changed_only(lag, "h", lambda: wrong() - lag.h)
+    return changed_only(lag, "h", lambda: _scaled_in_y(truth, *VELOCITY_FACTORS[name]))
+
+
+def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
+    """Return what changes, in the robot's torques, where products of the student's own rates have another factor."""
+    ring, coordinates, n = truth.lagrangian.arm.ring, truth.coordinates, truth.description.n
+    rates = element_array([ring.rate(i) for i in range(n)])
+    in_y = {ring.place("rate", i): rate for i, rate in enumerate(coordinates.B @ rates)}
+    back = {ring.place("rate", i): rate for i, rate in enumerate(coordinates.S @ rates)}
+    torques = translated_array(truth.of("h"), in_y)
+    changed = element_array([scaled(torque, squares, factor) for torque in torques])
+    return coordinates.S.T @ (translated_array(changed, back) - truth.of("h"))  # type: ignore[no-any-return]
+
+
+def _gravity_torques(truth: Truth) -> Iterator[Variant]:
+    """Yield gravity torques whose heights are right, and whose angles are then the joints' own."""
+    textbook = derive(truth.description)
+    for i in range(1, truth.description.n):
+        if truth.description.kinds[i] == "R":
+            made = MadeAt("gravity_torque_relative_angle", i + 1)
+            change = partial(_own_angle_change, textbook, i)
+            yield Variant(made, changed_only(truth.lagrangian, "g", change), f"link {i + 1}")
+
+
+def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
+    """Return what changes where the torques of link i, from its joint on, do not see the joints before it turn."""
+    arm, link = textbook.arm, textbook.links[i]
+    ring = arm.ring
+    joint = textbook.links[i - 1].origin if arm.is_standard else link.origin
+    height = -arm.bodies[i].mass * (arm.gravity @ (link.com - joint))
+    torques = element_array([height.by_position(j) for j in range(ring.n)])
+    still: dict[int, Element] = {}
+    for j in range(i):
+        if j in ring.angles:
+            still |= {ring.place("cosine", j): ring.one, ring.place("sine", j): ring.zero}
+    return translated_array(torques, still) - torques
+
+
+# What is done with matrices that are right
+
+
+def _matrices(truth: Truth) -> Iterator[Variant]:
+    lag, n = truth.lagrangian, truth.description.n
+    rates = element_array([lag.arm.ring.rate(i) for i in range(n)])
+    if n > 1:
+        yield Variant(MadeAt("coriolis_transposed"), changed_only(lag, "h", lambda: lag.C.T @ rates - lag.h))
+    for i, j in combinations(range(n), 2):
+        place = f"joints {i + 1} and {j + 1}"
+        yield Variant(MadeAt("centrifugal_index"), _rates_exchanged(lag, i, j), place)
+        yield Variant(MadeAt("equations_exchanged"), _equations_exchanged(lag, i, j), place, 2)
+
+
+def _motor_torques(truth: Truth) -> Make:
+    """Return what changes where torques stay the motors' though the angles are absolute."""
+    lag = truth.lagrangian
+
+    def make(quantity: str) -> Elements:
+        value = right(lag, quantity)
+        return truth.coordinates.S.T @ value - value if value.ndim == 1 else value * 0
+
+    return make
+
+
+def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
+    def make(quantity: str) -> Elements:
+        value = right(lag, quantity)
+        if not value.ndim:
+            return nothing(lag, quantity)
+        order = list(range(lag.n))
+        order[i], order[j] = j, i
+        return value[order] - value
+
+    return make
+
+
+def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
+    """Exchange the squares of two rates in h."""
+    ring = lag.arm.ring
+    a, b = ring.place("rate", i), ring.place("rate", j)
+
+    def exchanged(torque: Element) -> Element:
+        terms: dict[tuple[int, ...], Fraction] = {}
+        for monomial, coefficient in torque.terms.items():
+            powers = list(monomial)
+            if max(powers[a], powers[b]) == 2:
+                powers[a], powers[b] = powers[b], powers[a]
+            terms[tuple(powers)] = terms.get(tuple(powers), Fraction(0)) + coefficient
+        return ring.from_terms(terms)
+
+    return changed_only(lag, "h", lambda: element_array([exchanged(x) for x in lag.h]) - lag.h)
+
+
+# Sums of angles
+
+
+def _sums_of_angles(truth: Truth) -> Iterator[Variant]:
+    """Yield wrong formulas for the sines and cosines of sums, wherever such a sum stands."""
+    lag = truth.lagrangian
+    runs = [run for run in parallel_runs(lag.arm) if len(run) > 1]
+    if not runs:
+        return
+    for identity, formula in (
+        ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
+        ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x + c * y)),
+        ("sum_formula_sign", lambda c, s, x, y: (c * x - s * y, s * x - c * y)),
+        ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x - c * y)),
+        ("angle_difference", lambda c, s, x, y: (c * x + s * y, c * y - s * x)),
+    ):
+        yield Variant(MadeAt(identity), partial(_with_sums, lag, formula), rarity=1)
+
+
+def _with_sums(
+    lag: Lagrangian, formula: Callable[[Element, Element, Element, Element], tuple[Element, Element]], quantity: str
+) -> Elements:
+    """Return what changes where sines and cosines of sums are worked out by another formula."""
+    ring = lag.arm.ring
+    value = right(lag, quantity)
+    written = _in_sums(lag.arm, value)
+    changed = np.empty(value.shape, dtype=object)
+    for place, element in np.ndenumerate(written):
+        wrong: dict[int, Element] = {}
+        for sine, cosine, joints in element.ring.turning:
+            c, s = ring.cosine(joints[0]), ring.sine(joints[0])
+            for joint in joints[1:]:
+                c, s = formula(c, s, ring.cosine(joint), ring.sine(joint))
+            wrong |= {sine: s, cosine: c}
+        changed[place] = translated(element, ring, wrong) - value[place]
+    return changed
+
+
+def _in_sums(arm: ExactArm, array: Elements) -> Elements:
+    """Return elements with a sine and a cosine of their own for the angles of parallel axes, counted from the first."""
+    angles = {joint: run[: k + 1] for run in parallel_runs(arm) for k, joint in enumerate(run)}
+    ring = Ring(arm.ring.kinds, arm.ring.given, angles)
+    turned: dict[int, Element] = {}
+    for run in parallel_runs(arm):
+        for before, joint in pairwise(run):
+            c, s = ring.cosine(joint), ring.sine(joint)
+            x, y = ring.cosine(before), ring.sine(before)
+            turned[arm.ring.place("cosine", joint)] = c * x + s * y
+            turned[arm.ring.place("sine", joint)] = s * x - c * y
+    written = np.empty(array.shape, dtype=object)
+    for place, element in np.ndenumerate(array):
+        written[place] = translated(element, ring, turned)
+    return written
+
+
+# Coordinates
+
+
+def _other_coordinates(truth: Truth) -> Iterator[Variant]:
+    """Yield answers in relative angles that were declared absolute, and the other way round."""
+    arm = truth.lagrangian.arm
+    absolute = Coordinates.absolute(arm)
+    if absolute.is_relative:
+        return
+    if truth.coordinates.is_relative:
+        yield Variant(MadeAt("absolute_for_relative"), partial(_declared, truth, absolute, absolute.B), rarity=1)
+    else:
+        relative = Coordinates.relative(arm.n)
+        yield Variant(MadeAt("relative_for_absolute"), partial(_declared, truth, relative, absolute.S), rarity=1)
+
+
+def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str) -> Elements:
+    """Return what changes where an answer in other coordinates is read in the declared ones.
+
+    The answer is right in ``meant``; its variables are read as ``matrix`` times the robot's.
+    """
+    lag = truth.lagrangian
+    ring, n = lag.arm.ring, lag.n
+    answer = element_array(meant.in_y(quantity, right(lag, quantity)))
+    places: dict[int, Element] = {}
+    for i in range(n):
+        for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
+            places[ring.place(kind, i)] = ring.sum(generator(j) * int(matrix[i, j]) for j in range(n) if matrix[i, j])
+        if i in ring.angles:
+            c, s = ring.one, ring.zero
+            for j in range(n):
+                for _ in range(abs(int(matrix[i, j]))):
+                    x, y = ring.cosine(j), ring.sine(j) * (1 if matrix[i, j] > 0 else -1)
+                    c, s = c * x - s * y, s * x + c * y
+            places |= {ring.place("cosine", i): c, ring.place("sine", i): s}
+    wrong = translated_array(answer, places)
+    change = element_array(wrong - element_array(truth.coordinates.in_y(quantity, right(lag, quantity))))
+    return _in_robots(truth.coordinates, quantity, change)
+
+
+def _in_robots(coordinates: Coordinates, quantity: str, change: Elements) -> Elements:
+    """Return what a change in the declared coordinates is in the robot's own."""
+    if coordinates.is_relative or quantity not in DYNAMICS:
+        return change
+    if quantity in ("M", "C"):
+        return coordinates.S.T @ change @ coordinates.S  # type: ignore[no-any-return]
+    return coordinates.S.T @ change if change.ndim == 1 else change  # type: ignore[no-any-return]
+
+
+def _zero_poses(truth: Truth) -> Iterator[Variant]:
+    """Yield zero poses that are a quarter turn off, and sines and cosines exchanged."""
+    lag = truth.lagrangian
+    for i in lag.arm.ring.angles:
+        for identity, sign in (("zero_shifted", 1), ("zero_shifted_back", -1)):
+            yield Variant(MadeAt(identity, i + 1), _shifted(lag, i, sign), f"joint {i + 1}", 1)
+
+
+def _shifted(lag: Lagrangian, i: int, sign: int) -> Make:
+    ring = lag.arm.ring
+    turned = {ring.place("cosine", i): ring.sine(i) * -sign, ring.place("sine", i): ring.cosine(i) * sign}
+    return lambda quantity: translated_array(right(lag, quantity), turned) - right(lag, quantity)
+
+
+# Friction
+
+
+def _friction(truth: Truth) -> Iterator[Variant]:
+    lag = truth.lagrangian
+    arm = lag.arm
+    yield Variant(MadeAt("friction_forgotten"), changed_only(lag, "tau", lambda: truth.viscous * -1))
+    yield Variant(MadeAt("friction_sign"), changed_only(lag, "tau", lambda: truth.viscous * -2))
+    for power in (0, 1):
+        torques = element_array([arm.gear[i] ** power * arm.viscous[i] * arm.ring.rate(i) for i in range(arm.n)])
+        change = partial(np.subtract, torques, truth.viscous)
+        yield Variant(MadeAt("friction_gear"), changed_only(lag, "tau", change))

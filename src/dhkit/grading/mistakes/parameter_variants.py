@@ -1,0 +1,110 @@
+"""Parameters that are forgotten, doubled, halved, taken for another, exchanged, or in millimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations, permutations
+
+from dhkit.description import INERTIA_PLACES, Description
+from dhkit.expressions import Expression
+from dhkit.grading.judging.truth import Truth
+from dhkit.grading.mistakes.library import PARAMETER_FACTORS
+from dhkit.grading.mistakes.variants import Make, Variant, right, translated_array
+from dhkit.symbolic import Lagrangian
+from dhkit.symbolic.mistakes import MadeAt
+from dhkit.symbolic.ring import Element, Ring
+
+__all__ = ["parameter_variants"]
+
+MILLIMETRES = 1000
+
+
+def parameter_variants(truth: Truth) -> Iterator[Variant]:
+    """Yield what goes wrong with the file's parameters."""
+    lag = truth.lagrangian
+    ring = lag.arm.ring
+    symbols = [name for name in lag.arm.parameters if name in ring.constants and _is_free(ring, name)]
+    kinds = _kinds(truth.description)
+    yield from _factors(lag, symbols)
+    yield from _millimetres(lag, [name for name in symbols if kinds.get(name) == "length"])
+    alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
+    for first, second in alike:
+        swapped = {first: ring.constant(second), second: ring.constant(first)}
+        place = f"{first} and {second}"
+        yield Variant(MadeAt("parameters_exchanged"), _replaced(lag, swapped), place, 1)
+    for first, second in permutations(symbols, 2):
+        if (first, second) in alike or (second, first) in alike:
+            made = MadeAt("parameter_for_another")
+            yield Variant(made, _replaced(lag, {first: ring.constant(second)}), f"{second} for {first}", 1)
+    for i, j in combinations(range(1, truth.description.n + 1), 2):
+        pairs = [(x, y) for x in symbols for y in symbols if _swaps(x, y, i, j)]
+        if len(pairs) > 1:
+            swapped = {a: ring.constant(b) for x, y in pairs for a, b in ((x, y), (y, x))}
+            yield Variant(MadeAt("links_exchanged"), _replaced(lag, swapped), f"links {i} and {j}", 1)
+
+
+def _factors(lag: Lagrangian, symbols: list[str]) -> Iterator[Variant]:
+    ring = lag.arm.ring
+    for identity, factor in PARAMETER_FACTORS.items():
+        rarity = 1 if factor > 0 else 2
+        for name in symbols:
+            yield Variant(MadeAt(identity), _replaced(lag, {name: ring.constant(name) * factor}), name, rarity)
+
+
+def _millimetres(lag: Lagrangian, lengths: list[str]) -> Iterator[Variant]:
+    ring = lag.arm.ring
+    groups = [lengths] if len(lengths) > 1 else []
+    for names in (*groups, *([name] for name in lengths)):
+        values = {name: ring.constant(name) * MILLIMETRES for name in names}
+        place = names[0] if len(names) == 1 else ""
+        yield Variant(MadeAt("millimetres_for_metres"), _replaced(lag, values), place, 2)
+
+
+def _kinds(description: Description) -> dict[str, str]:
+    """Return which parameters are lengths, masses, inertias or gears, by where the file uses them first."""
+    found: dict[str, str] = {}
+
+    def note(kind: str, *expressions: Expression) -> None:
+        for expression in expressions:
+            for name in expression.symbols:
+                found.setdefault(name, kind)
+
+    for joint in description.joints:
+        if joint.body is not None:
+            note("mass", joint.body.mass)
+        if joint.drive is not None:
+            note("gear", joint.drive.gear)
+            note("rotor", joint.drive.rotor_inertia)
+            note("friction", joint.drive.viscous)
+        note("length", joint.a, joint.d)
+    note("length", *description.tool.placement.xyz)
+    bodies = [joint.body for joint in description.joints if joint.body is not None]
+    for body in bodies:
+        note("length", *body.com)
+    for body in bodies:
+        note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
+    return found
+
+
+def _are_alike(first: str, second: str, kinds: Mapping[str, str]) -> bool:
+    """Whether one parameter may stand in another's place by a slip: of the same kind, or of the same letters."""
+    return kinds.get(first, first) == kinds.get(second, second) or _letters(first) == _letters(second)
+
+
+def _swaps(first: str, second: str, i: int, j: int) -> bool:
+    letters = _letters(first)
+    return bool(letters) and first == f"{letters}{i}" and second == f"{letters}{j}"
+
+
+def _letters(name: str) -> str:
+    return name.rstrip("0123456789")
+
+
+def _is_free(ring: Ring, name: str) -> bool:
+    """Whether no other constant is written in a parameter, so that another may stand in its place."""
+    return not any(name in constant.symbols and constant.text != name for constant in ring.given)
+
+
+def _replaced(lag: Lagrangian, values: Mapping[str, Element]) -> Make:
+    places = {lag.arm.ring.place("constant", name): value for name, value in values.items()}
+    return lambda quantity: translated_array(right(lag, quantity), places) - right(lag, quantity)

@@ -1,0 +1,288 @@
+r"""Documents: rows that go on, chains, entries and systems are read as what they mean, and nothing as something else."""
+
+import subprocess
+import sys
+
+import pytest
+
+from dhkit.description import library_robot
+from dhkit.errors import AnswerError
+from dhkit.grading import grade
+from dhkit.grading.answers.sheet import Chain, Entries, Refusal
+from dhkit.grading.answers.sources import read_source
+from dhkit.grading.answers.statements import left_hand_name, statements_of
+
+ROBOT = library_robot("planar2r")
+V = r"\tfrac12 m_1 g l_1 s_1 + m_2 g (l_1 s_1 + \tfrac12 l_2 s_{12})"
+GRAVITY = [r"\tfrac12 m_1 g l_1 c_1", r"m_2 g l_1 c_1 + \tfrac12 m_2 g l_2 c_{12}"]
+
+
+@pytest.fixture
+def read(tmp_path):
+    def answers(text, robot=ROBOT):
+        (tmp_path / "a.tex").write_text(text)
+        return read_source(tmp_path / "a.tex", robot)
+
+    return answers
+
+
+@pytest.fixture
+def graded(tmp_path):
+    def verdicts(text, robot=ROBOT):
+        (tmp_path / "a.tex").write_text(text)
+        return grade(tmp_path / "a.tex", robot)
+
+    return verdicts
+
+
+def squeezed(text):
+    return "".join(text.replace(r"\qquad", "").replace(r"\quad", "").replace("{}", "").split())
+
+
+GOING_ON = [
+    r"\begin{align} V &= A \\ &\quad + B \end{align}",
+    r"\begin{align*} V &= A \\ &+ B \end{align*}",
+    r"\begin{align} V = {} & A \\ & {} + B \end{align}",
+    r"\begin{align} V &= A \nonumber \\ &\qquad + B \label{eq:v} \end{align}",
+    r"\begin{align} V &= A \tag{3} \\[2pt] &\phantom{=} + B. \end{align}",
+    r"\begin{align} V &= A + \\ &\quad B, \end{align}",
+    r"\begin{equation} \begin{split} V &= A \\ &+ B \end{split} \end{equation}",
+    r"\begin{equation} \begin{aligned} V &= A \\ &+ B \end{aligned} \end{equation}",
+    r"\[ \begin{aligned}[t] V &= A \\ &+ B \end{aligned} \]",
+    r"\[ V = \begin{aligned}[t] & A \\ & + B \end{aligned} \]",
+    r"\begin{multline} V = A \\ + B \end{multline}",
+    r"\begin{gather} V = A \\ + B \end{gather}",
+    r"\begin{equation} \begin{gathered} V = A \\ + B \end{gathered} \end{equation}",
+    r"\begin{eqnarray} V & = & A \nonumber \\ & & + B \end{eqnarray}",
+    r"\begin{eqnarray*} V & = & A \\ & + & B \end{eqnarray*}",
+    r"\begin{IEEEeqnarray}{rCl} V & = & A \IEEEnonumber \\ && + B \end{IEEEeqnarray}",
+    r"\begin{flalign} V &= A & \\ &+ B & \end{flalign}",
+    r"\begin{alignat}{2} V &= A \\ &+ B \end{alignat}",
+    r"\begin{dmath} V = A + B \end{dmath}",
+    "\\begin{align} V &= A % the first link\n \\\\ % the second\n &+ B \\end{align}",
+    "$$ V = A \n + B $$",
+    r"\( V = A + B \)",
+    r"$V = A + B$",
+    "V = A + B",
+    r"\begin{align} \intertext{The potential energy is} V &= A \\ &+ B \end{align}",
+    r"\begin{align} V &= A + B && \text{(potential energy)} \end{align}",
+    r"\begin{align} V &\equiv A + B \end{align}",
+    r"\begin{align} V &:= A + B \end{align}",
+    r"\begin{align} V(q) &= A + B, \quad \text{where } q = (q_1, q_2)^T \end{align}",
+]
+
+
+@pytest.mark.parametrize("text", GOING_ON)
+def test_rows_that_go_on_are_one_formula(read, text):
+    sheet = read(text.replace("A", "m_1 g").replace("B", "m_2 g"))
+    assert squeezed(sheet.answers["V"]) in ("m_1g+m_2g", r"\begin{aligned}[t]&m_1g\\&+m_2g\end{aligned}")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\begin{align} V &= \left( A \right. \\ &\quad \left. + B \right) \end{align}",
+        r"\begin{align} V &= \Bigl( A \\ &\quad + B \Bigr) \end{align}",
+        r"\begin{align} V &= \bigl[ A \\ & B \bigr] \end{align}",
+        r"\begin{align} V &= A \cdot \\ & B \end{align}",
+        r"\begin{align} V &= A \\ &\quad \times B \end{align}",
+        r"\begin{align} V &= A \\ &- B \end{align}",
+    ],
+)
+def test_no_row_is_lost(read, text):
+    answer = squeezed(read(text.replace("A", "m_1 g").replace("B", "m_2 g")).answers["V"])
+    assert "m_1g" in answer and "m_2g" in answer and "\\\\" not in answer
+
+
+def test_a_second_row_counts(graded):
+    first, second = r"\tfrac12 m_1 g l_1 s_1", r"m_2 g (l_1 s_1 + \tfrac12 l_2 s_{12})"
+    assert graded(rf"\begin{{align}} V &= {first} \\ &\quad + {second} \end{{align}}")
+    assert not graded(rf"\begin{{align}} V &= {first} \\ &\quad + 2 {second} \end{{align}}")
+    assert not graded(rf"\begin{{align}} V &= {V} \\ &\quad + {second} \end{{align}}")
+
+
+@pytest.mark.parametrize("sign", ["=", r"\equiv", r"\approx"])
+def test_a_chain_states_each_of_its_formulas(read, graded, sign):
+    assert read(rf"\begin{{align}} V &= A \\ &{sign} B \end{{align}}").answers["V"] == Chain(("A", "B"))
+    wrong = V.replace("s_1", "c_1")
+    assert graded(rf"\begin{{align}} V &= {V} \\ &{sign} {V} + 0 \end{{align}}")
+    for first, second in ((V, wrong), (wrong, V), (wrong, wrong)):
+        assert not graded(rf"\begin{{align}} V &= {first} \\ &{sign} {second} \end{{align}}")
+        assert not graded(rf"\[ V = {first} {sign} {second} \]")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\begin{align} M_{12} &= M_{21} = F \\ M_{11} &= 1 \\ M_{22} &= 2 \end{align}",
+        r"\[ M_{12} = M_{21} = F, \quad M_{11} = 1, \quad M_{22} = 2 \]",
+        r"$M_{11} = 1$, $M_{1,2} = F$, $M_{2,1} = M_{12}$ and $M_{22} = 2$",
+        r"\[ \begin{cases} M_{11} = 1 \\ M_{12} = M_{21} = F \\ M_{22} = 2 \end{cases} \]",
+        r"\[ \left\{ \begin{array}{l} M_{11} = 1 \\ M_{12} = M_{21} = F \\ M_{22} = 2 \end{array} \right. \]",
+        r"\begin{align} \mathbf{M}_{11}(q) &= 1 & M_{12}(q) &= M_{21}(q) = F & M_{22} &= 2 \end{align}",
+        r"\[ M(q) = \begin{bmatrix} M_{11} & M_{12} \\ M_{21} & M_{22} \end{bmatrix} \] \begin{align} M_{11} &= 1 \\"
+        r" M_{12} &= M_{21} = F \\ M_{22} &= 2 \end{align}",
+        r"\[ D_{11} = 1 \] \[ D_{12} = D_{21} = F \] \[ D_{22} = 2 \]",
+    ],
+)
+def test_names_on_several_sides_name_entries(read, text):
+    answer = read(text.replace("F", "m_1 g")).answers["M"]
+    assert isinstance(answer, Entries)
+    found = {index: text for index, text in answer.texts.items()}
+    assert (found[0, 0], found[1, 1]) == ("1", "2")
+    assert squeezed(found[0, 1]) == "m_1g"
+    assert squeezed(found[1, 0]) in ("m_1g", "M_{12}")
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        *(r"\dot V", r"\dot{V}", r"\ddot V", r"\delta V", r"\Delta V", "V'", r"V^{-1}", r"\partial V/\partial q", "V_1"),
+        *(r"\frac{\partial V}{\partial q_1}", r"\hat V", r"\bar{V}", r"\tilde V", "V_{tot}", r"V_{\text{link 1}}", "2V"),
+        *("-V", "V + K", r"\nabla V", "V(0)", "V(q_1 = 0)", r"\max V", "V^2", r"\int V", r"\langle V \rangle", "V dt"),
+        *(r"\mathrm{d}V", "dV", r"V^\star", r"V_{,1}", r"\lvert V \rvert", "V T", r"\sum V", r"\frac{dV}{dt}"),
+    ],
+)
+def test_what_is_not_V_is_not_read_as_V(read, left):
+    wrong, right = rf"\[ {left} = 3 \]", rf"\[ V = {V} \]"
+    assert read(f"{wrong} {right}").answers == read(f"{right} {wrong}").answers == {"V": V}
+    with pytest.raises(AnswerError, match="assigns no quantity"):
+        read(wrong)
+
+
+@pytest.mark.parametrize(
+    "left",
+    [r"\dot M", r"\hat{M}", "M^{-1}", "M_{link1}", r"\det M", r"M\ddot q", "M^T", r"M\dot q + C", "2M", r"\bar M", "M_c"],
+)
+def test_what_is_not_M_is_not_read_as_M(read, left):
+    matrix = r"\begin{bmatrix} 1 & 2 \\ 3 & 4 \end{bmatrix}"
+    assert set(read(rf"\[ {left} = {matrix} \] \[ V = {V} \]").answers) == {"V"}
+
+
+def test_products_of_matrices_are_left_out_and_told(read):
+    tau = r"\begin{bmatrix} \tau_1 \\ \tau_2 \end{bmatrix} = M \begin{bmatrix} \ddot q_1 \\ \ddot q_2 \end{bmatrix}"
+    sheet = read(rf"\[ {tau} \] \[ \tau = M \ddot q + g \] \[ V = {V} \]")
+    assert set(sheet.answers) == {"V"}
+    assert [told[:7] for told in sheet.left_out] == ["line 1:", "line 1:"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (r"\begin{gather} V = A \\ (B + C) \end{gather}", "neither begins with an operator"),
+        (r"\begin{gather} V = A \\ - B = C \end{gather}", "an = of its own"),
+        (r"\[ V = A \] \[ + B \]", "another display"),
+        (r"\[ V = A \] \[ = B \]", "another display"),
+        (r"\[ V = A > 0 \]", "another relation"),
+        (r"\[ V = A \neq 0 \]", "another relation"),
+        (r"\[ V = (A \]", "do not close"),
+        (r"\[ V = A \] \[ V = B \]", "assigned twice"),
+        (r"$V = A$ and $V = 2 A$", "assigned twice"),
+        (r"\[ V = \begin{cases} A & q_1 > 0 \\ B & q_1 < 0 \end{cases} \]", "row|relation"),
+        (r"\newcommand{\x}{A + B} \[ V = 2\x \]", "macro"),
+        (r"\def\x{m_1 g} \[ V = \x \]", "macro"),
+        (r"\newcommand{\x}[1]{#1^2} \[ V = \x{A} \]", "macro"),
+        (r"\renewcommand{\sin}{\cos} \renewcommand{\sin}{\tan} \[ V = \sin q_1 \]", "macro"),
+        (r"\let\sin\cos \[ V = \sin q_1 \]", "macro"),
+        (r"\DeclareMathOperator{\sin}{cos} \[ V = \sin q_1 \]", "macro"),
+        (r"\[ m_1 = 3 \] \[ V = m_1 g \]", "robot's own name"),
+        (r"\[ q_1 = \theta_2 \] \[ V = \sin q_1 \]", "robot's own name"),
+        (r"\[ q_1 = \theta_1 - \theta_2 \] \[ V = m_1 c_1 \]", "robot's own name"),
+        (r"\[ g = -9.81 \] \[ V = m_1 g \]", "robot's own name"),
+        (r"\[ a = m_1 \] \[ V = a g \] \[ a = m_2 \]", "assigned twice"),
+        (r"\[ a = b \] \[ b = a \] \[ V = a g \]", "defined by itself"),
+        (r"\[ a = m_1 = m_2 \] \[ V = a g \]", "several formulas"),
+    ],
+)
+def test_what_is_not_understood_refuses_the_answer_with_its_line(read, text, reason):
+    answer = read(f"\n{text}").answers["V"]
+    assert isinstance(answer, Refusal)
+    assert __import__("re").search(reason, answer.reason)
+    assert "line 2" in answer.reason
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        rf"\newcommand{{\qa}}{{q_1}} \[ V = {V} \]",
+        rf"\[ g = 9.81 \] \[ V = {V} \]",
+        rf"\[ g = 9.81\,\mathrm{{m/s^2}} \] $l_1 = 0.5~\text{{m}}$ \[ V = {V} \]",
+        rf"\[ V = {V} \] At $q_1 = 0$ and $q_2 = \pi$ the arm is folded, so $\dot V = 0$, $V(0) = 0$.",
+        rf"\[ q_1 = \theta_1 \] \[ V = {V} \]",
+        rf"\[ m_1 > 0 \] \[ q_1 \in [0, 2\pi) \] \[ V = {V} \]",
+        "\\begin{verbatim}\n$V = 3$\n\\end{verbatim}" + rf"\[ V = {V} \]",
+        "% $V = 3$\n" + rf"\[ V = {V} \]",
+        r"\iffalse $V = 3$ \fi" + rf"\[ V = {V} \]",
+        rf"\documentclass{{article}} \newcommand{{\x}}{{$V = 3$}} \begin{{document}} \[ V = {V} \] \end{{document}} $V = 3$",
+        rf"\[ c_{{12}} = \cos(q_1 + q_2), \quad s_1 = \sin q_1 \] \[ V = {V} \]",
+        rf"\[ V = {V.replace('l_1 s_1', 'y_1')} \] where $y_1 = l_1 \sin q_1$.",
+        r"\newcommand{\la}{l_1} \[ V = " + V.replace("l_1", r"\la") + r" \]",
+        rf"\[ K = T \] \[ T = \tfrac12 m_1 \dot q_1^2 \] \[ V = {V} \]",
+    ],
+)
+def test_what_changes_nothing_changes_no_verdict(graded, text):
+    entries = [entry for entry in graded(text).entries if entry.name == "V"]
+    assert entries and all(entry.verdict.value == "correct" for entry in entries)
+
+
+@pytest.mark.parametrize(
+    ("side", "name"),
+    [
+        (r"M_{12}", "M12"),
+        (r"M_{1,2}", "M12"),
+        (r"M_{10,2}", "M10_2"),
+        (r"\mathbf{M}(q)", "M"),
+        (r"\mathbf g(\theta)", "g"),
+        (r"h(q, \dot q)", "h"),
+        (r"C\left(q, \dot{q}\right)", "C"),
+        (r"\tau_1", "tau1"),
+        (r"\boldsymbol{\tau}", "tau"),
+        (r"\mathcal{L}", "L"),
+        (r"g_2(q_1, q_2)", "g2"),
+        (r"M(1,2)", "M12"),
+        (r"{\bf M}", "M"),
+        *((side, "") for side in (r"\dot V", "V'", "M^{-1}", "2M", "V + K", r"\frac{V}{2}", "", "V(q_1 + q_2)", "1")),
+    ],
+)
+def test_left_hand_sides(side, name):
+    assert left_hand_name(side) == name
+
+
+@pytest.mark.parametrize(
+    ("text", "targets", "formulas"),
+    [
+        (r"\tau_1 = m_1 g", ("tau1",), ("m_1 g",)),
+        ("tau1 = m1*g;", ("tau1",), ("m1*g",)),
+        ("G(q) = m1*g", ("G",), ("m1*g",)),
+        ("M12 = M21 = m1", ("M12", "M21"), ("m1",)),
+        ("m1*g*cos(q1)", (), ("m1*g*cos(q1)",)),
+        (r"\begin{aligned} V &= a \\ &+ b \end{aligned}", ("V",), (r"a + b",)),
+        (r"\begin{aligned} V &= a \\ &= b \end{aligned}", ("V",), ("a", "b")),
+        (r"\frac12 m_1", (), (r"\frac12 m_1",)),
+        ("V = a = b", ("V",), ("a", "b")),
+        ("V = U = b", ("V", "U"), ("b",)),
+        ("M[0][1] = a", ("M1_2",), ("a",)),
+        ("M(1,2) = a", ("M1_2",), ("a",)),
+    ],
+)
+def test_statements_of_one_entry(text, targets, formulas):
+    (statement,) = statements_of(text)
+    assert (statement.targets, statement.formulas, statement.problem) == (targets, formulas, "")
+
+
+def test_a_system_gives_several_statements():
+    found = statements_of(r"\begin{cases} \tau_1 = a \\ \tau_2 = b \end{cases}")
+    assert [(s.targets, s.formulas) for s in found] == [(("tau1",), ("a",)), (("tau2",), ("b",))]
+    found = statements_of("g1 = a\ng2 = b;\n")
+    assert [(s.line, s.targets, s.formulas) for s in found] == [(1, ("g1",), ("a",)), (2, ("g2",), ("b",))]
+
+
+@pytest.mark.parametrize("robot", ["planar2r", "polar_rp", "cobra600", "cart_pendulum"])
+def test_text_of_equations_is_statements(robot):
+    command = [sys.executable, "-m", "dhkit.cli", "equations", robot]
+    text = subprocess.run(command, capture_output=True, text=True, check=False).stdout  # noqa: S603
+    if not text:
+        pytest.skip("no command line")
+    names = {name for statement in statements_of(text, ".txt") for name in statement.targets}
+    assert {"M11", "M12", "M21", "M22", "C11", "g1"} <= names
+    assert not any(statement.problem for statement in statements_of(text, ".txt"))
