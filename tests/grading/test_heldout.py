@@ -122,6 +122,11 @@ def results(tmp_path_factory):
     return [judged(sheet, folder) for sheet in CORPUS if crc32(sheet["name"].encode()) % share == 0]
 
 
+def at_most(share, count):
+    """Return a share, or what two sheets are of a sixth of the corpus."""
+    return share if acceptance.ACCEPTING else max(share, 2 / count)
+
+
 def listed(found):
     return "\n".join(["", *(one if isinstance(one, str) else one.line for one in found)])
 
@@ -157,21 +162,26 @@ def test_no_entry_is_misjudged(results, law):
 def test_hardly_a_sheet_is_unreadable(results, law):
     unread = [one for one in results if one.verdict == "unreadable" and "unreadable" not in one.sheet["expected"]]
     law.size = len(results)
-    law.holds("share of sheets that are not read", len(unread) / len(results), 0.02, listed(unread))
+    law.holds(
+        "share of sheets that are not read", len(unread) / len(results), at_most(0.02, len(results)), listed(unread)
+    )
 
 
 def test_mistakes_are_named(results, law):
     wrong = single(results)
     unnamed = [one for one in wrong if not one.named]
     law.size = len(wrong)
-    law.holds("share of mistakes that are not named", len(unnamed) / len(wrong), 0.1, listed(unnamed))
+    law.holds(
+        "share of mistakes that are not named", len(unnamed) / len(wrong), at_most(0.1, len(wrong)), listed(unnamed)
+    )
 
 
 def test_the_names_are_right(results, law):
     named = [one for one in single(results) if one.named]
     other = [one for one in named if not one.named & set(one.label["accept"])]
     law.size = len(named)
-    law.holds("share of names that are another mistake's", len(other) / len(named), 0.02, listed(other))
+    required = at_most(0.02, len(named))
+    law.holds("share of names that are another mistake's", len(other) / len(named), required, listed(other))
 
 
 def test_no_right_formula_is_blamed(results, law):

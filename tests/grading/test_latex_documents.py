@@ -221,7 +221,7 @@ def test_what_is_not_understood_refuses_the_answer_with_its_line(read, text, rea
     ],
 )
 def test_what_changes_nothing_changes_no_verdict(graded, text):
-    entries = [entry for entry in graded(text).entries if entry.name == "V"]
+    entries = [entry for entry in graded(text).entries if entry.quantity == "V"]
     assert entries and all(entry.verdict.value == "correct" for entry in entries)
 
 

@@ -210,6 +210,7 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         centrifugal_halved="squares of rates have half their factor",
         centrifugal_doubled="squares of rates have twice their factor",
         velocity_torques_doubled="all terms with products of rates count twice",
+        velocity_torques_halved="all terms with products of rates count by half",
     ),
 )
 """Places where a derivation goes wrong, by identity; the more frequent first."""
@@ -233,6 +234,7 @@ STEP_FACTORS = {
     "kinetic_gradient_sign": (Fraction(1), Fraction(-1)),
     "christoffel_indices": (Fraction(0), Fraction(-1)),
     "velocity_torques_doubled": (Fraction(2), Fraction(2)),
+    "velocity_torques_halved": (HALF, HALF),
 }
 """Factors of dM/dt qd and of dK/dq in Euler and Lagrange's equation."""
 

@@ -123,7 +123,7 @@ class Corpus:
             return False
         label = {
             "mistake": mistake,
-            "accept": sorted({accept} if isinstance(accept, str) else set(accept)),
+            "accept": sorted({mistake, *([accept] if isinstance(accept, str) else accept)}),
             "entries": spoiled,
             "quantities": sorted({key for key in answers if any(entry.startswith(key) for entry in spoiled)}),
         }

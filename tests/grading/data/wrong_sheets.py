@@ -912,7 +912,7 @@ def _table(w, label, robot, convention, rows, accept):
     if name in {one["name"] for one in w.corpus.sheets}:
         name += "_2"
     w.corpus.raw(name, robot, ".toml", table_sheet(robot, convention, rows), ("wrong",),
-                 {"mistake": label, "accept": sorted(accept), "entries": [f"dh{i + 1}" for i in spoiled], "quantities": ["dh"]},
+                 {"mistake": label, "accept": sorted({label, *accept}), "entries": [f"dh{i + 1}" for i in spoiled], "quantities": ["dh"]},
                  "table")  # fmt: skip
 
 
@@ -1014,7 +1014,7 @@ def inverse(w):
         assert not closes(robot, branch), (robot, label)
         kind = w.corpus.turn("xik", ["python", "latex", "matlab"])
         w.corpus.raw(f"x_ik_{label}_{robot}", robot, ".toml", inverse_sheet(robot, [branch], kind), ("wrong",),
-                     {"mistake": label, "accept": sorted(accept), "entries": ["ik1"], "quantities": ["ik"]}, "ik_" + kind)  # fmt: skip
+                     {"mistake": label, "accept": sorted({label, *accept}), "entries": ["ik1"], "quantities": ["ik"]}, "ik_" + kind)  # fmt: skip
 
 
 def write(corpus):

@@ -253,6 +253,8 @@ class Definitions:
         if not isinstance(standing.library, FunctionNamed):
             raise _NotReadError(f"{read.name}(...) is called, and {read.name} is no function of a library")
         function = standing.library.name
+        if not function:
+            raise _NotReadError(f"{read.name}(...) is a function of this file, which is not read where it is called")
         if read.start == read.end:
             if function != read.name:
                 raise _NotReadError(f"{read.name} is {function}")
@@ -262,7 +264,7 @@ class Definitions:
         return None if FUNCTION_NAMES.get(read.name) == FUNCTION_NAMES[function] else function
 
     def _member(self, scope: Scope, owner: Scope | None, read: Read, standing: Standing) -> str:
-        if owner is not None and (standing.defined is not None or standing.entries):
+        if owner is None or standing.defined is not None or standing.entries:
             raise _NotReadError(f"{read.name}.{read.member} is not read")
         parameters = self.names.quantities.parameters
         meant = parameters.get(plain_name(read.member), "")

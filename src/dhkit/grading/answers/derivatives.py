@@ -87,6 +87,8 @@ def _of_power(base: Tree, exponent: Tree, at: int) -> Tree | None:
         raise AnswerError(f"a time derivative of a power with a changing exponent at position {at + 1}")
     if change is None:
         return None
+    if isinstance(exponent, Number) and exponent.value == 2:
+        return Product(((True, exponent), (True, base), (True, change)))
     lower = Power(base, Sum(((True, exponent), (False, _number(1, at)))), at)
     return Product(((True, exponent), (True, lower), (True, change)))
 

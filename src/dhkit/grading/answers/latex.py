@@ -35,6 +35,10 @@ SPACES = frozenset(
         "enspace",
         "space",
         "middle",
+        "it",
+        "rm",
+        "bf",
+        "sf",
     ]
 ) | {" ", "\n", "("[:0]}
 SIZES = frozenset(
@@ -101,6 +105,7 @@ GREEK = frozenset(
         "Omega",
     ]
 )
+OVER = "\\over"
 MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
 
 
@@ -160,7 +165,18 @@ class _Latex:
             if not self._next_is(closing):
                 fail(self.text, min(self.at, len(self.text) - 1), f"expected {closing!r}")
             self._skip()
-        return found
+        return self._over(found)
+
+    def _over(self, found: list[Token]) -> list[Token]:
+        r"""Read {a \over b} as \frac{a}{b}."""
+        places = [k for k, token in enumerate(found) if token.text == OVER]
+        if not places:
+            return found
+        if len(places) > 1:
+            fail(self.text, found[places[1]].at, "two \\over in one group")
+        at = found[places[0]].at
+        above, below = found[: places[0]], found[places[0] + 1 :]
+        return self._fraction(_in_brackets(above, at), _in_brackets(below, at), at)
 
     def _skip(self) -> None:
         piece = self._peek()
@@ -278,11 +294,9 @@ class _Latex:
         if name in SIZES:
             return self._delimiter(at)
         if name in FRACTIONS:
-            above, below = self._bracketed(at), self._bracketed(at)
-            if order := _order_by_time(below[1:-1]):
-                return self._derivative(above[1:-1], order, at)
-            self._refuse_mixed_number(above, below, at)
-            return [Token("sign", "(", at), *above, Token("sign", "/", at), *below, Token("sign", ")", at)]
+            return self._fraction(self._bracketed(at), self._bracketed(at), at)
+        if name == "over":
+            return [Token("sign", OVER, at)]
         if name == "sqrt":
             if self._next_is("["):
                 fail(self.text, at, "a root other than the square root")
@@ -305,6 +319,15 @@ class _Latex:
         if name in "{}":
             return [Token("sign", "(" if name == "{" else ")", at)]
         return fail(self.text, at, f"the macro \\{name}, which is not read,")
+
+    def _fraction(self, above: list[Token], below: list[Token], at: int) -> list[Token]:
+        """Return a fraction of two bracketed parts, or the time derivative that it is."""
+        if order := _order_by_time(below[1:-1]):
+            while above and above[0].text == "(" and closing_bracket(above, 0) == len(above) - 1:
+                above = above[1:-1]
+            return self._derivative(above, order, at)
+        self._refuse_mixed_number(above, below, at)
+        return _in_brackets([*above, Token("sign", "/", at), *below], at)
 
     def _refuse_mixed_number(self, above: list[Token], below: list[Token], at: int) -> None:
         """Refuse a fraction of two numbers right behind a number."""
@@ -341,8 +364,11 @@ class _Latex:
         return found
 
     def _one_item(self) -> list[Token]:
-        piece = self._peek()
-        return [] if piece is None or piece[4] == "}" else self._item(piece)
+        """Read one thing that is no space; nothing at the end of a group."""
+        while (piece := self._peek()) is not None and piece[4] != "}":
+            if item := self._item(piece):
+                return item
+        return []
 
     def _function_argument(self) -> list[Token]:
         """Read what a function applies to, with a power in front of it: up to a name, or a closing bracket."""
@@ -392,6 +418,10 @@ class _Latex:
             fail(self.text, at, "an environment that is no matrix")
         self.at = match.end()
         return [Token("sign", "[" if name == "begin" else "]", at)]
+
+
+def _in_brackets(found: list[Token], at: int) -> list[Token]:
+    return [Token("sign", "(", at), *found, Token("sign", ")", at)]
 
 
 def _order_by_time(below: list[Token]) -> int:

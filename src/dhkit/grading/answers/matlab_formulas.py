@@ -279,6 +279,8 @@ class MatlabFormulas:
                 powers.append(power)
                 power = False
             elif token.text == ")":
+                if not operand:
+                    return Formula(text, problem=what)
                 pieces.append(")")
                 operand = True
                 power = powers.pop() if powers else False

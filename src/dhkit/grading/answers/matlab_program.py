@@ -202,7 +202,12 @@ class _Reader:
         argument = next(iter(body), "")
         bindings = self.scope.bindings.get(argument, [])
         is_argument = [b for b in bindings if isinstance(b.value, Symbol) and b.value.is_argument]
-        is_call = len(body) == 5 and body[1] == "=" and body[3:] == ["(", ")"] and body[2] in self.owns
+        is_call = (
+            len(body) == 5
+            and body[1] == "="
+            and body[3:] == ["(", ")"]
+            and (body[2] in self.owns or body[2].endswith("_parameters"))
+        )
         return 3 if is_call and is_argument and len(bindings) == 1 else 0
 
     def _statement(self, statement: Statement, has_ends: bool) -> None:

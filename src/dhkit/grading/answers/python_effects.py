@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from dhkit.grading.answers.python_formulas import MATRIX_CALLS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-__all__ = ["Effects", "Found", "bound_names"]
+__all__ = ["Effects", "Found", "bound_names", "part_names"]
 
 ANYTHING = frozenset(
     (
@@ -196,7 +196,10 @@ class Effects:
         """Return what a statement may change besides what it assigns; functions' bodies are asked for themselves."""
         found = Found()
         for node in _inside(statement):
+            if isinstance(node, ast.comprehension):
+                self._alias_targets(node.target, node.iter)
             if isinstance(node, ast.NamedExpr):
+                self._alias_targets(node.target, node.value)
                 found.walrus += [x.id for x in ast.walk(node.target) if isinstance(x, ast.Name)]
             name = node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
             if isinstance(node, ast.expr) and name and self._may_be_anything(node, name):
@@ -206,6 +209,37 @@ class Effects:
                     found.changed.setdefault(changed, node)
                     for other in self.others(changed):
                         found.changed.setdefault(other, node)
+        return found
+
+    def _alias_targets(self, target: ast.expr, value: ast.expr) -> None:
+        others = {x.id for x in ast.walk(value) if isinstance(x, ast.Name)} - self.modules
+        for name in (x.id for x in ast.walk(target) if isinstance(x, ast.Name)):
+            self.alias(name, others)
+
+    def of_block(self, statement: ast.stmt) -> list[str]:
+        """Return names whose matrices a block may change by assigning parts of them, under any name.
+
+        Names that the block binds may from then on be the same matrices as names that it reads.
+        """
+        bound = bound_names([statement])
+        read = {x.id for x in ast.walk(statement) if isinstance(x, ast.Name)} - self.modules
+        for name in bound:
+            self.alias(name, read)
+        changed = part_names(statement)
+        return sorted({*changed, *(other for name in changed for other in self.others(name))})
+
+    def of_class(self, statement: ast.ClassDef) -> list[str]:
+        """Return names of the program whose matrices the body of a class, or one of its methods, may change."""
+        found: list[str] = []
+        for inner in statement.body:
+            if not isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
+                found += self.of_block(inner)
+                continue
+            arguments = {x.arg for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
+            read = {x.id for x in ast.walk(inner) if isinstance(x, ast.Name)} - self.modules - arguments
+            changed = part_names(inner)
+            if any(name not in arguments for name in changed):
+                found += sorted(read)
         return found
 
     @staticmethod
@@ -222,10 +256,15 @@ class Effects:
         keywords = {keyword.arg for keyword in call.keywords}
         match function:
             case ast.Name(name):
+                has_function = any(isinstance(x, ast.Lambda) for a in self._arguments(call) for x in ast.walk(a))
+                if has_function:
+                    yield from argument_names
+                    return
                 if name in HARMLESS and (name not in self.own or name in self.imported) and "out" not in keywords:
                     return
                 if name in self.imported and name not in MUTATORS and not keywords & CHANGING_ARGUMENTS:
                     return
+                yield name
                 yield from argument_names
             case ast.Attribute(ast.Name(base), method) if base in self.modules:
                 if method in MUTATORS or keywords & CHANGING_ARGUMENTS:
@@ -309,6 +348,19 @@ def bound_names(statements: Sequence[ast.stmt]) -> list[str]:
             case ast.Global(names) | ast.Nonlocal(names):
                 found.update(dict.fromkeys(names))
         waiting += ast.iter_child_nodes(node)
+    return list(found)
+
+
+def part_names(statement: ast.AST) -> list[str]:
+    """Return names of which parts are assigned or deleted, or that are changed in place, however deep."""
+    found: dict[str, None] = {}
+    for node in ast.walk(statement):
+        is_part = isinstance(node, ast.Subscript | ast.Attribute) and isinstance(node.ctx, ast.Store | ast.Del)
+        target = node if is_part else node.target if isinstance(node, ast.AugAssign) else None
+        while isinstance(target, ast.Subscript | ast.Attribute | ast.Call):
+            target = target.func if isinstance(target, ast.Call) else target.value
+        if isinstance(target, ast.Name):
+            found[target.id] = None
     return list(found)
 
 

@@ -171,12 +171,22 @@ class _Reader:
             case ast.ClassDef():
                 self._not_understood(scope, [statement.name], statement, "a class of this name")
                 self._not_understood(scope, _globals(statement.body), statement, "'global'")
+                self._block_changes(statement, scope)
                 if scope is self.program.main and any(isinstance(x, ast.FunctionDef) for x in statement.body):
                     self.program.left_out.append(f"{self._line(statement)}: class {statement.name[:40]}")
             case _:
+                self._block_changes(statement, scope)
                 names = bound_names([statement])
                 kind = {"FunctionDef": "a function of this name", "Delete": "'del'"}.get(type(statement).__name__)
                 self._not_understood(scope, names, statement, kind or f"{type(statement).__name__.lower()!r}")
+
+    def _block_changes(self, statement: ast.stmt, scope: Scope) -> None:
+        """Note what a block that is not understood may change under another name."""
+        line = self._line(statement)
+        is_class = isinstance(statement, ast.ClassDef)
+        for name in self.effects.of_class(statement) if is_class else self.effects.of_block(statement):
+            reason = f"{spelled(name)[:40]} may be changed in the block of {line}"
+            self._bind(scope, name, statement, NotUnderstood(reason, only_matrices=True))
 
     # Assignments
 
@@ -438,6 +448,14 @@ class _Reader:
             if own:
                 value = NotUnderstood(f"{argument.arg} is an object, in {self._line(statement)}")
             self._bind(scope, argument.arg, statement, value)
+        positional = [*arguments.posonlyargs, *arguments.args]
+        with_defaults = [
+            *zip(reversed(positional), reversed(arguments.defaults), strict=False),
+            *zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True),
+        ]
+        for argument, default in with_defaults:
+            if default is not None:
+                self.effects.alias(argument.arg, self.effects.parts(default))
         for rest in (arguments.vararg, arguments.kwarg):
             if rest is not None:
                 self._not_understood(scope, [rest.arg], statement, "'*'")

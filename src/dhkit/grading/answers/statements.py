@@ -11,7 +11,15 @@ from dhkit.grading.answers.latex_rows import Row, rows_of
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
 
-__all__ = ["STARTS", "STARTS_WITH_RELATION", "Statement", "has_relation", "latex_statements", "left_hand_name", "statements_of"]
+__all__ = [
+    "STARTS",
+    "STARTS_WITH_RELATION",
+    "Statement",
+    "has_relation",
+    "latex_statements",
+    "left_hand_name",
+    "statements_of",
+]
 
 
 @dataclass(frozen=True)

@@ -287,13 +287,13 @@ def rounding_share(tree: Tree, truth: Element, reading: Reading, residuals: Resi
     return share if share is not None and share <= 1 + 1e-9 else None
 
 
-def _groups(element: Element) -> dict[Monomial, Fraction]:
-    """Return the largest coefficient by what stands beside sines and cosines: parameters, rates, slides."""
+def _groups(element: Element) -> dict[Any, list[Fraction]]:
+    """Return the coefficients' sizes by what stands beside sines, cosines and numbers: parameters, rates, slides."""
     beside = [generator.kind not in ("sine", "cosine") for generator in element.ring.generators]
-    found: dict[Any, Fraction] = {}
-    for monomial, coefficient in element.terms.items():
+    found: dict[Any, list[Fraction]] = {}
+    for (_, monomial), coefficient in _coefficients([element], element.ring).items():
         group = tuple(e for e, counts in zip(monomial, beside, strict=True) if counts)
-        found[group] = max(found.get(group, Fraction(0)), abs(coefficient))
+        found.setdefault(group, []).append(abs(coefficient))
     return found
 
 
@@ -303,19 +303,17 @@ def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Frac
     Of an energy the terms without state do not count: it is measured from any zero.
     """
     ring = difference.ring
-    numbers = _numbers(ring)
-    if numbers:
-        return True  # groups do not see that sqrt(2) is 1.41
     if is_energy:
         constant = [generator.kind == "constant" for generator in ring.generators]
         free = {m for m in difference.terms if all(c or not e for e, c in zip(m, constant, strict=True))}
         difference = ring.from_terms({m: c for m, c in difference.terms.items() if m not in free})
-    sizes = _groups(reference)
-    return all(
-        size
-        <= (shares.get(group, Fraction(0)) + DOUBLE_ALLOWANCE) * (sizes.get(group, Fraction(0)) + size) * (1 + SLACK)
-        for group, size in _groups(difference).items()
-    )
+    references = {group: sum(sizes) for group, sizes in _groups(reference).items()}
+    for group, sizes in _groups(difference).items():
+        share = shares.get(group, Fraction(0)) + DOUBLE_ALLOWANCE
+        largest = max(sizes)
+        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + SLACK):
+            return False
+    return True
 
 
 def _is_plain(residuals: Residuals, truth: Element) -> bool:

@@ -296,10 +296,12 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
     """Find the one slip in a term of each wrong entry; nothing where an entry has none."""
     found: list[Diagnosis] = []
     for index in _distinct(quantity):
-        slip = _slip(truth, quantity, index)
+        slip = _slip_in_C(truth, quantity, index) if quantity.name == "C" else _slip(truth, quantity, index)
         if slip is None or _mirrored(quantity, index) or _factor(quantity, index):
             return []
         found.append(_of_slip(quantity, index, slip))
+    if len({one.sentence for one in found}) > 1 and (rare := _rare(truth, judged, quantity)):
+        return rare
     differences = quantity.differences
     alike = _tables(truth, quantity).whole(quantity.name, differences) if differences else []
     equivalent = tuple(dict.fromkeys(variant.called for variant in alike))
@@ -314,6 +316,26 @@ def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
     if quantity.name == "g" and not right and _is_weight(truth, difference):
         return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
     return slip_in(arm, right + difference, right)
+
+
+def _slip_in_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
+    """Return the slip in the one entry of a row of C that is not the Christoffel factorization's."""
+    arm = truth.arm("C")
+    reading = Reading(arm.ring, others=truth.others("C"))
+    right = truth.coordinates.in_y("C", truth.lagrangian.C)
+    differing: list[tuple[Element, Element]] = []
+    for given in quantity.given:
+        if given.index[0] != index[0] or given.tree is None:
+            continue
+        try:
+            answer = reading.read(given.tree).element()
+        except (OutsideTheRingError, AnswerError):
+            return None
+        if answer is None:
+            return None
+        if answer != right[given.index]:
+            differing.append((answer, right[given.index]))
+    return slip_in(arm, *differing[0]) if len(differing) == 1 else None
 
 
 def _is_weight(truth: Truth, difference: Element) -> bool:

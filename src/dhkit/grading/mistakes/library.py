@@ -142,6 +142,11 @@ EQUATION = catalogue(
     ),
     _of(
         Subject.ENERGY,
+        "Look again at the constant angle of the base or of a link, and at its sine and cosine.",
+        parameter_sin_cos="sine and cosine of a constant angle are exchanged",
+    ),
+    _of(
+        Subject.ENERGY,
         "Look again at the squares in the kinetic energy.",
         square_of_sum="the square of a sum lacks its mixed term: (a + b)^2 = a^2 + 2 a b + b^2",
         exponent_dropped="an exponent is missing: m r stands where m r^2 belongs",

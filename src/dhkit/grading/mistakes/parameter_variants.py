@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from fractions import Fraction
 from itertools import combinations, permutations
 
 from dhkit.description import INERTIA_PLACES, Description
@@ -17,6 +18,8 @@ from dhkit.symbolic.ring import Element, Ring
 __all__ = ["parameter_variants"]
 
 MILLIMETRES = 1000
+MAX_JOINTS = 3
+"""Joints of arms of which half of one length may stand for another: of larger ones there are too many pairs."""
 
 
 def parameter_variants(truth: Truth) -> Iterator[Variant]:
@@ -26,6 +29,7 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
     symbols = [name for name in lag.arm.parameters if name in ring.constants and _is_free(ring, name)]
     kinds = _kinds(truth.description)
     yield from _factors(lag, symbols)
+    yield from _tilts(lag)
     yield from _millimetres(lag, [name for name in symbols if kinds.get(name) == "length"])
     alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
     for first, second in alike:
@@ -36,6 +40,10 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
         if (first, second) in alike or (second, first) in alike:
             made = MadeAt("parameter_for_another")
             yield Variant(made, _replaced(lag, {first: ring.constant(second)}), f"{second} for {first}", 1)
+            if kinds.get(first) == "length" and first in kinds and lag.n <= MAX_JOINTS:
+                half = ring.constant(second) * Fraction(1, 2)
+                yield Variant(made, _replaced(lag, {first: half}), f"{second}/2 for {first}", 1)
+                yield Variant(made, _replaced(lag, {first: ring.constant(second) * 2}), f"2*{second} for {first}", 2)
     for i, j in combinations(range(1, truth.description.n + 1), 2):
         pairs = [(x, y) for x in symbols for y in symbols if _swaps(x, y, i, j)]
         if len(pairs) > 1:
@@ -58,6 +66,21 @@ def _millimetres(lag: Lagrangian, lengths: list[str]) -> Iterator[Variant]:
         values = {name: ring.constant(name) * MILLIMETRES for name in names}
         place = names[0] if len(names) == 1 else ""
         yield Variant(MadeAt("millimetres_for_metres"), _replaced(lag, values), place, 2)
+
+
+def _tilts(lag: Lagrangian) -> Iterator[Variant]:
+    """Yield constant angles that are forgotten, or whose sine and cosine are exchanged or have another sign."""
+    ring = lag.arm.ring
+    for cosine in ring.constants:
+        if not cosine.startswith("cos(") or (sine := f"sin{cosine[3:]}") not in ring.constants:
+            continue
+        c, s, place = ring.constant(cosine), ring.constant(sine), cosine[4:-1]
+        for identity, values in (
+            ("parameter_forgotten", {cosine: ring.one, sine: ring.zero}),
+            ("parameter_sign", {sine: -s}),
+            ("parameter_sin_cos", {cosine: s, sine: c}),
+        ):
+            yield Variant(MadeAt(identity), _replaced(lag, values), place, 1)
 
 
 def _kinds(description: Description) -> dict[str, str]:

@@ -14,6 +14,8 @@ from dhkit.symbolic.ring import Element, Generator, Ring
 __all__ = ["Slip", "slip_in"]
 
 Terms = Mapping[tuple[int, ...], Fraction]
+UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
+"""Factors of a term in millimetres."""
 MAX_TERMS = 4
 """Terms that one slip changes alike: m2*(l1^2 + l2^2) may stand multiplied out."""
 
@@ -54,6 +56,10 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     changed = {m: c for m, c in changed.items() if c}
     if not changed or len(changed) > 2 * MAX_TERMS:
         return None
+    gone = {m: right[m] for m, c in changed.items() if m not in wrong}
+    come = {m: c for m, c in changed.items() if m not in gone}
+    if gone and len(gone) == len(come) and (slip := _replaced(ring, gone, come)):
+        return slip
     shared = {m: c for m, c in changed.items() if m in right}
     extra = {m: c for m, c in changed.items() if m not in right}
     if not extra:
@@ -63,7 +69,7 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
             return None
         (term,) = extra.items()
         return Slip("term_extra", plain_text(ring.from_terms(dict([term]))))
-    return _replaced(ring, shared, extra, right)
+    return None
 
 
 def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
@@ -78,6 +84,8 @@ def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
         return Slip("square_of_sum" if mixed else "term_missing", terms)
     if factor == -1:
         return Slip("term_sign", terms)
+    if factor in UNITS:
+        return Slip("millimetres_for_metres", terms)
     wrong = plain_text(ring.from_terms({m: right[m] * factor for m in shared}))
     return Slip("term_factor", f"{wrong} in place of {terms}")
 
@@ -93,22 +101,19 @@ def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
     return False
 
 
-def _replaced(ring: Ring, shared: Terms, extra: Terms, right: Terms) -> Slip | None:
+def _replaced(ring: Ring, gone: Terms, come: Terms) -> Slip | None:
     """Return a slip by which terms stand in others' places: all of them with the same exchange of generators."""
-    if len(shared) != len(extra) or any(right[m] + c for m, c in shared.items()):
-        return None
-    pairs = _paired({m: right[m] for m in shared}, extra)
+    pairs = _paired(gone, come)
     if pairs is None:
         return None
     exchanges = {tuple(b - a for a, b in zip(old, new, strict=True)) for old, new in pairs.items()}
     if len(exchanges) != 1:
         return None
     (exchange,) = exchanges
-    gone = [(ring.generators[k], -e) for k, e in enumerate(exchange) if e < 0]
-    come = [(ring.generators[k], e) for k, e in enumerate(exchange) if e > 0]
-    new = plain_text(ring.from_terms(dict(extra)))
-    old = plain_text(ring.from_terms({m: right[m] for m in shared}))
-    return Slip(_kind(ring, gone, come, next(iter(pairs))), f"{new} in place of {old}")
+    less = [(ring.generators[k], -e) for k, e in enumerate(exchange) if e < 0]
+    more = [(ring.generators[k], e) for k, e in enumerate(exchange) if e > 0]
+    new, old = plain_text(ring.from_terms(dict(come))), plain_text(ring.from_terms(dict(gone)))
+    return Slip(_kind(ring, less, more, next(iter(pairs))), f"{new} in place of {old}")
 
 
 def _paired(old: Terms, new: Terms) -> dict[tuple[int, ...], tuple[int, ...]] | None:
