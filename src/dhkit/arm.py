@@ -495,9 +495,13 @@ class Arm:
         *,
         names: Mapping[str, Any] | None = None,
         task: Mapping[str, Any] | None = None,
+        seed: int | None = None,
+        explain: bool = True,
         **quantities: Any,
     ) -> GradeReport:
         """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
+
+        Entries may be given one by one: ``M11=...``, ``g2=...``.
 
         Examples
         --------
@@ -507,7 +511,8 @@ class Arm:
         """
         from dhkit.grading import grade_answers
 
-        return grade_answers(self._description, {**(answers or {}), **quantities}, names, task)
+        given = {**(answers or {}), **quantities}
+        return grade_answers(self._description, given, names, task, seed=seed, explain=explain)
 
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
         """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.

@@ -289,7 +289,22 @@ def test_files_are_taken_as_they_are_and_folders_searched(tmp_path):
         ("ada/deep/q2.m", "ada", ""),
         ("ada/q1.toml", "ada", ""),
         ("b.toml", "b", ""),
+        ("c.txt", "c", "not read: .txt; expected .ipynb, .m, .py, .tex, .toml"),
     ]
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "answer.docx", "scan.PDF", "answer.mlx", "answer", "data.csv", "a.py.bak"])
+def test_what_is_not_read_is_said(tmp_path, name):
+    (tmp_path / "ada").mkdir()
+    (tmp_path / "bob").mkdir()
+    (tmp_path / "ada" / "answer.toml").write_text("[answer]\n")
+    for student in ("ada", "bob"):
+        (tmp_path / student / name).write_text("M = 1")
+    ada, bob = find_sheets([tmp_path])
+    assert ada.beside == (name,) and not ada.error
+    assert bob.error.startswith("not read: ") and bob.student == "bob"
+    report, unread = grade_all([ada, bob], right)
+    assert f"not read: {name}" in report.left_out and unread.verdict is Verdict.UNREADABLE
 
 
 def test_files_alike_in_name_are_by_their_folders(tmp_path):
@@ -316,9 +331,10 @@ def test_links_out_of_the_folder_are_not_followed(tmp_path):
         "out.toml": "a link out of the folder; it is not followed",
         "within.toml": "",
         "a.toml": "",
+        "passwd": "not read: passwd; expected .ipynb, .m, .py, .tex, .toml",
     }
     refused = [report for report in grade_all(find_sheets([folder]), right) if report.error]
-    assert [report.verdict for report in refused] == [Verdict.UNREADABLE] * 3
+    assert [report.verdict for report in refused] == [Verdict.UNREADABLE] * 4
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")

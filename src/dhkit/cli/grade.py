@@ -88,7 +88,8 @@ def grade_files(
         chosen = _own_rubric(sheets[0])
     else:
         chosen = rubric_of(rubric)
-    prepare(about)
+    if len(sheets) > 1 or any(path.is_dir() for path in sheets):
+        prepare(about)
     own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
     return run(
         sheets,

@@ -12,11 +12,6 @@ import typer
 
 from dhkit import __version__
 from dhkit.arm import Arm
-from dhkit.cli import demo as demo_command
-from dhkit.cli import info as info_command
-from dhkit.cli import inverse as inverse_command
-from dhkit.cli import verify as verify_command
-from dhkit.cli import workspace as workspace_command
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError, DhkitError
@@ -82,12 +77,16 @@ def common(version: Version = False) -> None:
 @app.command()
 def robots(json: Json = False) -> None:
     """List the robots of the library."""
+    from dhkit.cli import info as info_command
+
     info_command.list_robots(json)
 
 
 @app.command()
 def info(robot: Robot, json: Json = False) -> None:
     """Show a robot: its DH table, limits, masses, configurations and what is odd about it."""
+    from dhkit.cli import info as info_command
+
     info_command.show(Arm.load(robot), json)
 
 
@@ -120,6 +119,8 @@ def fk(
     json: Json = False,
 ) -> None:
     """Print where the tool is for given joint values (rad and m)."""
+    from dhkit.cli import info as info_command
+
     info_command.forward(Arm.load(robot), q, degrees=degrees, with_frames=frames, json=json)
 
 
@@ -143,6 +144,8 @@ def ik(
 
     Numbers may be expressions such as 17*inch or pi/2; joint values may be the name of a configuration.
     """
+    from dhkit.cli import inverse as inverse_command
+
     arm = Arm.load(robot)
     return inverse_command.run(
         arm,
@@ -269,6 +272,8 @@ def verify(
 
     With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.
     """
+    from dhkit.cli import verify as verify_command
+
     return verify_command.run(
         Arm.load(robot),
         samples,
@@ -290,6 +295,8 @@ def workspace(
     json: Json = False,
 ) -> None:
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
+    from dhkit.cli import workspace as workspace_command
+
     workspace_command.run(Arm.load(robot), samples, seed, output, json=json)
 
 
@@ -412,4 +419,6 @@ def demo(
     json: Json = False,
 ) -> int:
     """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""
+    from dhkit.cli import demo as demo_command
+
     return demo_command.run(Arm.load(robot), output, quick=quick, json=json)

@@ -21,6 +21,7 @@ from dhkit.grading.answers.given import (
     vocabulary_of,
     with_entries_gathered,
 )
+from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names
 from dhkit.grading.answers.typeset import typeset
 from dhkit.grading.answers.vocabulary import Vocabulary
@@ -148,11 +149,12 @@ def _judged(
     """Judge a sheet's quantities; return them, and why others could not be: one does not stop the rest."""
     judged: dict[str, JudgedQuantity] = {}
     refused: dict[str, DhkitError] = {}
-    for name, value in with_entries_gathered(sheet.answers, description).items():
+    names = QuantityNames(description)
+    for name, value in with_entries_gathered(sheet.answers, names).items():
         if _is_empty(value):
             continue
         try:
-            judged[name] = _judge_one(name, value, description, sheet, vocabulary, truth, digits, seed)
+            judged[name] = _judge_one(name, value, names, sheet, vocabulary, truth, digits, seed)
         except AnswerError as error:
             refused[name] = AnswerError(f"{sheet.file}: answer: {error}")
         except DescriptionError as error:
@@ -163,21 +165,21 @@ def _judged(
 def _judge_one(
     name: str,
     value: Any,
-    description: Description,
+    names: QuantityNames,
     sheet: AnswerSheet,
     vocabulary: Vocabulary,
     truth: Truth,
     digits: int,
     seed: int,
 ) -> JudgedQuantity:
-    known = quantity_names(description.n)
+    known = quantity_names(names.n)
     if name not in known:
         meant = ALIASES.get(name) or next(iter(difflib.get_close_matches(name, known, n=1)), "")
         hint = f"did you mean {meant!r}?" if meant else f"expected {', '.join(known)}, dh, ik"
         raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
     if callable(value):
         return judge_function(name, value, truth, seed)
-    given = given_quantity(name, value, shape_of(name, description.n), vocabulary)
+    given = given_quantity(name, value, shape_of(name, names.n), vocabulary, names)
     return judge_quantity(name, given, truth, sheet.task, digits, seed)
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dhkit.description import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
 from dhkit.description.assets import inside, is_readable_mesh
@@ -359,6 +358,8 @@ def _about_z(angle: float) -> Array:
 
 def _towards(point: Array) -> Array:
     """Return a frame at the origin whose z axis points to a point other than it."""
+    from scipy.spatial.transform import Rotation
+
     T = np.eye(4)
     T[:3, :3] = Rotation.align_vectors([point], [(0, 0, 1)])[0].as_matrix()
     return T

@@ -15,7 +15,7 @@ from dhkit.grading.answers.tokens import fail
 __all__ = ["from_mathematica", "from_maxima", "is_mathematica"]
 
 MATHEMATICA = re.compile(
-    r"\b(?:Sin|Cos|Tan|Sec|Csc|Cot|Sqrt|ArcTan|ArcSin|ArcCos|Derivative|Subscript|Abs|Sign|D|Dt)\[|[A-Za-z0-9\]]'*\[t\]"
+    r"\*\^|\b(?:Sin|Cos|Tan|Sec|Csc|Cot|Sqrt|ArcTan|ArcSin|ArcCos|Derivative|Subscript|Abs|Sign|D|Dt)\[|[A-Za-z0-9\]]'*\[t\]"
     r"|\\\[[A-Z][A-Za-z]*\]|^\s*\{[^\\]*\}\s*$",
     re.DOTALL,
 )
@@ -30,7 +30,7 @@ def is_mathematica(text: str) -> bool:
 
 def from_mathematica(found: Sequence[Token], text: str) -> list[Token]:
     """Return tokens with round brackets for calls and square ones for lists."""
-    found = _with_names(list(found))
+    found = _with_exponents(_with_names(list(found)))
     closes = _closing_places(found, text)
     made: list[Token] = []
     k = 0
@@ -69,6 +69,28 @@ def _with_names(found: list[Token]) -> list[Token]:
                 letter += following.text
                 k += 1
             made.append(Token("name", letter, found[k - 1].at))
+            continue
+        made.append(found[k])
+        k += 1
+    return made
+
+
+def _with_exponents(found: list[Token]) -> list[Token]:
+    """Read 5*^-1 as 5e-1."""
+    made: list[Token] = []
+    k = 0
+    while k < len(found):
+        texts = [token.text for token in found[k : k + 5]]
+        sign = "-" if texts[3:4] == ["-"] else ""
+        exponent = found[k + 4] if sign and k + 4 < len(found) else found[k + 3] if k + 3 < len(found) else None
+        if (
+            found[k].kind == "number"
+            and texts[1:3] == ["*", "^"]
+            and exponent is not None
+            and exponent.text.isdecimal()
+        ):
+            made.append(Token("number", f"{texts[0]}e{sign}{exponent.text}", found[k].at))
+            k += 4 + bool(sign)
             continue
         made.append(found[k])
         k += 1

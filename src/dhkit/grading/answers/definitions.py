@@ -229,7 +229,7 @@ class Definitions:
         if standing.note and standing.note not in self.notes:
             self.notes.append(standing.note)
         if standing.defined is not None and not (standing.is_itself and place <= standing.defined.place):
-            assert owner is not None  # noqa: S101 - what is defined is bound somewhere
+            assert owner is not None  # noqa: S101
             return self._definition(owner, scope, read, place, standing.defined)
         entries = [binding.place for bindings in standing.entries.values() for binding in bindings]
         if entries and standing.is_itself and read.index is None and owner is scope and place > min(entries):

@@ -14,8 +14,10 @@ from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.objects import entry_tree, is_entry
+from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of, read_matrix
-from dhkit.grading.answers.sheet import ALIASES, Chain, Entries, Names, Refusal, quantity_names
+from dhkit.grading.answers.sheet import Chain, Entries, Names, Refusal
+from dhkit.grading.answers.statements import Statement, has_relation, statements_of
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
@@ -31,8 +33,6 @@ __all__ = [
 ]
 
 LEFT_EMPTY = "left empty"
-ENTRY_NAME = re.compile(r"(?:(?=[MCJ]\d\d$|[hg]\d$|tau\d$)([A-Za-z]+)(\d)(\d)?)", re.ASCII)
-"""Names of single entries on a sheet, counted from 1."""
 POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
 """The tool's pose in the world, which inverse kinematics start from: its origin, m, and its rotation by rows."""
 
@@ -106,19 +106,23 @@ def _stays(name: str, text: str | Refusal, vocabulary: Vocabulary, description: 
     return vocabulary.is_state(name)
 
 
-def given_quantity(name: str, value: Any, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+def given_quantity(
+    name: str, value: Any, shape: tuple[int, ...], vocabulary: Vocabulary, names: QuantityNames
+) -> tuple[Given, ...]:
     """Return all entries of a quantity, those that were not handed in among them.
 
     Parameters
     ----------
     name
-        What messages call it. Of M an entry that is missing is taken from the other half.
+        Which. Of M an entry that is missing is taken from the other half.
     value
         Text, a number, or lists of them; a matrix may stand in one text; :class:`~dhkit.grading.answers.sheet.Entries`.
     shape
         What is expected.
     vocabulary
         What names mean.
+    names
+        Which names stand in front of an answer: ``tau_1 = ...``.
 
     Raises
     ------
@@ -127,63 +131,127 @@ def given_quantity(name: str, value: Any, shape: tuple[int, ...], vocabulary: Vo
     """
     if isinstance(value, Refusal):
         raise AnswerError(f"{name}: {value.reason}; a program is read, not run: write it in one assignment")
-    if isinstance(value, Entries):
-        given = _from_entries(name, value, shape, vocabulary)
-    elif isinstance(value, Chain):
-        sides = [given_quantity(name, formula, shape, vocabulary) for formula in value.formulas]
-        return _chained(sides)
-    elif isinstance(value, str) and math.prod(shape) == 1 and "[" not in value and "\\begin" not in value:
-        return (_read((0,) * len(shape), _without_head(name, value), vocabulary),)
-    elif isinstance(value, str) and shape:
-        return _from_one_text(name, _without_head(name, value), shape, vocabulary)
+    if isinstance(value, str) and shape:
+        value = _system(name, value, names)
+    if isinstance(value, Chain):
+        return _chained([given_quantity(name, formula, shape, vocabulary, names) for formula in value.formulas])
+    if isinstance(value, str) and math.prod(shape) != 1:
+        given = _from_one_text(name, _without_head(name, value), shape, vocabulary)
+    elif isinstance(value, Entries):
+        given = _from_entries(name, value, shape, vocabulary, names)
+    elif isinstance(value, str) and "[" not in value and "matrix" not in value:
+        given = (_entry(Target(name, (0,) * len(shape)), value, vocabulary, names),)
+    elif isinstance(value, str):
+        given = _from_one_text(name, _without_head(name, value), shape, vocabulary)
     else:
-        given = tuple(_read(index, text, vocabulary) for index, text in _flat(name, value, shape, ()))
+        flat = _flat(name, value, shape, ())
+        given = tuple(_entry(Target(name, index), text, vocabulary, names) for index, text in flat)
     return _mirrored(given) if name == "M" else given
 
 
-def with_entries_gathered(answers: Mapping[str, Any], description: Description) -> dict[str, Any]:
+def with_entries_gathered(answers: Mapping[str, Any], names: QuantityNames) -> dict[str, Any]:
     """Return answers by quantity: those that name one entry (``M11``, ``g_2``) gathered in :class:`Entries`.
 
     Raises
     ------
     AnswerError
-        A quantity that is given whole and by its entries.
+        A quantity that is given whole and by its entries, or a name that two entries may have.
     """
-    n = description.n
-    known = {*quantity_names(n), *ALIASES}
     gathered: dict[str, Any] = {}
+    entries: dict[str, dict[tuple[int, ...], Any]] = {}
     for name, value in answers.items():
-        match = None if name in known else ENTRY_NAME.fullmatch(plain_name(name))
-        if match is None:
-            if name in gathered:
-                raise AnswerError(f"{name}: given whole and entry by entry; expected one of them")
+        targets = [] if names.quantity(name) else names.entries(name)
+        if len(targets) > 1:
+            raise AnswerError(f"{name}: may be {' or '.join(map(str, targets))}; write M_1_12 or M_11_2")
+        if targets and targets[0].index is not None:
+            entries.setdefault(targets[0].quantity, {})[targets[0].index] = value
+        else:
             gathered[name] = value
-            continue
-        quantity, index = match[1], tuple(int(k) - 1 for k in (match[2], match[3]) if k)
-        texts = gathered.setdefault(quantity, Entries({}))
-        if not isinstance(texts, Entries):
+    for quantity, texts in entries.items():
+        if quantity in gathered:
             raise AnswerError(f"{quantity}: given whole and entry by entry; expected one of them")
-        gathered[quantity] = Entries({**texts.texts, index: value})
+        gathered[quantity] = Entries(texts)
     return gathered
 
 
-def _from_entries(name: str, value: Entries, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+SYSTEM = re.compile(
+    r"\\begin\s*\{(?:cases|align|aligned|alignat|split|gather|gathered|eqnarray|IEEEeqnarray|multline)\*?\}"
+)
+"""Environments whose rows are statements."""
+
+
+def _system(name: str, text: str, names: QuantityNames) -> str | Chain | Entries:
+    """Return the entries that a system of equations in one text states; the text itself where it is none."""
+    if not SYSTEM.search(text):
+        return text
+    found: dict[tuple[int, ...], str | Chain] = {}
+    for statement in statements_of(text):
+        if statement.problem:
+            raise AnswerError(f"{name}: {statement.problem}: {shown(statement.text)}")
+        for target in statement.targets:
+            if names.quantity(target) == name:
+                return _formulas(statement)
+            places = [one.index for one in names.entries(target) if one.quantity == name]
+            if len(places) != 1 or places[0] is None:
+                raise AnswerError(f"{name}: {shown(target)} is none of its entries")
+            found[places[0]] = _formulas(statement)
+    return Entries(found) if found else text
+
+
+def _formulas(statement: Statement) -> str | Chain:
+    formulas = statement.formulas
+    return formulas[0] if len(formulas) == 1 else Chain(formulas)
+
+
+def _stated(target: Target, text: str, names: QuantityNames) -> str | Chain:
+    """Return an entry's formula without the name in front of it: tau_1 = ..., G(q) = ...; a chain of several.
+
+    Raises
+    ------
+    AnswerError
+        Several statements, or one about something else.
+    """
+    if not (SYSTEM.search(text) or has_relation(text)):
+        return text
+    statements = statements_of(text, "")
+    if len(statements) != 1 or statements[0].problem:
+        problem = statements[0].problem if len(statements) == 1 else f"{len(statements)} statements"
+        raise AnswerError(f"{shown(text)}: {problem}; expected one formula")
+    (statement,) = statements
+    for name in statement.targets:
+        meant = [one for one in names.entries(name) if one.quantity == target.quantity]
+        other = names.quantity(name) not in ("", target.quantity) or names.is_parameter(name)
+        if other or (meant and target not in meant) or names.vocabulary.is_state(name):
+            raise AnswerError(f"{shown(text)}: states {name}, and stands where {target} is expected")
+    return _formulas(statement) if statement.formulas else text
+
+
+def _from_entries(
+    name: str, value: Entries, shape: tuple[int, ...], vocabulary: Vocabulary, names: QuantityNames
+) -> tuple[Given, ...]:
     """Return a quantity's entries of those that were given one by one."""
     places = list(np.ndindex(shape))
     for index in value.texts:
         if index not in places:
-            found = name + "".join(f"[{k + 1}]" for k in index)
-            raise AnswerError(f"{name}: found {found}; expected {' x '.join(map(str, shape))} entries, counted from 1")
-    return tuple(_entry(index, value.texts.get(index, ""), vocabulary) for index in places)
+            raise AnswerError(
+                f"{name}: found {Target(name, index)}; expected {' x '.join(map(str, shape))} entries, counted from 1"
+            )
+    return tuple(_entry(Target(name, index), value.texts.get(index, ""), vocabulary, names) for index in places)
 
 
-def _entry(index: tuple[int, ...], text: str | Chain | Refusal, vocabulary: Vocabulary) -> Given:
-    if isinstance(text, Refusal):
-        return Given(index, "", error=f"{text.reason}; a program is read, not run: write it in one assignment")
-    if isinstance(text, Chain):
-        (given,) = _chained([(_read(index, formula, vocabulary),) for formula in text.formulas])
+def _entry(target: Target, value: Any, vocabulary: Vocabulary, names: QuantityNames) -> Given:
+    index = target.index or ()
+    if isinstance(value, Refusal):
+        return Given(index, "", error=f"{value.reason}; a program is read, not run: write it in one assignment")
+    if isinstance(value, str):
+        try:
+            value = _stated(target, value, names)
+        except AnswerError as error:
+            return Given(index, value[:1000], error=str(error))
+    if isinstance(value, Chain):
+        (given,) = _chained([(_read(index, formula, vocabulary),) for formula in value.formulas])
         return given
-    return _read(index, text, vocabulary)
+    return _read(index, value, vocabulary)
 
 
 def _chained(sides: Sequence[Sequence[Given]]) -> tuple[Given, ...]:

@@ -51,7 +51,8 @@ MATRIX = re.compile(r"\\begin\s*\{(?:[bpvBV]?|small)?(?:matrix|array)\*?\}")
 VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
 """What the value of a joint variable may be made of besides numbers."""
 UNITS = re.compile(
-    r"([-+]?\s*(?:\d+\.?\d*|\.\d+))\s*(?:\\[,;: ]|~|\s)*(?:\\(?:mathrm|text|textrm|si|unit)\s*\{[^{}]*\}(?:/?(?:\^\{?-?\d\}?)?)*)*",
+    r"([-+]?\s*(?:\d+\.?\d*|\.\d+))(?:\\[,;: ]|~|\s)*"
+    r"(?:\\(?:mathrm|text|textrm|si|unit)\s*\{[^{}]*\}(?:\^(?:\d|\{-?\d\}))?/?)*",
     re.ASCII,
 )
 
@@ -382,7 +383,7 @@ class _Document:
                 refused |= {target.quantity: Refusal(reason) for target in targets}
                 continue
             (target,) = targets
-            assert target.index is not None  # noqa: S101 - entries have one
+            assert target.index is not None  # noqa: S101
             text = self._entry(name, statements)
             own = found.setdefault(target.quantity, {})
             if own.setdefault(target.index, text) != text:

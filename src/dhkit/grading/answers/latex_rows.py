@@ -9,9 +9,32 @@ from dataclasses import dataclass, replace
 __all__ = ["ROWS", "Row", "rows_of"]
 
 ROWS = frozenset(
-    ("align", "aligned", "alignat", "alignedat", "flalign", "split", "multline", "multlined", "gather", "gathered")
-    + ("eqnarray", "IEEEeqnarray", "equation", "dmath", "dgroup", "displaymath", "math", "cases", "dcases", "rcases")
-    + ("subequations", "empheq", "dseries", "xalignat")
+    (
+        "align",
+        "aligned",
+        "alignat",
+        "alignedat",
+        "flalign",
+        "split",
+        "multline",
+        "multlined",
+        "gather",
+        "gathered",
+        "eqnarray",
+        "IEEEeqnarray",
+        "equation",
+        "dmath",
+        "dgroup",
+        "displaymath",
+        "math",
+        "cases",
+        "dcases",
+        "rcases",
+        "subequations",
+        "empheq",
+        "dseries",
+        "xalignat",
+    )
 )
 """Environments whose rows are equations, or parts of them."""
 JOINED = frozenset(("eqnarray", "IEEEeqnarray"))
@@ -25,6 +48,10 @@ MARK = re.compile(
     r"|\\(?:left|right)(?![A-Za-z])\s*(?:\\.|.)|\\[{}]|\\.|[&{}\n]|\n\s*\n",
     re.DOTALL,
 )
+
+
+FEW = 8
+"""Pieces in front of a row that may all be blank: labels and line breaks."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +98,7 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     for mark in MARK.finditer(text):
         piece.append(text[at : mark.start()])
         line += text.count("\n", at, mark.start())
-        if not "".join(piece).strip() and not columns:
+        if len(piece) <= FEW and not columns and not "".join(piece).strip():
             start = line
         at = mark.end()
         word = mark[0]

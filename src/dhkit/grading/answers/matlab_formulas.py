@@ -135,10 +135,10 @@ class MatlabFormulas:
             and closing(tokens, 1) == len(tokens) - 1
         ):
             tokens = tokens[2:-1]
-        if tokens and tokens[0].text == "zeros" and len(tokens) > 2 and tokens[1].text == "(":
-            if closing(tokens, 1) == len(tokens) - 1:
-                return Formula(_text(tokens), (Read("zeros", 0, 0, use=Use.CALL),), is_zeros=True)
-        return None
+        is_call = len(tokens) > 2 and tokens[0].text == "zeros" and tokens[1].text == "("
+        if not is_call or closing(tokens, 1) != len(tokens) - 1:
+            return None
+        return Formula(_text(tokens), (Read("zeros", 0, 0, use=Use.CALL),), is_zeros=True)
 
     @staticmethod
     def _symbols(tokens: Tokens) -> Formula | None:
@@ -155,7 +155,7 @@ class MatlabFormulas:
         letters = tokens[2].text[1:-1].replace("%d", "")
         if not re.fullmatch(r"[A-Za-z]\w*", letters, re.ASCII):
             return None
-        entries = {(k,): Formula(f"{letters}{k + 1}") for k in range(max(numbers))}
+        entries: dict[tuple[int, ...], Formula] = {(k,): Formula(f"{letters}{k + 1}") for k in range(max(numbers))}
         return Formula("[" + ", ".join(entry.text for entry in entries.values()) + "]", entries=entries)
 
     def _matrix(self, tokens: Tokens) -> Formula | None:

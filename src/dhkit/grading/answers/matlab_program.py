@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bindings import (
-    Formula,
     STRUCTURE,
+    Formula,
     FunctionNamed,
     ModuleNamed,
     NotUnderstood,
@@ -26,13 +26,37 @@ __all__ = ["matlab_program"]
 
 MAX_STATEMENTS = 5_000
 OPENERS = frozenset(
-    ("if", "for", "while", "switch", "try", "parfor", "spmd", "unwind_protect", "do", "classdef")
-    + ("methods", "properties", "events", "enumeration")
+    (
+        "if",
+        "for",
+        "while",
+        "switch",
+        "try",
+        "parfor",
+        "spmd",
+        "unwind_protect",
+        "do",
+        "classdef",
+        "methods",
+        "properties",
+        "events",
+        "enumeration",
+    )
 )
 MIDDLE = frozenset(("else", "elseif", "case", "otherwise", "catch", "unwind_protect_cleanup"))
 CLOSERS = frozenset(
-    ("end", "endif", "endfor", "endwhile", "endswitch", "end_try_catch", "endfunction", "endparfor")
-    + ("end_unwind_protect", "until")
+    (
+        "end",
+        "endif",
+        "endfor",
+        "endwhile",
+        "endswitch",
+        "end_try_catch",
+        "endfunction",
+        "endparfor",
+        "end_unwind_protect",
+        "until",
+    )
 )
 ANYTHING = frozenset(
     (
@@ -48,13 +72,33 @@ ANYTHING = frozenset(
         "str2func",
         "inputname",
         "import",
+        "cellfun",
+        "arrayfun",
+        "evalAt",
+        "rehash",
+        "dbstop",
+        "keyboard",
+        "inline",
+        "matlabFunction_eval",
+        "script",
     )
-    + ("cellfun", "arrayfun", "evalAt", "rehash", "dbstop", "keyboard", "inline", "matlabFunction_eval", "script")
 )
 """Functions with which a program may change any name."""
 HARMLESS = frozenset(
-    ("clc", "close", "clear", "clearvars", "format", "hold", "warning", "more", "pkg", "figure", "grid", "axis", "disp")
-    + (
+    (
+        "clc",
+        "close",
+        "clear",
+        "clearvars",
+        "format",
+        "hold",
+        "warning",
+        "more",
+        "pkg",
+        "figure",
+        "grid",
+        "axis",
+        "disp",
         "display",
         "fprintf",
         "printf",
@@ -68,9 +112,29 @@ HARMLESS = frozenset(
         "echo",
         "help",
         "doc",
+        "graphics_toolkit",
+        "addpath",
+        "digits",
+        "assume",
+        "assumeAlso",
+        "latex",
+        "simplify",
+        "expand",
+        "beep",
+        "pause",
+        "xlabel",
+        "ylabel",
+        "title",
+        "legend",
+        "assert",
+        "error",
+        "sympref",
+        "return",
+        "puts",
+        "fdisp",
+        "sympy",
+        "reset",
     )
-    + ("graphics_toolkit", "addpath", "digits", "assume", "assumeAlso", "latex", "simplify", "expand", "beep", "pause")
-    + ("xlabel", "ylabel", "title", "legend", "assert", "error", "sympref", "return", "puts", "fdisp", "sympy", "reset")
 )
 """Commands, and functions without a value, that assign nothing."""
 ASSIGNING = frozenset(("+=", "-=", "*=", "/=", "^=", "|=", "&="))
@@ -339,7 +403,7 @@ class _Reader:
                 if len(numbers) > 2 or (len(numbers) == 2 and min(numbers) > 1):
                     self._not_understood([name], statement, "'syms' of a matrix")
                     continue
-                entries = {(k,): Formula(f"{name}{k + 1}") for k in range(length)}
+                entries: dict[tuple[int, ...], Formula] = {(k,): Formula(f"{name}{k + 1}") for k in range(length)}
                 for entry in entries.values():
                     self._bind(entry.text, statement, Symbol(entry.text))
                 self._bind(

@@ -170,9 +170,39 @@ def _is_transpose(before: MatlabToken, spaced: bool, brackets: list[tuple[str, i
 
 
 COMMANDS = frozenset(
-    ("syms", "clear", "clearvars", "close", "clc", "format", "hold", "warning", "more", "pkg", "global", "persistent")
-    + ("load", "save", "figure", "grid", "axis", "diary", "echo", "disp", "help", "doc", "graphics_toolkit", "addpath")
-    + ("run", "source", "digits", "reset", "tic", "toc", "import")
+    (
+        "syms",
+        "clear",
+        "clearvars",
+        "close",
+        "clc",
+        "format",
+        "hold",
+        "warning",
+        "more",
+        "pkg",
+        "global",
+        "persistent",
+        "load",
+        "save",
+        "figure",
+        "grid",
+        "axis",
+        "diary",
+        "echo",
+        "disp",
+        "help",
+        "doc",
+        "graphics_toolkit",
+        "addpath",
+        "run",
+        "source",
+        "digits",
+        "reset",
+        "tic",
+        "toc",
+        "import",
+    )
 )
 
 

@@ -28,8 +28,17 @@ HARMLESS_MAGICS = frozenset(
         "precision",
         "load_ext",
         "autoreload",
+        "time",
+        "cd",
+        "lsmagic",
+        "autosave",
+        "pdb",
+        "xmode",
+        "colors",
+        "history",
+        "env",
+        "display",
     )
-    + ("time", "cd", "lsmagic", "autosave", "pdb", "xmode", "colors", "history", "env", "display")
 )
 """Magics that assign nothing."""
 WHOLE_CELLS = frozenset(

@@ -153,7 +153,7 @@ class _Answers:
         return _Given(target, binding.line, node, reason, is_named_entry=True, name=name)
 
     def _node_of(self, scope: Scope, name: str, binding: Binding) -> Node:
-        assert isinstance(binding.value, Formula)  # noqa: S101 - callers pass bindings to formulas
+        assert isinstance(binding.value, Formula)  # noqa: S101
         return Node(name, None, scope, ((binding.value, binding.place),), binding.line)
 
     def _whole_or_parts(
@@ -200,9 +200,8 @@ class _Answers:
             return False
         if self.quantities.is_scalar(quantity) and not value.is_matrix:
             is_number = value.number is not None
-            if self.quantities.is_parameter(called) or (is_number and (alias or quantity in ("K", "L"))):
-                return False
-            return True
+            is_other = is_number and (alias or quantity in ("K", "L"))
+            return not self.quantities.is_parameter(called) and not is_other
         if quantity in ("K", "V", "L"):
             return value.entries is not None and len(value.entries) == 1
         return value.is_matrix
@@ -302,12 +301,12 @@ class _Answers:
             return False
         key = (id(one.node.scope), one.node.name)
         for other in given:
-            if other.target.quantity in ("K", "V", "L") and other.node is not None:
-                if any(used[:2] == key for used in self.definitions.closure(other.node)):
-                    self.notes.append(
-                        f"{one.line}: {one.name} is read as the program's own name, which {other.target.quantity} uses"
-                    )
-                    return True
+            if other.target.quantity not in ("K", "V", "L") or other.node is None:
+                continue
+            if any(used[:2] == key for used in self.definitions.closure(other.node)):
+                user = other.target.quantity
+                self.notes.append(f"{one.line}: {one.name} is read as the program's own name, which {user} uses")
+                return True
         return False
 
     def _entries(self, quantity: str, entries: list[_Given]) -> Entries | Refusal:
@@ -315,7 +314,7 @@ class _Answers:
         lines: dict[tuple[int, ...], str] = {}
         for one in entries:
             index = one.target.index
-            assert index is not None  # noqa: S101 - entries have one
+            assert index is not None  # noqa: S101
             text = self.definitions.text_of(one.node) if one.node is not None else Refusal(one.reason)
             if texts.setdefault(index, text) != text:
                 return Refusal(f"{one.target} is assigned twice, in {lines[index]} and in {one.line}")

@@ -24,8 +24,6 @@ ANYTHING = frozenset(
         "getattr",
         "execfile",
         "run_line_magic",
-    )
-    + (
         "import_module",
         "get_ipython",
         "run_cell_magic",
@@ -57,10 +55,25 @@ HARMLESS = frozenset(
         "sum",
         "list",
         "tuple",
-    )
-    + ("zip", "enumerate", "type", "isinstance", "latex", "init_printing", "init_session", "init_vprinting", "mprint")
-    + ("vprint", "vlatex", "lambdify", "symbols", "Symbol", "dynamicsymbols", "Function", "diff", "Derivative", "solve")
-    + (
+        "zip",
+        "enumerate",
+        "type",
+        "isinstance",
+        "latex",
+        "init_printing",
+        "init_session",
+        "init_vprinting",
+        "mprint",
+        "vprint",
+        "vlatex",
+        "lambdify",
+        "symbols",
+        "Symbol",
+        "dynamicsymbols",
+        "Function",
+        "diff",
+        "Derivative",
+        "solve",
         "simplify",
         "expand",
         "trigsimp",
@@ -74,11 +87,30 @@ HARMLESS = frozenset(
         "Eq",
         "Math",
         "set",
+        "Markdown",
+        "Latex",
+        "dict",
+        "sorted",
+        "all",
+        "any",
+        "super",
+        "format",
+        "Exception",
+        "ValueError",
+        "nsimplify",
+        "cancel",
+        "together",
+        "powsimp",
+        "expand_trig",
+        "radsimp",
+        "N",
+        "time",
+        "perf_counter",
+        "pretty_print",
+        "pretty",
+        *tuple(MATRIX_CALLS),
+        *tuple(FUNCTION_NAMES),
     )
-    + ("Markdown", "Latex", "dict", "sorted", "all", "any", "super", "format", "Exception", "ValueError", "nsimplify")
-    + ("cancel", "together", "powsimp", "expand_trig", "radsimp", "N", "time", "perf_counter", "pretty_print", "pretty")
-    + tuple(MATRIX_CALLS)
-    + tuple(FUNCTION_NAMES)
 )
 """Functions that change nothing that they are given."""
 PURE_METHODS = frozenset(
@@ -96,9 +128,17 @@ PURE_METHODS = frozenset(
         "copy",
         "dot",
         "cross",
-    )
-    + ("norm", "tolist", "format", "join", "trigsimp", "factor", "applyfunc", "xreplace", "rewrite", "coeff", "collect")
-    + (
+        "norm",
+        "tolist",
+        "format",
+        "join",
+        "trigsimp",
+        "factor",
+        "applyfunc",
+        "xreplace",
+        "rewrite",
+        "coeff",
+        "collect",
         "as_immutable",
         "as_mutable",
         "n",
@@ -110,8 +150,6 @@ PURE_METHODS = frozenset(
         "is_symmetric",
         "conjugate",
         "show",
-    )
-    + (
         "flatten",
         "mean",
         "max",
@@ -126,8 +164,17 @@ PURE_METHODS = frozenset(
         "split",
         "strip",
         "lower",
+        "has",
+        "free_symbols",
+        "equals",
+        "multiply",
+        "adjugate",
+        "cofactor",
+        "LUsolve",
+        "solve",
+        "applyfunc",
+        "together",
     )
-    + ("has", "free_symbols", "equals", "multiply", "adjugate", "cofactor", "LUsolve", "solve", "applyfunc", "together")
 )
 MUTATORS = frozenset(
     ("fill_diagonal", "put", "copyto", "place", "putmask", "put_along_axis", "shuffle", "at", "setfield", "sort")

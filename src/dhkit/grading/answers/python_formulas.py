@@ -7,7 +7,7 @@ import io
 import math
 import re
 import tokenize
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import accumulate
 
@@ -87,12 +87,12 @@ def joined(pieces: Sequence[str | Formula]) -> Formula:
 
 
 class PythonFormulas:
-    """Reads expressions of one program's text.
+    r"""Reads expressions of one program's text.
 
     Parameters
     ----------
     text
-        The program, with ``\\n`` alone between lines.
+        The program, with ``\n`` alone between lines.
     """
 
     def __init__(self, text: str) -> None:
@@ -199,11 +199,11 @@ class PythonFormulas:
         """Return the rows of Matrix(2, 2, [a, b, c, d])."""
         if len(arguments) != 3 or not isinstance(arguments[2], ast.List | ast.Tuple):
             return None
-        shape = [x.value for x in arguments[:2] if isinstance(x, ast.Constant) and type(x.value) is int]
+        shape = [x.value for x in arguments[:2] if isinstance(x, ast.Constant) and isinstance(x.value, int)]
         entries = arguments[2].elts
-        if len(shape) != 2 or not all(isinstance(k, int) and 0 < k <= MAX_INDEX for k in shape):
+        if len(shape) != 2 or not all(0 < k <= MAX_INDEX for k in shape):
             return None
-        rows, columns = int(str(shape[0])), int(str(shape[1]))
+        rows, columns = shape
         if len(entries) != rows * columns:
             return None
         at = [ast.List(entries[i * columns : (i + 1) * columns], ast.Load()) for i in range(rows)]
@@ -328,10 +328,10 @@ class PythonFormulas:
                     return _problem(text, f"{text[start:end][:40]!r} is not read")
         return replace(_changed(text, reads, changes), number=_number(root))
 
-    def _call(  # type: ignore[no-untyped-def]  # noqa: ANN001
+    def _call(
         self,
         node: ast.Call,
-        span,
+        span: Callable[[ast.expr], tuple[int, int]],
         text: str,
         reads: list[Read],
         changes: list[tuple[int, int, str]],
@@ -352,15 +352,17 @@ class PythonFormulas:
         if isinstance(function, ast.Name):
             of_time = len(node.args) == 1 and isinstance(node.args[0], ast.Name) and node.args[0].id == "t"
             if of_time and function.id not in FUNCTION_NAMES:
-                reads.append(Read(spelled(function.id), *span(function)))
-                reads.append(Read("t", *span(node.args[0]), use=Use.TIME))
+                first, last = span(function)
+                reads.append(Read(spelled(function.id), first, last))
+                first, last = span(node.args[0])
+                reads.append(Read("t", first, last, use=Use.TIME))
                 return ""
             first, last = span(function)
             reads.append(Read(spelled(function.id), first, last, use=Use.CALL))
             waiting += node.args
             return ""
         if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-            if function.attr not in FUNCTION_NAMES or len(function.attr) == 1 and function.attr != "S":
+            if function.attr not in FUNCTION_NAMES or (len(function.attr) == 1 and function.attr != "S"):
                 return what
             first, last = span(function)
             module = spelled(function.value.id)
@@ -377,8 +379,8 @@ class PythonFormulas:
         function, arguments = node.func, list(node.args)
         uses: list[Read] = []
         match function:
-            case ast.Name("diff" | "Derivative" as name):
-                uses.append(Read(name, 0, 0, use=Use.CALL))
+            case ast.Name("diff" | "Derivative" as called):
+                uses.append(Read(called, 0, 0, use=Use.CALL))
             case ast.Attribute(ast.Name(module), "diff" | "Derivative") if len(arguments) > 1 and not _is_time(
                 arguments[0]
             ):

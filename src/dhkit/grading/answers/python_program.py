@@ -31,8 +31,23 @@ __all__ = ["python_program"]
 MAX_STATEMENTS = 5_000
 MAX_SYMBOLS = 1_000
 MODULES = frozenset(
-    ("numpy", "sympy", "math", "cmath", "mpmath", "casadi", "jax.numpy", "autograd.numpy", "numpy.lib.scimath")
-    + ("sympy.physics.mechanics", "sympy.physics.vector", "sympy.matrices", "sympy.abc", "symengine", "pylab")
+    (
+        "numpy",
+        "sympy",
+        "math",
+        "cmath",
+        "mpmath",
+        "casadi",
+        "jax.numpy",
+        "autograd.numpy",
+        "numpy.lib.scimath",
+        "sympy.physics.mechanics",
+        "sympy.physics.vector",
+        "sympy.matrices",
+        "sympy.abc",
+        "symengine",
+        "pylab",
+    )
 )
 """Modules whose sin is the sine, and whose other functions mean what their names say."""
 SYMBOL_CALLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
@@ -183,8 +198,11 @@ class _Reader:
     def _block_changes(self, statement: ast.stmt, scope: Scope) -> None:
         """Note what a block that is not understood may change under another name."""
         line = self._line(statement)
-        is_class = isinstance(statement, ast.ClassDef)
-        for name in self.effects.of_class(statement) if is_class else self.effects.of_block(statement):
+        if isinstance(statement, ast.ClassDef):
+            names = self.effects.of_class(statement)
+        else:
+            names = self.effects.of_block(statement)
+        for name in names:
             reason = f"{spelled(name)[:40]} may be changed in the block of {line}"
             self._bind(scope, name, statement, NotUnderstood(reason, only_matrices=True))
 
@@ -219,18 +237,24 @@ class _Reader:
             if len(found) == 1:
                 self._bind(scope, name, statement, Symbol(found[0]))
             else:
-                entries = {(k,): Formula(plain_name(symbol)) for k, symbol in enumerate(found)}
+                entries: dict[tuple[int, ...], Formula] = {
+                    (k,): Formula(plain_name(symbol)) for k, symbol in enumerate(found)
+                }
                 self._bind(scope, name, statement, Formula(f"[{', '.join(found)}]", entries=entries))
             return
-        if isinstance(value, ast.Name) and value.id in FUNCTION_NAMES and len(value.id) > 1:
-            if value.id not in self.effects.own or value.id in self.effects.imported:
-                self._bind(scope, name, statement, FunctionNamed(value.id))
-                return
-        if isinstance(value, ast.Attribute) and isinstance(value.value, ast.Name) and value.attr in FUNCTION_NAMES:
-            if value.value.id in self.effects.modules and len(value.attr) > 1:
-                self._bind(scope, name, statement, FunctionNamed(value.attr))
-                return
-        self._bind(scope, name, statement, self.formulas.formula(value))
+        function = self._function_name(value)
+        self._bind(scope, name, statement, FunctionNamed(function) if function else self.formulas.formula(value))
+
+    def _function_name(self, value: ast.expr) -> str:
+        """Return the library's function that a value is; empty of another value."""
+        match value:
+            case ast.Name(name) if name not in self.effects.own or name in self.effects.imported:
+                function = name
+            case ast.Attribute(ast.Name(module), name) if module in self.effects.modules:
+                function = name
+            case _:
+                return ""
+        return str(function) if function in FUNCTION_NAMES and len(function) > 1 else ""
 
     def _is_same(self, name: str, value: ast.expr) -> bool:
         """Whether a value is the name itself, simplified, or as an array."""
@@ -351,9 +375,9 @@ class _Reader:
             return found
         order = value.args[1].value if len(value.args) == 2 and isinstance(value.args[1], ast.Constant) else None
         called = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-        if called != "dynamicsymbols" or order not in (0, 1, 2):
+        if called != "dynamicsymbols" or not isinstance(order, int) or order not in (0, 1, 2):
             return None
-        return found if order == 0 else [dotted(plain_name(name), ("dot", "ddot")[int(order) - 1]) for name in found]
+        return found if order == 0 else [dotted(plain_name(name), ("dot", "ddot")[order - 1]) for name in found]
 
     def _symbol_call(self, call: ast.Call, names: frozenset[str]) -> list[str] | None:
         match call:
@@ -418,15 +442,15 @@ class _Reader:
         """Take the names of a known module for what they are; those assigned before may be replaced by it."""
         if module not in MODULES or module == "sympy.abc":
             raise AnswerError(
-                f"{self.file}: {self._line(statement)}: found 'from {module[:40]} import *', which may change any name; "
-                "expected numpy, sympy or math"
+                f"{self.file}: {self._line(statement)}: found 'from {module[:40]} import *', which may change any "
+                "name; expected numpy, sympy or math"
             )
         main = self.program.main
         for name, bindings in list(main.bindings.items()):
             is_exported = name in LATER if len(name) == 1 else not any(c.isdigit() for c in name)
-            if is_exported and name not in ("tau", "KE", "PE", "Tau", "Jac"):
-                if any(isinstance(b.value, Formula | Symbol) for b in bindings):
-                    self._not_understood(main, [name], statement, f"'from {module} import *'")
+            is_value = any(isinstance(b.value, Formula | Symbol) for b in bindings)
+            if is_exported and is_value and name not in ("tau", "KE", "PE", "Tau", "Jac"):
+                self._not_understood(main, [name], statement, f"'from {module} import *'")
 
     # Functions
 

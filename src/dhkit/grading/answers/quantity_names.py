@@ -110,9 +110,9 @@ class QuantityNames:
         yield from self._vector_entry(letters, number)
         for k in range(1, len(number)):
             yield from self._matrix_entry(letters, number[:k], number[k:])
-        for k in range(1, len(number) - 1):
-            for j in range(k + 1, len(number)):
-                yield from self._matrix_entry(letters + number[:k], number[k:j], number[j:])
+        for start in range(1, len(number) - 1):
+            for end in range(start + 1, len(number)):
+                yield from self._matrix_entry(letters + number[:start], number[start:end], number[end:])
 
     def _vector_entry(self, letters: str, number: str) -> Iterable[Target]:
         quantity = self.quantity(letters)

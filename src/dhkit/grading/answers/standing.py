@@ -127,13 +127,13 @@ class NameTable:
                 case FunctionNamed() | ModuleNamed():
                     library.append(binding)
                 case Formula() as formula:
-                    reason = self._objection(scope, name, formula, binding)
-                    if reason is None:
+                    objection = self._objection(scope, name, formula, binding)
+                    if objection is None:
                         itself.append(binding)
                         note = f"{binding.line}: {name} = {formula.text} is the file's own number"
                         note = note if formula.number is not None else ""
-                    elif reason:
-                        return Standing(wrong=reason)
+                    elif objection:
+                        return Standing(wrong=objection)
                     else:
                         defined.append(binding)
         return self._judged(name, whole, parts, itself, defined, library, note)
@@ -190,7 +190,7 @@ class NameTable:
             return Standing(wrong=f"{name} is changed in {parts[0].line}, and is the robot's own name")
         entries: dict[tuple[int, ...], list[Binding]] = {}
         for part in parts:
-            assert part.index is not None  # noqa: S101 - parts are those with one
+            assert part.index is not None  # noqa: S101
             if not isinstance(part.value, Formula):
                 return Standing(wrong=f"an entry of {name} is not read, in {part.line}")
             versions = entries.setdefault(part.index, [])

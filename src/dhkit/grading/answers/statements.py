@@ -90,7 +90,7 @@ DROPPED = re.compile(
     r"|\\(?:nonumber|notag|IEEEnonumber|IEEEyesnumber|yesnumber|displaystyle|textstyle|allowbreak|centering|noindent|hfill|smallskip|medskip|bigskip)(?![A-Za-z])"
 )
 SPACE = r"(?:\s|~|\\[,;:!> ]|\\q?quad(?![A-Za-z])|\\(?:enspace|thinspace|space)(?![A-Za-z])|\{\})"
-LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;.])")
+LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
 TRAILING = (
     *(
         "\\,",
@@ -160,7 +160,7 @@ def _without_words(text: str) -> str:
 
     def worded(match: re.Match[str]) -> str:
         inside = match[1].strip()
-        joins = re.fullmatch(r"[A-Za-z]{1,3}\d*", inside) and not inside.lower() in ("and", "or", "for", "if", "as")
+        joins = re.fullmatch(r"[A-Za-z]{1,3}\d*", inside) and inside.lower() not in ("and", "or", "for", "if", "as")
         return match[0] if joins else r" \quad\therefore "
 
     return WORDS.sub(worded, text)
@@ -216,16 +216,17 @@ def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
     """Return where a pattern stands outside all brackets and environments."""
     depth = 0
     found: list[tuple[int, int]] = []
-    nested = [(m.start(), m.end(), m) for m in PIECE.finditer(text)]
-    k = 0
+    if pattern.search(text) is None:
+        return found
+    pieces = PIECE.finditer(text)
+    piece = next(pieces, None)
     for match in pattern.finditer(text):
-        while k < len(nested) and nested[k][0] < match.start():
-            piece = nested[k][2]
+        while piece is not None and piece.start() < match.start():
             if piece[1] or piece[3] == "left" or piece[0] in OPENS or piece[0] == r"\{":
                 depth += 1
             elif piece[2] or piece[3] == "right" or piece[0] in CLOSES or piece[0] == r"\}":
                 depth -= 1
-            k += 1
+            piece = next(pieces, None)
         if depth == 0:
             found.append(match.span())
     return found
@@ -370,34 +371,85 @@ def left_hand_name(side: str) -> str:
 
 
 _GREEK = frozenset(
-    ("alpha", "beta", "gamma", "delta", "epsilon", "varepsilon", "zeta", "eta", "theta", "vartheta", "iota", "kappa")
-    + ("lambda", "mu", "nu", "xi", "rho", "varrho", "sigma", "tau", "upsilon", "phi", "varphi", "chi", "psi", "omega")
-    + ("Gamma", "Delta", "Theta", "Lambda", "Xi", "Sigma", "Upsilon", "Phi", "Psi", "Omega", "ell", "Tau", "mathbf")
+    (
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "epsilon",
+        "varepsilon",
+        "zeta",
+        "eta",
+        "theta",
+        "vartheta",
+        "iota",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+        "rho",
+        "varrho",
+        "sigma",
+        "tau",
+        "upsilon",
+        "phi",
+        "varphi",
+        "chi",
+        "psi",
+        "omega",
+        "Gamma",
+        "Delta",
+        "Theta",
+        "Lambda",
+        "Xi",
+        "Sigma",
+        "Upsilon",
+        "Phi",
+        "Psi",
+        "Omega",
+        "ell",
+        "Tau",
+        "mathbf",
+    )
 )
 
 
 # Plain text
 
 
+PLAIN_START = re.compile(r"\s*(?:[-+*/^=)\].]|\*\*)")
+PLAIN_END = re.compile(r"(?:[-+*/^=(\[,]|\.\.\.|\\)\s*$")
+
+
 def _plain_statements(text: str) -> Iterator[Statement]:
-    """Yield the statements of plain text: one a line, or between semicolons outside brackets."""
-    line, start, depth = 1, 1, 0
-    piece: list[str] = []
-    for character in f"{text}\n":
-        depth += (character in "([{") - (character in ")]}")
-        if depth <= 0 and (character in "\n;"):
-            whole = "".join(piece).strip()
-            if whole:
-                yield from _plain_line(whole, start)
-            piece = []
-            line += character == "\n"
-            start = line
-            continue
-        line += character == "\n"
-        piece.append(" " if character == "\n" else character)
-    whole = "".join(piece).strip()
-    if whole:
-        yield Statement(start, (), (whole,), "brackets that do not close", whole)
+    """Yield the statements of plain text: one a line, or between semicolons; lines that go on belong together."""
+    held: list[str] = []
+    start, depth = 1, 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            goes_on = depth > 0
+        else:
+            ended = not held or re.search(r";\s*$", held[-1]) is not None
+            goes_on = depth > 0 or (
+                not ended and (PLAIN_START.match(line) is not None or PLAIN_END.search(held[-1][-20:]) is not None)
+            )
+        if not goes_on:
+            yield from _plain_held(held, start)
+            held, start, depth = [], number, 0
+        if line.strip():
+            start = start if held else number
+            held.append(line)
+            depth += sum(map(line.count, "([{")) - sum(map(line.count, ")]}"))
+    yield from _plain_held(held, start)
+
+
+def _plain_held(held: Sequence[str], line: int) -> Iterator[Statement]:
+    """Yield the statements of lines that belong together."""
+    whole = " ".join(part.strip().removesuffix("...") for part in held)
+    for piece in _plain_split(whole, ";"):
+        if piece.strip():
+            yield from _plain_line(piece.strip(), line)
 
 
 def _plain_line(text: str, line: int) -> Iterator[Statement]:
@@ -412,6 +464,8 @@ def _plain_line(text: str, line: int) -> Iterator[Statement]:
             yield Statement(line, (), (sides[0],), "", part)
             continue
         problem = "" if all(sides) else "an = with nothing on one side"
+        if sum(map(part.count, "([{")) != sum(map(part.count, ")]}")):
+            problem = "brackets that do not close"
         names = [_plain_target(side) for side in sides]
         if re.search(r"[<>~!]|[-+*/]=", part):
             problem = "another relation than ="
