@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict, Witness
 
 SIGN = Diagnosis("gravity_sign", "gravity has the wrong sign", "g", ("g1",), hint="look at the sign of V")
 REPORT = GradeReport(
@@ -28,7 +28,7 @@ REPORT = GradeReport(
         Entry("g", (1,), Verdict.WRONG, "0", follows="V"),
     ),
     diagnosis=(SIGN,),
-    notes=("C is judged by C qd",),
+    notes=(Note(NoteKind.CHRISTOFFEL, "C"),),
     sheet="class/ada.toml",
     student="ada",
     seconds=0.25,
@@ -57,11 +57,12 @@ def reports(draw, words=readable):
     names = st.lists(st.sampled_from([entry.name for entry in entries] or ["M11"]), max_size=3).map(tuple)
     mistake = st.none() | words
     diagnosis = st.builds(Diagnosis, mistake, words, words, names, words, st.tuples(words))
+    notes = st.builds(Note, st.sampled_from(NoteKind), words, st.lists(words, max_size=3).map(tuple))
     return GradeReport(
         *(draw(words) for _ in range(3)),
         tuple(entries),
         tuple(draw(st.lists(diagnosis, max_size=2))),
-        tuple(draw(st.lists(words, max_size=2))),
+        tuple(draw(st.lists(notes, max_size=2))),
         draw(st.none() | words),
         draw(words),
         draw(st.just("") | words),

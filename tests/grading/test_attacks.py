@@ -615,7 +615,7 @@ def test_a_student_is_told_apart_from_another_of_that_name(tmp_path):
 
 
 def test_a_report_of_strangers_texts_survives_its_process():
-    odd = replace(GradeReport("x"), student="\ud800\x00\x1b", notes=("\udcff",))
+    odd = replace(GradeReport("x"), student="\ud800\x00\x1b", left_out=("\udcff",))
     (report,) = grade_all([Sheet(Path("sheet"))], lambda path: odd)
     assert report.to_json().encode()
 

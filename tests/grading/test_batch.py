@@ -56,7 +56,7 @@ def eat(path):
 
 
 def flood(path):
-    return replace(REPORT, notes=("x" * 30_000_000,))
+    return replace(REPORT, left_out=("x" * 30_000_000,))
 
 
 def stumble(path):
@@ -155,15 +155,15 @@ def test_each_has_a_process_and_no_files_of_its_own(capfd):
             resource.getrlimit(resource.RLIMIT_CORE)[0],
             len(list(Path("/dev/fd").iterdir())),
         )
-        return replace(right(path), notes=tuple(map(str, facts)))
+        return replace(right(path), left_out=tuple(map(str, facts)))
 
     first, second = grade_all(sheets("a.toml", "b.toml"), judge, jobs=2)
     assert capfd.readouterr() == ("", "")
-    pid, group, core, files = map(int, first.notes)
+    pid, group, core, files = map(int, first.left_out)
     assert pid == group != os.getpid()
     assert core == 0
     assert files <= 5  # 0, 1, 2, the pipe, and the folder that is being listed
-    assert first.notes[0] != second.notes[0]
+    assert first.left_out[0] != second.left_out[0]
 
 
 @forking
@@ -210,10 +210,10 @@ def test_later_processes_inherit_what_is_prepared():
     cache = []
 
     def judge(path):
-        return replace(right(path), notes=tuple(cache))
+        return replace(right(path), left_out=tuple(cache))
 
     reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, prepare=lambda r: cache.append(r.student))
-    assert [report.notes for report in reports] == [(), ("a",), ("a", "b")]
+    assert [report.left_out for report in reports] == [(), ("a",), ("a", "b")]
 
 
 @forking
@@ -241,7 +241,7 @@ def test_an_interrupt_leaves_no_process_behind(tmp_path, stop):
 @forking
 def test_who_is_slow_to_read_makes_nobody_late():
     def judge(path):
-        return replace(right(path), notes=("x" * 1_000_000,))  # more than a pipe holds
+        return replace(right(path), left_out=("x" * 1_000_000,))  # more than a pipe holds
 
     reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, jobs=3, seconds=1.0)
     errors = []
@@ -262,10 +262,10 @@ def test_without_fork_in_the_process_itself(monkeypatch):
     monkeypatch.delattr(os, "fork", raising=False)
 
     def judge(path):
-        return stumble(path) if path.stem == "b" else replace(right(path), notes=(str(os.getpid()),))
+        return stumble(path) if path.stem == "b" else replace(right(path), left_out=(str(os.getpid()),))
 
     first, second = grade_all(sheets("a.toml", "b.toml"), judge)
-    assert first.notes == (str(os.getpid()),)
+    assert first.left_out == (str(os.getpid()),)
     assert second.error == "KeyError: 'no\\nsuch'; please report this"
 
 

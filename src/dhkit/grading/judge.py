@@ -33,7 +33,7 @@ from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
 from dhkit.grading.judging.truth import Truth, shape_of, truth_of
 from dhkit.grading.mistakes.explaining import explain
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import RingError
 
@@ -83,7 +83,8 @@ def judge(
         for name, quantity in judged.items()
         for entry in _entries(truth.arm(name), quantity, follows.get(name, {}))
     ]
-    notes = [*sheet.notes, *_notes(truth, judged, vocabulary), *agreement]
+    read = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
+    notes = [*read, *_notes(truth, judged, vocabulary), *agreement]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
     judged_at = _judged_at(truth, judged)
     for other in others:
@@ -126,14 +127,14 @@ def _judged_at(truth: Truth, judged: Mapping[str, JudgedQuantity]) -> dict[str, 
 
 def _explained(
     truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int
-) -> tuple[dict[str, dict[tuple[int, ...], str]], list[str], list[Diagnosis]]:
+) -> tuple[dict[str, dict[tuple[int, ...], str]], list[Note], list[Diagnosis]]:
     """Return what wrong entries follow from, which parts agree or why that is not told, and what went wrong."""
     parts = Consistency(truth, judged)
     try:
         follows = {name: parts.follows(name) for name in parts.judged}
         return follows, parts.notes(), explain(truth, parts.judged, digits, follows)
     except RingError as error:
-        return {}, [f"not explained, since an answer is too long: {error}"[:200]], []
+        return {}, [Note(NoteKind.NOT_EXPLAINED, values=(str(error)[:160],))], []
 
 
 def _version() -> str:
@@ -234,25 +235,20 @@ def _entry(arm: ExactArm, name: str, given: Given, finding: Finding, follows: Ma
     )
 
 
-def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary) -> list[str]:
+def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary) -> list[Note]:
     """Return what a reader should know beside verdicts."""
     notes = []
     for name, quantity in judged.items():
         if quantity.numbers:
             values = truth.arm(name).parameters
-            listed = ", ".join(f"{p} = {values[p]:g}" for p in sorted(quantity.numbers))
-            notes.append(f"{name}: judged at the file's numbers: {listed}")
+            listed = tuple(f"{p} = {values[p]:g}" for p in sorted(quantity.numbers))
+            notes.append(Note(NoteKind.NUMBERS, name, listed))
         for index in quantity.contradictions:
-            entry = Entry(name, index, Verdict.WRONG).name
-            notes.append(f"{entry}: the sides of its chain of equations differ; the last one is judged")
+            notes.append(Note(NoteKind.SIDES_DIFFER, Entry(name, index, Verdict.WRONG).name))
     if "C" in judged:
         notes += _about_C(truth, judged["C"])
-    notes += [f"{typed!r} was read as {meant}" for typed, meant in vocabulary.taken_for.items()]
-    notes += [
-        f"V and L count from any zero: {name} is right up to a constant"
-        for name in ("V", "L")
-        if _is_shifted(judged.get(name))
-    ]
+    notes += [Note(NoteKind.TAKEN_FOR, values=(typed, meant)) for typed, meant in vocabulary.taken_for.items()]
+    notes += [Note(NoteKind.UP_TO_A_CONSTANT, name) for name in ("V", "L") if _is_shifted(judged.get(name))]
     return notes
 
 
@@ -263,7 +259,7 @@ def _is_shifted(quantity: JudgedQuantity | None) -> bool:
     return answers is not None and not answers[()].numerator_of_difference(quantity.right(())).is_zero
 
 
-def _about_C(truth: Truth, judged: JudgedQuantity) -> list[str]:
+def _about_C(truth: Truth, judged: JudgedQuantity) -> list[Note]:
     """Say which factorization a right C is: C is judged by C qd, which alone is determined."""
     if judged.wrong or any(entry.tree is None for entry in judged.given):
         return []
@@ -274,17 +270,14 @@ def _about_C(truth: Truth, judged: JudgedQuantity) -> list[str]:
         for entry in judged.given:
             element = reading.read(entry.tree).element() if entry.tree else None
             if element is None:
-                return ["C: judged by C qd"]
+                return [Note(NoteKind.BY_TORQUES, "C")]
             C[entry.index] = element
     except (OutsideTheRingError, AnswerError):
-        return ["C: judged by C qd"]
+        return [Note(NoteKind.BY_TORQUES, "C")]
     M, right = truth.of("M"), coordinates.in_y("C", lag.C)
     if all(element.is_zero for element in (C - right).flat):
-        return ["C: judged by C qd; it is the one of the Christoffel symbols, so dM/dt - 2 C is skew-symmetric"]
+        return [Note(NoteKind.CHRISTOFFEL, "C")]
     rate = np.array([[entry.by_time() for entry in row] for row in M], dtype=object)
     N = rate - 2 * C
     skew = all(element.is_zero for element in (N + N.T).flat)
-    return [
-        "C: judged by C qd; it is another valid factorization than that of the Christoffel symbols, and dM/dt - 2 C is "
-        + ("skew-symmetric" if skew else "not skew-symmetric, which some controllers need")
-    ]
+    return [Note(NoteKind.SKEW if skew else NoteKind.NOT_SKEW, "C")]

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from enum import Enum
 from typing import Any
 
-__all__ = ["Diagnosis", "Entry", "GradeReport", "Verdict", "Witness"]
+__all__ = ["Diagnosis", "Entry", "GradeReport", "Note", "NoteKind", "Verdict", "Witness"]
 
 
 MOST_NAMED = 6
@@ -135,6 +135,66 @@ class Diagnosis:
         return ", ".join(self.entries) or self.where
 
 
+class NoteKind(Enum):
+    """What a note is about; :func:`dhkit.grading.reports.notes.note_text` puts it into words."""
+
+    AGREES = "agrees"
+    """A quantity is what the sheet's own quantities ``values`` give, right or wrong."""
+    DISAGREES = "disagrees"
+    """A quantity is not what the sheet's own quantities ``values`` give."""
+    NUMBERS = "numbers"
+    """A quantity holds parameters as numbers: ``values`` has a text such as ``l2 = 0.4`` for each."""
+    SIDES_DIFFER = "sides_differ"
+    """The sides of an entry's chain of equations differ; the last one is judged."""
+    CHRISTOFFEL = "christoffel"
+    """C is the factorization of the Christoffel symbols."""
+    SKEW = "skew"
+    """C is another factorization, for which dM/dt - 2 C is skew-symmetric."""
+    NOT_SKEW = "not_skew"
+    """C is another factorization, for which dM/dt - 2 C is not skew-symmetric."""
+    BY_TORQUES = "by_torques"
+    """C is judged by C qd alone: which factorization it is could not be decided."""
+    TAKEN_FOR = "taken_for"
+    """The name ``values[0]`` was read as ``values[1]``."""
+    UP_TO_A_CONSTANT = "up_to_a_constant"
+    """An energy is right up to a constant."""
+    NOT_EXPLAINED = "not_explained"
+    """Mistakes were not looked for, since an answer is too long; ``values`` has the limit that it breaks."""
+    OTHER_CONVENTION = "other_convention"
+    """The file's table is in the convention ``values[0]``, and the answer in ``values[1]``."""
+    RIGHT_IN_OTHER_FRAMES = "right_in_other_frames"
+    """A table with a slip would be right for the same arm in other frames than the file's."""
+    ASKED_FOR = "asked_for"
+    """Inverse kinematics are asked for the parts ``values`` of the pose, which the arm can meet."""
+    POSITIONS_ONLY = "positions_only"
+    """Inverse kinematics of an arm without a closed form of ours are asked for positions alone."""
+    NO_CLOSED_FORM = "no_closed_form"
+    """How many solutions there are is open: the arm has no closed form of ours."""
+    SOLUTIONS_MISSING = "solutions_missing"
+    """The branches give ``values[0]`` of the ``values[1]`` solutions that the arm has in general."""
+    PROGRAM = "program"
+    """How a program or paper was read: ``values`` has the reader's text, with its line."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """What a reader should know beside the verdicts, as data.
+
+    Attributes
+    ----------
+    kind
+        What it is about.
+    quantity
+        The quantity or entry that it concerns; empty if it is the sheet.
+    values
+        Names, numbers and texts that the kind tells of.
+    """
+
+    kind: NoteKind
+    quantity: str = ""
+    values: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class GradeReport:
     """What is decided of an answer sheet.
@@ -186,7 +246,7 @@ class GradeReport:
     version: str = ""
     entries: tuple[Entry, ...] = ()
     diagnosis: tuple[Diagnosis, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     sheet: str | None = None
     student: str = ""
     error: str = ""
@@ -255,6 +315,8 @@ class GradeReport:
         data = asdict(self)
         for entry, own in zip(data["entries"], self.entries, strict=True):
             entry["verdict"] = own.verdict.value
+        for note, own_note in zip(data["notes"], self.notes, strict=True):
+            note["kind"] = own_note.kind.value
         return data
 
     @classmethod
@@ -281,7 +343,10 @@ class GradeReport:
             Diagnosis(**{**found, "entries": tuple(found["entries"]), "equivalent": tuple(found["equivalent"])})
             for found in data["diagnosis"]
         )
-        listed = {name: tuple(data[name]) for name in ("notes", "left_out")}
+        notes = tuple(
+            Note(NoteKind(note["kind"]), note["quantity"], tuple(note["values"])) for note in data["notes"]
+        )
+        listed = {"notes": notes, "left_out": tuple(data["left_out"])}
         return cls(**{**data, "entries": entries, "diagnosis": diagnosis, **listed})
 
     def to_json(self) -> str:

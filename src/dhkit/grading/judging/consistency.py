@@ -9,7 +9,7 @@ import numpy as np
 
 from dhkit.grading.judging.quantities import JudgedQuantity
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.report import Verdict
+from dhkit.grading.report import Note, NoteKind, Verdict
 from dhkit.symbolic.ring import Element, Elements, element_array
 
 __all__ = ["Consistency"]
@@ -52,11 +52,11 @@ class Consistency:
                     found[index] = ", ".join(wrong)
         return found
 
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         """Say of a sheet with mistakes which of its parts agree with each other, right or wrong."""
         found = []
-        for quantity, ((sources, route), words) in _CHECKS.items():
-            given = [name for name in sources if name in self.judged]
+        for quantity, ((sources, route), *_) in _ROUTES.items():
+            given = tuple(name for name in sources if name in self.judged)
             if quantity not in self.judged or not given:
                 continue
             if not any(self.judged[name].wrong for name in (quantity, *given)):
@@ -65,7 +65,7 @@ class Consistency:
             if own is None or expected is None:
                 continue
             agrees = all((a - b).is_zero for a, b in zip(own.flat, expected.flat, strict=True))
-            found.append(f"{quantity} is {'' if agrees else 'not '}{words.format(', '.join(given))}")
+            found.append(Note(NoteKind.AGREES if agrees else NoteKind.DISAGREES, quantity, given))
         return found
 
     def own(self, quantity: str) -> Elements | None:
@@ -189,15 +189,3 @@ _ROUTES: Mapping[str, tuple[tuple[tuple[str, ...], Route], ...]] = {
     "J": ((("T",), _jacobian),),
 }
 """By quantity the quantities that it is made of, and how."""
-
-_WORDS = {
-    "M": "the matrix of second derivatives of the sheet's own {} by the rates",
-    "C": "what the sheet's own {} gives: C qd = dM/dt qd - dK/dq",
-    "h": "what the sheet's own {} gives: h = dM/dt qd - dK/dq",
-    "g": "the gradient of the sheet's own {}",
-    "tau": "what the sheet's own {} give",
-    "L": "the difference of energies, with the sheet's own {}",
-    "T": "the product of the transforms, with the sheet's own {}",
-    "J": "the Jacobian of the sheet's own {}",
-}
-_CHECKS = {quantity: (routes[0], _WORDS[quantity]) for quantity, routes in _ROUTES.items()}

@@ -28,7 +28,7 @@ from dhkit.grading.judging.inverse_branch import (
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Verdict
+from dhkit.grading.report import Note, NoteKind, Verdict
 
 __all__ = [
     "CLOSES",
@@ -65,7 +65,7 @@ class InverseJudgement:
     duplicates: tuple[tuple[int, int], ...] = ()
     solutions: int | None = None
     covered: int | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -143,14 +143,14 @@ def _check(description: Description, branches: Sequence[Sequence[Tree]]) -> None
         joint_order(branch, f"ik, branch {b}")
 
 
-def _notes(poses: Poses, solutions: int | None, covered: int | None) -> tuple[str, ...]:
+def _notes(poses: Poses, solutions: int | None, covered: int | None) -> tuple[Note, ...]:
     notes = []
     if not poses.full:
-        notes.append(f"asked for what the arm can meet: {', '.join(poses.met)}")
+        notes.append(Note(NoteKind.ASKED_FOR, "ik", tuple(poses.met)))
     if solutions is None or covered is None:
-        notes.append("no closed form of ours for this arm: how many solutions there are is open")
+        notes.append(Note(NoteKind.NO_CLOSED_FORM, "ik"))
     elif covered < solutions:
-        notes.append(f"the branches give {covered} of the {solutions} solutions that the arm has in general")
+        notes.append(Note(NoteKind.SOLUTIONS_MISSING, "ik", (str(covered), str(solutions))))
     return tuple(notes)
 
 

@@ -11,7 +11,7 @@ from dhkit.grading.answers.sheet import Task
 from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.inverse import BranchJudgement, judge_inverse
 from dhkit.grading.judging.tables import TableJudgement, judge_table
-from dhkit.grading.report import Diagnosis, Entry, Verdict, Witness
+from dhkit.grading.report import Diagnosis, Entry, Note, NoteKind, Verdict, Witness
 
 __all__ = ["KinematicEntries", "inverse_entries", "table_entries"]
 
@@ -26,7 +26,7 @@ class KinematicEntries:
 
     entries: tuple[Entry, ...]
     diagnosis: tuple[Diagnosis, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     judged_at: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -55,7 +55,7 @@ def table_entries(
         entries.append(Entry("dh", (i,), verdict, _row_text(rows[i]), statement=statement))
     notes = judgement.notes
     if slipped:
-        notes += ("dh: it would be right for the same arm in other frames than the file's",)
+        notes += (Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"),)
     return KinematicEntries(tuple(entries), _table_diagnosis(judgement, entries, slipped), notes, judgement.judged_at)
 
 
@@ -106,7 +106,7 @@ def inverse_entries(description: Description, branches: Sequence[Sequence[Given]
             where = f"ik, branch {k + 1}" + ("" if explanation.joint is None else f", q{explanation.joint + 1}")
             sentence = _sentence(explanation.sentence)
             diagnosis.append(Diagnosis(explanation.mistake, sentence, where, (entry.name,), INVERSE_HINT))
-    return KinematicEntries(tuple(entries), tuple(diagnosis), tuple(f"ik: {note}" for note in judgement.notes))
+    return KinematicEntries(tuple(entries), tuple(diagnosis), judgement.notes)
 
 
 def _statement(branch: BranchJudgement) -> str:

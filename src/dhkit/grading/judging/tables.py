@@ -33,7 +33,7 @@ from dhkit.grading.judging.table_arms import (
     row_numbers,
 )
 from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Verdict
+from dhkit.grading.report import Note, NoteKind, Verdict
 from dhkit.symbolic import Element, Elements, ExactArm, RingError, exact_arm
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring
@@ -95,7 +95,7 @@ class TableJudgement:
     statements: tuple[str, ...]
     explanations: tuple[TableExplanation, ...] = ()
     other_frames: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     judged_at: Mapping[str, float] = field(default_factory=dict)
     moves_zero: bool = False
     moved_rows: tuple[int, ...] = ()
@@ -216,12 +216,10 @@ class _Judge:
         verdicts, statements = tuple(row.verdict for row in judged), tuple(row.statement for row in judged)
         in_numbers = frozenset().union(*(row.numbers for row in judged))
         at = {name: self.states[0][name] for name in self.description.parameters if name in in_numbers}
-        notes: tuple[str, ...] = ()
+        notes: tuple[Note, ...] = ()
         if self.converted:
-            notes = (
-                f"the file's table is {self.description.convention.value}: held against it in the "
-                f"{self.convention.value} convention; base and tool take up what is left over at the ends",
-            )
+            conventions = (self.description.convention.value, self.convention.value)
+            notes = (Note(NoteKind.OTHER_CONVENTION, "dh", conventions),)
         wrong = [i for i in range(self.n) if verdicts[i] is Verdict.WRONG]
         if not wrong:
             return TableJudgement(verdicts, statements, notes=notes, judged_at=at)

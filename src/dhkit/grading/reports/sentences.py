@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict, Witness
+from dhkit.grading.reports.notes import note_text
 from dhkit.grading.reports.plain import plain, points
 
 __all__ = [
@@ -63,7 +64,7 @@ def remarks(report: GradeReport) -> Iterator[str]:
     if report.missing:
         yield f"missing: {', '.join(map(plain, report.missing))}"
     yield from (f"left out: {plain(line)}" for line in report.left_out)
-    yield from (f"note: {plain(note)}" for note in report.notes)
+    yield from (f"note: {plain(note_text(note))}" for note in report.notes)
 
 
 def witness_sentence(witness: Witness) -> str:
