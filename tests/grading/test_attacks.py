@@ -112,12 +112,12 @@ def prepared():
     assert not CANARY.exists()
 
 
-def watch():
+def watch(may_fork=False):
     """End this process if anything is executed, started, written or spied on."""
     allowed = ("__pycache__", os.environ.get("DHKIT_CACHE_DIR", "__pycache__"), os.devnull)
 
     def hook(event, arguments):
-        if event in FORBIDDEN:
+        if event in FORBIDDEN and not (may_fork and event in ("os.fork", "os.kill")):
             os._exit(EXECUTED)
         if event in ("compile", "exec"):
             code = arguments[1] if event == "compile" else getattr(arguments[0], "co_filename", "<string>")
@@ -132,11 +132,11 @@ def watch():
     sys.addaudithook(hook)
 
 
-def judged(judge, seconds=SECONDS, memory=MEMORY):
+def judged(judge, seconds=SECONDS, memory=MEMORY, may_fork=False):
     """Return the report of a judge that is watched, in a process with limits."""
 
     def watched(path):
-        watch()
+        watch(may_fork)
         try:
             return judge()
         except (AnswerError, DescriptionError):
@@ -187,11 +187,15 @@ def test_the_watch_lets_honest_answers_pass():
 # Entries
 
 
+TRIED = ("large power", "power of nine", "negative power", "cosine of many", "cosine of too many", "LaTeX catcode")
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_no_answer_is_refused(name):
     report = judged(lambda: grade_answers(PLANAR, {"V": made(REFUSED[name])}))
     check(report)
-    assert report.verdict is Verdict.UNREADABLE
+    # What is too long for the exact ring is tried at random states: one that differs is wrong. So is x = 11 of V.
+    assert report.verdict is (Verdict.WRONG if name in TRIED else Verdict.UNREADABLE)
 
 
 @pytest.mark.parametrize("name", WRONG)
@@ -327,7 +331,8 @@ def test_hostile_objects_are_unreadable_or_wrong(name):
         answer = OBJECTS[name]()
     except RecursionError:
         pytest.skip("not even made")
-    report = judged(lambda: grade_answers(PLANAR, {"V": answer}))
+    # A function is called in a process of its own.
+    report = judged(lambda: grade_answers(PLANAR, {"V": answer}), may_fork=callable(answer))
     check(report)
     assert report.verdict in (Verdict.WRONG, Verdict.UNREADABLE)
 

@@ -15,7 +15,7 @@ from dhkit.grading.answers.sheet import sheet_of
 from dhkit.grading.judge import judge
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "grading.md").read_text("utf-8")
-SHEET, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+TASK, SHEET, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
@@ -34,6 +34,7 @@ def test_a_command_works(command, tmp_path, monkeypatch, capsys):
     (tmp_path / "submissions" / "ada").mkdir(parents=True)
     for path in ("answer.toml", "submissions/ada/answer.toml", "submissions/bob.toml"):
         (tmp_path / path).write_text(SHEET)
+    (tmp_path / "task.toml").write_text(TASK)
     (tmp_path / "homework.m").write_text("V = m1*g*l1*sin(q(1))/2 + m2*g*(l1*sin(q(1)) + l2*sin(q(1) + q(2))/2);\n")
     with pytest.raises(SystemExit) as exit:
         main(shlex.split(command))

@@ -67,8 +67,10 @@ def grade(
         if robot is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
         sheet = read_source(path, robot)
-    else:
+    elif path.suffix.lower() == ".toml":
         sheet = read_sheet(path)
+    else:
+        raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected .toml, .py, .m, .tex or .ipynb")
     about = robot or robot_of(sheet, path.parent)
     if task is not None:
         sheet = replace(sheet, task=task.task, names=_names(sheet.names, task.names))

@@ -24,7 +24,7 @@ def template(description: Description, robot: str | None = None) -> str:
     variables = ", ".join(f"q{i + 1}" for i in range(n))
     symbols = ", ".join(description.parameters) or "none: numbers, SI and radians"
     lines = [
-        f"# Answers for {description.name}; entries that stay empty are not handed in.",
+        f"# Answers for {description.name}; what stays empty is not handed in, and part of a quantity is incomplete.",
         f"# Joint variables: {variables} (or th1, theta_1, ...), rates qd1 (q1dot, dq1), accelerations qdd1.",
         f"# Sums of angles: c12 for cos(q1 + q2), s1 for sin(q1). Parameters: {symbols}.",
         "format = 1",

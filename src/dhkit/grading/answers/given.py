@@ -33,6 +33,8 @@ __all__ = [
 ]
 
 LEFT_EMPTY = "left empty"
+BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
+"""How the one entry of a matrix begins that stands in brackets."""
 POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
 """The tool's pose in the world, which inverse kinematics start from: its origin, m, and its rotation by rows."""
 
@@ -53,6 +55,8 @@ class Given:
         Why it could not be read.
     earlier
         The other formulas of a statement ``V = a = b``, of which ``tree`` is the last.
+    is_partly_read
+        Whether a formula before the last could not be read, and was not held against it.
     """
 
     index: tuple[int, ...]
@@ -60,6 +64,7 @@ class Given:
     tree: Tree | None = None
     error: str = ""
     earlier: tuple[Tree, ...] = ()
+    is_partly_read: bool = False
 
     @property
     def is_missing(self) -> bool:
@@ -80,8 +85,6 @@ def vocabulary_of(
     further = POSE_NAMES if inverse else ()
     vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
     for name, text in names.parameters.items():
-        if names.lenient and _stays(name, text, vocabulary, description):
-            continue
         if isinstance(text, Refusal):
             vocabulary.refuse(name, f"its own assignment is not read: {text.reason}")
             continue
@@ -91,19 +94,8 @@ def vocabulary_of(
         except AnswerError as error:
             if not names.lenient:
                 raise AnswerError(f"names.parameters: {shown(name)}: {error}") from None
-            if not vocabulary.knows(name):
-                vocabulary.refuse(name, f"its own assignment is not read: {error}")
+            vocabulary.refuse(name, f"its own assignment is not read: {error}")
     return vocabulary
-
-
-def _stays(name: str, text: str | Refusal, vocabulary: Vocabulary, description: Description) -> bool:
-    """Whether a program's assignment changes nothing: a number for a parameter, symbols for joint variables."""
-    known = vocabulary.find(name)
-    if known is None:
-        return False
-    if known == (name,) and name in description.parameters:
-        return isinstance(text, str) and re.fullmatch(r"[-+\d.eE*/() ]+", text) is not None
-    return vocabulary.is_state(name)
 
 
 def given_quantity(
@@ -139,7 +131,7 @@ def given_quantity(
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary)
     elif isinstance(value, Entries):
         given = _from_entries(name, value, shape, vocabulary, names)
-    elif isinstance(value, str) and "[" not in value and "matrix" not in value:
+    elif isinstance(value, str) and (not shape or not BRACKETED.match(value)):
         given = (_entry(Target(name, (0,) * len(shape)), value, vocabulary, names),)
     elif isinstance(value, str):
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary)
@@ -255,16 +247,14 @@ def _entry(target: Target, value: Any, vocabulary: Vocabulary, names: QuantityNa
 
 
 def _chained(sides: Sequence[Sequence[Given]]) -> tuple[Given, ...]:
-    """Return the entries of a chain's last side, each with those of the sides before it.
+    """Return the entries of a chain's last side, each with those of the sides before it that can be read.
 
-    A side before the last that cannot be read makes the entry unreadable: what it says may differ.
+    K = q'^T M q'/2 = ... begins with a side that is no formula of the robot's names; the last side is the answer.
     """
     found = []
-    for entries in zip(*sides, strict=True):
-        *earlier, last = entries
-        error = next((entry.error for entry in entries if entry.tree is None), "")
+    for *earlier, last in zip(*sides, strict=True):
         trees = tuple(entry.tree for entry in earlier if entry.tree is not None)
-        found.append(Given(last.index, last.text, error=error) if error else replace(last, earlier=trees))
+        found.append(replace(last, earlier=trees, is_partly_read=len(trees) < len(earlier)))
     return tuple(found)
 
 

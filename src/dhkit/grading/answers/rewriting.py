@@ -279,7 +279,8 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
         calls = k + 1 < len(tokens) and tokens[k + 1].text in ("(", "^")
         meaning = vocabulary.find(token.text)
         _refuse_ambiguous(tokens, k, vocabulary, text)
-        if token.text in FUNCTION_NAMES and (meaning is None or calls):
+        is_raised = calls and tokens[k + 1].text == "^" and token.text in vocabulary.own
+        if token.text in FUNCTION_NAMES and (meaning is None or (calls and not is_raised)):
             found.append(Token("function", FUNCTION_NAMES[token.text], token.at))
         elif meaning is not None:
             found += [_token(word, token.at) for word in meaning]

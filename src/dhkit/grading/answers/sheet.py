@@ -106,7 +106,7 @@ class Names:
     parameters
         The student's further names, each as text in the robot's parameters and in those before it.
     lenient
-        Whether a further name may be unreadable, or that of a parameter: what a program assigns besides its answers.
+        Whether a further name may be unreadable, and replaces any other meaning: what a program defines.
     """
 
     q: tuple[str, ...] = ()

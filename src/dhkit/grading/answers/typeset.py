@@ -30,15 +30,29 @@ def typeset(tree: Tree) -> tuple[str, str]:
     >>> typeset(read("m1/2*cos(q1)^2"))
     ('m1/2*cos(q1)^2', '\\\\frac{m_{1}}{2} \\\\cos(q_{1})^{2}')
     """
-    count = 0
-    for count, _ in enumerate(parts_of(tree), start=1):
-        if count > MAX_NODES:
-            return "", ""
+    if _size(tree, MAX_NODES) > MAX_NODES:
+        return "", ""
     names = {part.text for part in parts_of(tree) if isinstance(part, Name)}
     symbols = latex_names([name for name in names if not VARIABLE.fullmatch(name)])
     text = _Writer(_plain_name, _plain_call, _plain_product, lambda a, b: f"{a}^{b}")
     latex = _Writer(lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power)
     return text.of(tree, SUM), latex.of(tree, SUM)
+
+
+def _size(tree: Tree, most: int) -> int:
+    """Return how many nodes are written, those that are shared each time; counting ends beyond the most."""
+    count, left = 0, [tree]
+    while left and count <= most:
+        part = left.pop()
+        count += 1
+        match part:
+            case Sum(parts) | Product(parts):
+                left += [inner for _, inner in parts]
+            case Power(base, exponent):
+                left += [base, exponent]
+            case Call(_, arguments):
+                left += arguments
+    return count
 
 
 @dataclass(frozen=True)

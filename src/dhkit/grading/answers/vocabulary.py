@@ -292,9 +292,8 @@ class Vocabulary:
         return found[0] if is_product else None
 
     def _is_factor(self, piece: str) -> bool:
-        return piece[0].isalpha() and (
-            piece in self.own or piece in self._exact or bool(self._joint(piece) or self._turn(piece))
-        )
+        is_known = piece in self.own or piece in self._exact or bool(self._joint(piece) or self._turn(piece))
+        return piece[0].isalpha() and is_known and self.knows(piece)
 
     def nearest(self, name: str) -> str:
         """Return a hint: why a name could not be defined, or the known name that is nearest."""

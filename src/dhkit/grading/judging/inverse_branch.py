@@ -1,8 +1,8 @@
-"""One branch of inverse kinematics worked out for many poses, and what goes wrong in it."""
+"""One branch of inverse kinematics worked out for many poses: which it closes, and which joint is wrong first."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
@@ -13,109 +13,35 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.answers.given import POSE_NAMES
-from dhkit.grading.judging.changed_calls import changed_calls, exchanged, negated
-from dhkit.grading.judging.inverse_poses import CLOSES, MATCHES, Mask, Poses
-from dhkit.grading.judging.numeric import doubles, names_of
-from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Verdict
+from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
+from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
 
-__all__ = ["Branch", "BranchJudgement", "InverseExplanation", "InverseWitness", "joint_order"]
+__all__ = ["Branch", "Repair", "joint_order"]
 
 RARE = 0.01
 """Share of poses: solutions that a branch meets less often are met by chance."""
-SUBSTANTIAL = 0.3
-"""Share of the failing poses: a mistake that explains so many is one, though others are made besides."""
+UNFOUND = 0.1
+"""Share of the failing poses for which Newton's method may have missed a solution."""
 Repair: TypeAlias = Callable[[Array], Array]
-
-
-@dataclass(frozen=True)
-class InverseExplanation:
-    """What went wrong in a branch.
-
-    Attributes
-    ----------
-    mistake
-        The identity of a mistake of the library; None where none is found.
-    sentence
-        What a student learns from it.
-    joint
-        Which joint's formula is meant, from 0; None where it is the branch.
-    """
-
-    mistake: str | None
-    sentence: str
-    joint: int | None = None
-
-
-@dataclass(frozen=True)
-class InverseWitness:
-    """A pose that a branch does not reach.
-
-    Attributes
-    ----------
-    pose
-        Values of :data:`POSE_NAMES`, m.
-    answer
-        What the formulas give, rad and m; None where they have no value.
-    truth
-        The solution that is nearest to it, joint after joint.
-    """
-
-    pose: Mapping[str, float]
-    answer: tuple[float | None, ...]
-    truth: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class BranchJudgement:
-    """What is decided of one branch.
-
-    Attributes
-    ----------
-    verdict
-        CORRECT where it closes every pose tried that a solution of this branch reaches, else WRONG.
-    closed, poses
-        How many poses it closes, of how many that a solution of this branch reaches.
-    without_value
-        On how many of these it has no value: a root of a negative number, an arc cosine beyond 1.
-    joint
-        The first joint, from 0, whose value is wrong; None where all are right, or only not exact enough.
-    witness
-        A pose that it does not close.
-    explanations
-        What went wrong, the earliest joint first.
-    repeats
-        Which earlier branch, from 0, gives the same.
-    """
-
-    verdict: Verdict
-    closed: int
-    poses: int
-    without_value: int = 0
-    joint: int | None = None
-    witness: InverseWitness | None = None
-    explanations: tuple[InverseExplanation, ...] = ()
-    repeats: int | None = None
-
-    @property
-    def statement(self) -> str:
-        """What was found, in a line."""
-        if self.repeats is not None:
-            return f"gives the same solutions as branch {self.repeats + 1}"
-        said = f"closes {self.closed} of {self.poses} poses"
-        share = 100 * self.without_value / max(self.poses, 1)
-        return said + (f", has no value on {share:.3g} %" if self.without_value else "")
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One branch worked out for all poses."""
+    """One branch worked out for all poses.
+
+    Attributes
+    ----------
+    poses
+        What it is tried on.
+    trees
+        A formula a joint.
+    repairs
+        Joints with what is done to their results before later joints use them.
+    """
 
     poses: Poses
     trees: tuple[Tree, ...]
     repairs: tuple[tuple[int, Repair], ...] = ()
-    """What is done to a joint's result before later joints use it."""
 
     @property
     def n(self) -> int:
@@ -136,12 +62,29 @@ class Branch:
         """What the formulas give, shape (S, n); NaN where they have no value."""
         values, columns = dict(self.poses.values), np.empty((len(self.poses.T), self.n))
         for k in self.order:
-            x = np.array(np.broadcast_to(np.asarray(doubles(self.trees[k], values), dtype=float), len(self.poses.T)))
-            for joint, repair in self.repairs:
-                x = repair(x) if joint == k else x
-            x[~np.isfinite(x)] = np.nan
-            values[f"q{k + 1}"] = columns[:, k] = x
+            columns[:, k] = values[f"q{k + 1}"] = self.repaired(k, doubles(self.trees[k], values))
         return columns
+
+    def repaired(self, joint: int, numbers: Array | float) -> Array:
+        """Return a formula's numbers for all poses, shape (S,), put right where that is known; NaN for no value."""
+        x = np.array(np.broadcast_to(np.asarray(numbers, dtype=float), len(self.poses.T)))
+        for other, repair in self.repairs:
+            x = repair(x) if other == joint else x
+        x[~np.isfinite(x)] = np.nan
+        return x
+
+    def independent(self, joint: int) -> list[int]:
+        """Return the joints whose formulas do not need a joint's: its own may use them."""
+        needing = {joint}
+        for k in self.order:
+            if names_of(self.trees[k]) & {f"q{other + 1}" for other in needing}:
+                needing.add(k)
+        return [k for k in range(self.n) if k not in needing]
+
+    def editable(self, joint: int) -> EditedDoubles:
+        """Return a joint's formula worked out, ready for changes."""
+        found = {f"q{k + 1}": self.q[:, k] for k in self.independent(joint)}
+        return EditedDoubles(self.trees[joint], {**self.poses.values, **found})
 
     @cached_property
     def closed(self) -> Mask:
@@ -152,7 +95,7 @@ class Branch:
     def reachable(self) -> Mask:
         """Which poses it should close, shape (S,): all but those that none of the solutions it follows reaches."""
         solutions = self.poses.solutions
-        if not np.any(self.closed) or not solutions.shape[1]:
+        if not np.any(self.closed) or not self.poses.has_closed_form:
             return np.ones(len(self.closed), dtype=bool)
         follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > RARE
         if not np.any(follows):
@@ -165,130 +108,58 @@ class Branch:
         """Which poses it should close and does not, shape (S,)."""
         return self.reachable & ~self.closed
 
+    @property
+    def is_right(self) -> bool:
+        """Whether it closes every pose that it should."""
+        return not np.any(self.failing)
+
     @cached_property
     def agreement(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Of each pose the turn of the first joint that no solution agrees with so far (n: none), and the nearest."""
         truths = self.poses.truths
-        alive = np.all(np.isfinite(truths), axis=-1)
         first = np.full(len(truths), self.n)
-        nearest = np.argmax(alive, axis=1)
+        nearest = np.argmax(np.all(np.isfinite(truths), axis=-1), axis=1)
         for turn, k in enumerate(self.order):
+            alive = self.alive[turn]
             gap = np.where(alive, self.poses.gaps(self.q[:, None, k], truths[..., k], k), np.inf)
             gap = np.where(alive & np.isnan(gap), 1e300, gap)
             going = first == self.n
             nearest = np.where(going, np.argmin(gap, axis=1), nearest)
-            lost = going & ~np.any(gap < MATCHES, axis=1)
-            first[lost] = turn
-            alive = np.where((first == self.n)[:, None], gap < MATCHES, alive)
+            first[going & ~np.any(gap < MATCHES, axis=1)] = turn
         return first, nearest
 
+    @cached_property
+    def alive(self) -> list[Mask]:
+        """Of each turn which solutions, shape (S, B + 1), agree with the joints before it; all once none does."""
+        truths = self.poses.truths
+        alive = [np.all(np.isfinite(truths), axis=-1)]
+        for k in self.order:
+            near = alive[-1] & (self.poses.gaps(self.q[:, None, k], truths[..., k], k) < MATCHES)
+            alive.append(np.where(np.any(near, axis=1, keepdims=True), near, alive[-1]))
+        return alive
+
+    def agrees(self, joint: int, x: Array) -> Mask:
+        """Return whether values of a joint, shape (S,), are those of a solution that agrees with the joints before."""
+        gap = self.poses.gaps(x[:, None], self.poses.truths[..., joint], joint)
+        near: Mask = np.any(self.alive[self.rank(joint)] & (gap < MATCHES), axis=1)
+        return near
+
     def wrong_joint(self) -> int | None:
-        """Return the first joint that is wrong on some pose that should close."""
-        first = self.agreement[0][self.failing]
-        turn = int(np.min(first, initial=self.n))
+        """Return the first joint that is wrong on some pose that should close; None where all are right.
+
+        Solutions that Newton's method found may not be all: a joint is wrong then where it is on a good part of them.
+        """
+        first = np.sort(self.agreement[0][self.failing])
+        if not len(first) or not self.poses.isolated:
+            return None
+        spared = 0 if self.poses.has_closed_form else int(UNFOUND * len(first))
+        turn = int(first[spared])
         return self.order[turn] if turn < self.n else None
 
-    def judgement(self) -> BranchJudgement:
-        """Return what is decided of it, and why."""
-        poses, closed = int(np.sum(self.reachable)), int(np.sum(self.closed & self.reachable))
-        if not np.any(self.failing):
-            return BranchJudgement(Verdict.CORRECT, closed, poses)
-        explanations = tuple(sorted(self.explanations(), key=lambda found: self.rank(found.joint or 0)))
-        return BranchJudgement(
-            Verdict.WRONG,
-            closed,
-            poses,
-            int(np.sum(self.reachable & np.any(np.isnan(self.q), axis=1))),
-            explanations[0].joint,
-            self.witness(),
-            explanations,
-        )
-
-    def witness(self) -> InverseWitness:
-        """Return a pose that it does not close, one where it has values if there is one."""
-        valued = self.failing & np.all(np.isfinite(self.q), axis=1)
-        s = int(np.argmax(valued if np.any(valued) else self.failing))
-        pose = {name: float(np.asarray(self.poses.values[name])[s]) for name in POSE_NAMES}
-        answer = tuple(float(x) if np.isfinite(x) else None for x in self.q[s])
-        return InverseWitness(pose, answer, tuple(self.poses.truths[s, self.agreement[1][s]].tolist()))
-
-    def explanations(self) -> Iterator[InverseExplanation]:
-        """Yield what went wrong, each mistake put right before the next is looked for."""
-        branch: Branch | None = self
-        while branch is not None and np.any(branch.failing):
-            joint = branch.wrong_joint()
-            if joint is None:
-                yield InverseExplanation(None, f"near to a solution, but not to {CLOSES:g}")
-                return
-            name, joint, branch = branch.repaired(joint)
-            said = f"q{joint + 1}: {LIBRARY[name].sentence}" if name else f"q{joint + 1} is the first that is wrong"
-            yield InverseExplanation(name, said, joint)
-
-    def repaired(self, joint: int) -> tuple[str | None, int, Branch | None]:
-        """Return a mistake, its joint and the branch with it put right, given the first joint that is wrong.
-
-        Rather one that explains all poses than one that only makes the joint right (a wrong value may well be that of
-        another solution), and rather that than one that closes a good part of them, next to other mistakes.
-        """
-        candidates = [
-            *(
-                (name, earlier, branch)
-                for earlier in self.order[: self.rank(joint)]
-                for name, branch in self.lost_halves(earlier, joint)
-            ),
-            *((name, joint, branch) for name, branch in self.candidates(joint)),
-        ]
-        for candidate in candidates:
-            if not np.any(candidate[2].failing):
-                return candidate
-        for candidate in candidates:
-            following = candidate[2].wrong_joint()
-            if following is None or self.rank(following) > self.rank(joint):
-                return candidate
-        best = max(candidates, key=lambda candidate: int(np.sum(candidate[2].closed)))
-        gained = int(np.sum(best[2].closed)) - int(np.sum(self.closed))
-        return best if gained > SUBSTANTIAL * np.sum(self.failing) else (None, joint, None)
-
-    def lost_halves(self, joint: int, first: int) -> Iterator[tuple[str, Branch]]:
-        """Yield what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
-
-        The wrong half may be the value of another solution, and then a later joint is the first that is wrong.
-        """
-        wrong = self.failing & (self.agreement[0] == self.rank(first))
-        if any(True for _ in changed_calls(self.trees[joint], ("atan", "asin"), negated)):
-            yield "quadrant", self.with_repair(joint, lambda x: np.where(wrong, x + np.pi, x))
-            yield "quadrant", self.with_repair(joint, lambda x: np.where(wrong, np.pi - x, x))
-        if any(True for _ in changed_calls(self.trees[joint], ("acos",), negated)):
-            yield "sign_lost", self.with_repair(joint, lambda x: np.where(wrong, -x, x))
-
-    def candidates(self, joint: int) -> Iterator[tuple[str, Branch]]:
-        """Yield what the branch would be with each mistake at a joint put right."""
-        wrong = self.failing & (self.agreement[0] == self.rank(joint))
-        if self.poses.description.numbers.prismatic[joint]:
-            yield "millimetres_for_metres", self.with_repair(joint, lambda x: x / 1000)
-        else:
-            yield "degrees_for_radians", self.with_repair(joint, np.radians)
-            for tree in changed_calls(self.trees[joint], ("atan2",), exchanged):
-                yield "atan2_arguments", self.with_tree(joint, tree)
-        for tree in changed_calls(self.trees[joint], ("sqrt", "acos", "asin"), negated):
-            yield "elbow_sign", self.with_tree(joint, tree)
-        yield "joint_sign", self.with_repair(joint, np.negative)
-        for offset in self.offsets(joint, wrong):
-            yield "missing_offset", self.with_repair(joint, _plus(offset))
-        if not self.poses.description.numbers.prismatic[joint]:
-            yield "supplement", self.with_repair(joint, lambda x: np.pi - x)
-            yield "quadrant", self.with_repair(joint, lambda x: np.where(wrong, x + np.pi, x))
-            yield "quadrant", self.with_repair(joint, lambda x: np.where(wrong, np.pi - x, x))
-        yield "sign_lost", self.with_repair(joint, lambda x: np.where(wrong, -x, x))
-
-    def offsets(self, joint: int, wrong: Mask) -> list[float]:
-        """Return by how much a joint may be off, from one pose."""
-        wrong = wrong & np.isfinite(self.q[:, joint])
-        if not np.any(wrong):
-            return []
-        s = int(np.argmax(wrong))
-        found = self.poses.truths[s, :, joint] - self.q[s, joint]
-        return [float(x) for x in found if np.isfinite(x)]
+    def sample(self, most: int) -> Branch:
+        """Return the branch on some of its poses: so many that it should close and does not, and as many that it does."""
+        chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
+        return Branch(self.poses.at(chosen), self.trees)
 
     def with_repair(self, joint: int, repair: Repair) -> Branch:
         """Return the branch with something done to a joint's result."""
@@ -296,7 +167,11 @@ class Branch:
 
     def with_tree(self, joint: int, tree: Tree) -> Branch:
         """Return the branch with another formula for a joint."""
-        return replace(self, trees=(*self.trees[:joint], tree, *self.trees[joint + 1 :]))
+        return self.with_trees((*self.trees[:joint], tree, *self.trees[joint + 1 :]))
+
+    def with_trees(self, trees: Sequence[Tree]) -> Branch:
+        """Return the branch with other formulas."""
+        return Branch(self.poses, tuple(trees), self.repairs)
 
 
 def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:
@@ -316,7 +191,3 @@ def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:
             raise AnswerError(f"{where}: {left} need each other")
         order.append(ready[0])
     return tuple(order)
-
-
-def _plus(offset: float) -> Repair:
-    return lambda x: x + offset

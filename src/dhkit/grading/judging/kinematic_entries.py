@@ -7,17 +7,14 @@ from dataclasses import dataclass, field
 
 from dhkit.description import Description
 from dhkit.grading.answers.given import Given
-from dhkit.grading.answers.sheet import Task
 from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.inverse import BranchJudgement, judge_inverse
-from dhkit.grading.judging.tables import TableJudgement, judge_table
-from dhkit.grading.report import Diagnosis, Entry, Note, NoteKind, Verdict, Witness
+from dhkit.grading.judging.tables import table_entries
+from dhkit.grading.report import Diagnosis, Entry, Note, Verdict, Witness
 
 __all__ = ["KinematicEntries", "inverse_entries", "table_entries"]
 
-TABLE_HINT = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
 INVERSE_HINT = "Look again at this branch: in which quadrant is the angle, and where is it counted from?"
-OTHER_FRAMES = "other_frames"
 
 
 @dataclass(frozen=True)
@@ -28,58 +25,6 @@ class KinematicEntries:
     diagnosis: tuple[Diagnosis, ...] = ()
     notes: tuple[Note, ...] = ()
     judged_at: Mapping[str, float] = field(default_factory=dict)
-
-
-def table_entries(
-    description: Description, rows: Sequence[Sequence[Given]], convention: str, task: Task, seed: int = 0
-) -> KinematicEntries:
-    """Judge a table, a row an entry.
-
-    Raises
-    ------
-    AnswerError
-        An entry with a name or a function that tables do not have.
-    """
-    unreadable = _unreadable("dh", rows)
-    if unreadable:
-        return unreadable
-    trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
-    judgement = judge_table(description, trees, convention, seed)
-    # One slip is more likely than a choice of frames that differs in one entry alone.
-    slipped = bool(judgement.other_frames) and any(found.mistake for found in judgement.explanations)
-    refused = _refused(judgement, task)
-    entries = []
-    for i, (verdict, statement) in enumerate(zip(judgement.rows, judgement.statements, strict=True)):
-        if judgement.is_in_other_frames(i) and (slipped or refused):
-            verdict, statement = Verdict.WRONG, f"A{i + 1} differs{refused}"
-        entries.append(Entry("dh", (i,), verdict, _row_text(rows[i]), statement=statement))
-    notes = judgement.notes
-    if slipped:
-        notes += (Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"),)
-    return KinematicEntries(tuple(entries), _table_diagnosis(judgement, entries, slipped), notes, judgement.judged_at)
-
-
-def _refused(judgement: TableJudgement, task: Task) -> str:
-    """Return why a table in other frames is wrong for this task; empty where it is allowed."""
-    if judgement.other_frames and task.frames_given:
-        return ": the task gives the frames"
-    if judgement.moves_zero and (task.zero_given or task.frames_given):
-        return ": the task gives the zero pose"
-    return ""
-
-
-def _table_diagnosis(judgement: TableJudgement, entries: Sequence[Entry], slipped: bool) -> tuple[Diagnosis, ...]:
-    open_rows = tuple(entry.name for entry in entries if entry.verdict is not Verdict.CORRECT)
-    found = []
-    for explanation in judgement.explanations:
-        rows = open_rows if explanation.row is None else (f"dh{explanation.row + 1}",)
-        where = "dh" if explanation.row is None else f"dh, row {explanation.row + 1}"
-        found.append(Diagnosis(explanation.mistake, _sentence(explanation.sentence), where, rows, TABLE_HINT))
-    if judgement.other_frames and not slipped:
-        said = "; ".join(judgement.other_frames)
-        sentence = f"The table describes the same arm, in other frames: {said}."
-        found.append(Diagnosis(OTHER_FRAMES, sentence, "dh", open_rows, TABLE_HINT))
-    return tuple(found)
 
 
 def inverse_entries(description: Description, branches: Sequence[Sequence[Given]], seed: int = 0) -> KinematicEntries:

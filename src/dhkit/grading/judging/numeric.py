@@ -16,6 +16,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 
 __all__ = [
     "FUNCTIONS",
+    "EditedDoubles",
     "TooLargeError",
     "doubles",
     "general_state",
@@ -78,6 +79,32 @@ def doubles(tree: Tree, values: Mapping[str, Any]) -> Any:
         # Floats of Python's own would raise where NumPy's give infinity.
         arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**_UNITS, **values}.items()}
         return _Evaluation(arrays, _NUMPY, float, np.float64).of(tree)
+
+
+class EditedDoubles:
+    """The numbers of trees that differ from one tree in a place or two: what they share is worked out once.
+
+    Parameters
+    ----------
+    tree
+        What is changed later.
+    values
+        Doubles or arrays by name, as for :func:`doubles`.
+    """
+
+    def __init__(self, tree: Tree, values: Mapping[str, Any]) -> None:
+        arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**_UNITS, **values}.items()}
+        self._evaluation = _Evaluation(arrays, _NUMPY, float, np.float64)
+        self._tree = tree  # keeps the parts alive, which are known by their ids
+        with np.errstate(all="ignore"):
+            self.numbers = self._evaluation.of(tree)
+
+    def of(self, edited: Tree) -> Any:
+        """Return the number, or array (...), of a tree that shares parts with the first one."""
+        evaluation = _Evaluation(self._evaluation.values, _NUMPY, float, np.float64)
+        evaluation.shared = dict(self._evaluation.shared)
+        with np.errstate(all="ignore"):
+            return evaluation.of(edited)
 
 
 def many_digits(tree: Tree, values: Mapping[str, Any]) -> Any:

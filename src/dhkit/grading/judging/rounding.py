@@ -115,9 +115,16 @@ class _Expansion:
         self.atoms: list[Element] = []
         self.one: Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
         self._numbers: dict[Any, int] = {}
+        self._shared: dict[int, tuple[Polynomial, Polynomial]] = {}
         self._images: dict[Monomial, Element] = {(): reading.ring.one}
 
     def of(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
+        # CasADi's graphs share what is used twice.
+        if id(tree) not in self._shared:
+            self._shared[id(tree)] = self._read(tree)
+        return self._shared[id(tree)]
+
+    def _read(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
         match tree:
             case Number(value=value, text=text):
                 share = _allowance(value, text, self.digits)

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention
+from dhkit.grading.judging.frame_changes import SAME, FrameChange, frame_changes, joint_changes, wrapped
 from dhkit.grading.judging.table_arms import TableArm
 
-__all__ = ["SAME", "STATES", "Overlay", "overlaid"]
+__all__ = ["STATES", "Overlay", "overlaid"]
 
-SAME = 1e-9
-"""rad, or share of the reach: two arms whose poses differ by less, in every state tried, are one arm."""
 STEPS = 12
 """Of Newton's method, which takes five or six from within an eighth of a turn."""
 STATES = 4
@@ -79,31 +78,24 @@ class Overlay:
 
     def length(self) -> tuple[int, int]:
         """Return how much there is to say: of all, and of joint variables."""
-        words = self.words()
-        return len(words), sum(word.startswith("q") for word in words)
+        return len(self.changes), sum(found.change.concerns_joint for found in self.changes)
 
     @property
     def moves_zero(self) -> bool:
         """Whether a joint variable counts from another zero, or the other way round."""
         return any(
-            sense < 0 or abs(_wrapped(offset) if kind == "R" else offset) > SAME
+            sense < 0 or abs(wrapped(offset) if kind == "R" else offset) > SAME
             for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True)
         )
 
-    def words(self) -> tuple[str, ...]:
-        """Say which frames and joint variables differ, and how."""
-        said = [word for i, D in enumerate(self.differences) for word in _frame_words(i, D)]
-        for i, (sense, offset) in enumerate(zip(self.senses, self.offsets, strict=True), start=1):
-            if sense < 0:
-                said.append(f"q{i} is counted the other way round")
-            turning = self.truth.kinds[i - 1] == "R"
-            offset = _wrapped(offset) if turning else offset
-            if turning and abs(abs(offset) - np.pi) < SAME:
-                said.append(f"q{i} is counted from the other end: by 180 degrees")
-            elif abs(offset) > SAME:
-                shown = f"{np.degrees(offset):.6g} degrees" if turning else f"{offset:.6g} m"
-                said.append(f"q{i} is counted from another zero: there the file's q{i} is {shown}")
-        return tuple(said)
+    @cached_property
+    def changes(self) -> tuple[FrameChange, ...]:
+        """Which frames and joint variables differ, and how."""
+        found = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D)]
+        joints = zip(self.truth.kinds, self.senses, self.offsets, strict=True)
+        for i, (kind, sense, offset) in enumerate(joints, start=1):
+            found += joint_changes(i, kind == "R", float(sense), float(offset))
+        return tuple(found)
 
 
 def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
@@ -113,34 +105,8 @@ def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
     return free
 
 
-def _frame_words(i: int, D: Array) -> Iterator[str]:
-    """Say how frame i differs from the file's."""
-    if abs(abs(D[2, 2]) - 1) > SAME:
-        yield f"frame {i}'s z axis points elsewhere: along {_shown(D[:3, 2])} of the file's frame {i}"
-    elif D[2, 2] < 0:
-        yield f"frame {i}'s z axis points the other way"
-    angle = float(np.arctan2(D[1, 0], D[0, 0])) if abs(D[2, 0]) < SAME else np.nan
-    if abs(abs(angle) - np.pi) < SAME:
-        yield f"frame {i}'s x axis points the other way"
-    elif not abs(angle) < SAME:
-        shown = f"along {_shown(D[:3, 0])}" if np.isnan(angle) else f"turned by {np.degrees(angle):.6g} degrees about z"
-        yield f"frame {i}'s x axis is another: {shown}"
-    if np.max(np.abs(D[:2, 3])) > SAME:
-        yield f"frame {i}'s origin is elsewhere: at {_shown(D[:3, 3])} m in the file's frame {i}"
-    elif abs(D[2, 3]) > SAME:
-        yield f"frame {i} is slid along its z axis, by {D[2, 3]:.6g} m"
-
-
-def _shown(vector: Array) -> str:
-    return "(" + ", ".join(f"{x + 0.0:.4g}" for x in np.where(np.abs(vector) < SAME, 0.0, vector)) + ")"
-
-
-def _wrapped(angle: float) -> float:
-    return float(np.arctan2(np.sin(angle), np.cos(angle)))
-
-
 def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
-    """Return how two arms are one, in the fewest words; None where they are not."""
+    """Return how two arms are one, with the fewest changes; None where they are not."""
     scale = float(np.sum(np.abs(truth.entries[:, 1:3]))) or 1.0
     matching = _Matching(answer, truth, scale)
     if not matching.links_agree:

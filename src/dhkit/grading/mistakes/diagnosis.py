@@ -205,20 +205,18 @@ class _Pairs:
     derived: int = 0
 
     def find(self, differences: Differences) -> tuple[Variant, Variant] | None:
-        return self._summed(differences) or self._derived(differences)
+        wanted = keys_of(self.quantity, differences)
+        return self._summed(differences, wanted) or self._derived(wanted)
 
-    def _summed(self, differences: Differences) -> tuple[Variant, Variant] | None:
+    def _summed(self, differences: Differences, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
         """Look up what a mistake leaves of the difference."""
         for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
             rest = {index: x - change[place_of(self.quantity, index)] for index, x in differences.items()}
             for second in self.tables.whole(self.quantity, rest):
-                if second.identity in TEXTBOOK and self._fits(self._both(first, second), differences):
+                if second.identity in TEXTBOOK and _fits(self._both(first, second), wanted):
                     return first, second
         return None
-
-    def _fits(self, keys: Mapping[Index, Key], differences: Differences) -> bool:
-        return all(keys[place] == key for place, key in keys_of(self.quantity, differences).items())
 
     def _both(self, first: Variant, second: Variant) -> dict[Index, Key]:
         """Derive with two mistakes, and return what both change together."""
@@ -238,9 +236,9 @@ class _Pairs:
         pairs = combinations(self.tables.textbook(self.quantity), 2)
         return ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
 
-    def _derived(self, differences: Differences) -> tuple[Variant, Variant] | None:
+    def _derived(self, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
         for keys, pair in self.found.items():
-            if self._fits(dict(keys), differences):
+            if _fits(dict(keys), wanted):
                 return pair
         while self.derived < MAX_DERIVED_PAIRS:
             following = next(self._todo, None)
@@ -249,7 +247,7 @@ class _Pairs:
             self.derived += 1
             keys_of_both = self._both(*following)
             self.found.setdefault(tuple(keys_of_both.items()), following)
-            if self._fits(keys_of_both, differences):
+            if _fits(keys_of_both, wanted):
                 return following
         return None
 
@@ -282,6 +280,11 @@ def key_of(quantity: str, element: Element) -> Key:
         constant = [g.kind == "constant" for g in element.ring.generators]
         terms = {m: c for m, c in terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
     return frozenset(terms.items())
+
+
+def _fits(keys: Mapping[Index, Key], wanted: Mapping[Index, Key]) -> bool:
+    """Whether a change is what is wanted, of the entries that are there."""
+    return all(keys[place] == key for place, key in wanted.items())
 
 
 def _apart(a: MadeAt, b: MadeAt) -> bool:

@@ -45,8 +45,13 @@ MAX_ALTERNATIVES = 3
 """Mistakes that give the same answers and are named in one sentence."""
 LEAST_DIGITS = 2
 """Significant digits of decimals that are told to be too few rather than wrong."""
-LEAST_TERMS_OF_A_PAIR = 3
-"""Terms in which an answer must differ for two mistakes at once to be likelier than a slip."""
+LEAST_TERMS_OF_A_PAIR, MOST_TERMS_OF_A_PAIR = 3, 600
+"""Terms in which an answer differs: of fewer a slip is likelier than two mistakes at once, of more it is not worth the
+search."""
+MAX_TERMS = 150
+"""Terms in which an entry may differ for a slip in one of them to be looked for."""
+MAX_DESCRIBED = 600
+"""Terms of an entry that is described term by term."""
 
 
 def explain(
@@ -310,7 +315,7 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
 
 def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
     difference, right = quantity.findings[index].difference, quantity.right(index)
-    if difference is None or difference.is_zero:
+    if difference is None or difference.is_zero or len(difference) > MAX_TERMS:
         return None
     arm = truth.arm(quantity.name)
     if quantity.name == "g" and not right and _is_weight(truth, difference):
@@ -443,7 +448,8 @@ def _coefficient(element: Element, place: int) -> Element:
 def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Find two of a derivation's mistakes that together explain what no single one does."""
     differences = quantity.differences
-    if not differences or len({x for d in differences.values() for x in d.terms}) < LEAST_TERMS_OF_A_PAIR:
+    terms = sum(map(len, differences.values())) if differences else 0
+    if not differences or not LEAST_TERMS_OF_A_PAIR <= terms <= MOST_TERMS_OF_A_PAIR:
         return []
     pair = _tables(truth, quantity).pair(quantity.name, differences)
     if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):
@@ -512,5 +518,10 @@ def _described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosi
     finding, right = quantity.findings[index], quantity.right(index)
     (entry,) = _names(quantity, [index])
     element = finding.answer.element() if finding.answer is not None else None
-    words = describe(truth.arm(quantity.name), element, right) if element is not None else finding.statement
+    if element is None:
+        words = finding.statement
+    elif len(element) > MAX_DESCRIBED:
+        words = f"{len(element)} terms, where {len(right)} are right"
+    else:
+        words = describe(truth.arm(quantity.name), element, right)
     return Diagnosis(None, capitalised(f"{words}."), entry, (entry,), hint_of(None))

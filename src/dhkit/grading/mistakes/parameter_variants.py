@@ -11,9 +11,8 @@ from dhkit.expressions import Expression
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.library import PARAMETER_FACTORS
 from dhkit.grading.mistakes.variants import Make, Variant, right, translated_array
-from dhkit.symbolic import Lagrangian
 from dhkit.symbolic.mistakes import MadeAt
-from dhkit.symbolic.ring import Element, Ring
+from dhkit.symbolic.ring import Element, Elements, Ring
 
 __all__ = ["parameter_variants"]
 
@@ -28,49 +27,49 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
     ring = lag.arm.ring
     symbols = [name for name in lag.arm.parameters if name in ring.constants and _is_free(ring, name)]
     kinds = _kinds(truth.description)
-    yield from _factors(lag, symbols)
-    yield from _tilts(lag)
-    yield from _millimetres(lag, [name for name in symbols if kinds.get(name) == "length"])
+    yield from _factors(truth, symbols)
+    yield from _tilts(truth)
+    yield from _millimetres(truth, [name for name in symbols if kinds.get(name) == "length"])
     alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
     for first, second in alike:
         swapped = {first: ring.constant(second), second: ring.constant(first)}
         place = f"{first} and {second}"
-        yield Variant(MadeAt("parameters_exchanged"), _replaced(lag, swapped), place, 1)
+        yield Variant(MadeAt("parameters_exchanged"), _replaced(truth, swapped), place, 1)
     for first, second in permutations(symbols, 2):
         if (first, second) in alike or (second, first) in alike:
             made = MadeAt("parameter_for_another")
-            yield Variant(made, _replaced(lag, {first: ring.constant(second)}), f"{second} for {first}", 1)
+            yield Variant(made, _replaced(truth, {first: ring.constant(second)}), f"{second} for {first}", 1)
             if kinds.get(first) == "length" and first in kinds and lag.n <= MAX_JOINTS:
                 half = ring.constant(second) * Fraction(1, 2)
-                yield Variant(made, _replaced(lag, {first: half}), f"{second}/2 for {first}", 1)
-                yield Variant(made, _replaced(lag, {first: ring.constant(second) * 2}), f"2*{second} for {first}", 2)
+                yield Variant(made, _replaced(truth, {first: half}), f"{second}/2 for {first}", 1)
+                yield Variant(made, _replaced(truth, {first: ring.constant(second) * 2}), f"2*{second} for {first}", 2)
     for i, j in combinations(range(1, truth.description.n + 1), 2):
         pairs = [(x, y) for x in symbols for y in symbols if _swaps(x, y, i, j)]
         if len(pairs) > 1:
             swapped = {a: ring.constant(b) for x, y in pairs for a, b in ((x, y), (y, x))}
-            yield Variant(MadeAt("links_exchanged"), _replaced(lag, swapped), f"links {i} and {j}", 1)
+            yield Variant(MadeAt("links_exchanged"), _replaced(truth, swapped), f"links {i} and {j}", 1)
 
 
-def _factors(lag: Lagrangian, symbols: list[str]) -> Iterator[Variant]:
-    ring = lag.arm.ring
+def _factors(truth: Truth, symbols: list[str]) -> Iterator[Variant]:
+    ring = truth.lagrangian.arm.ring
     for identity, factor in PARAMETER_FACTORS.items():
         rarity = 1 if factor > 0 else 2
         for name in symbols:
-            yield Variant(MadeAt(identity), _replaced(lag, {name: ring.constant(name) * factor}), name, rarity)
+            yield Variant(MadeAt(identity), _replaced(truth, {name: ring.constant(name) * factor}), name, rarity)
 
 
-def _millimetres(lag: Lagrangian, lengths: list[str]) -> Iterator[Variant]:
-    ring = lag.arm.ring
+def _millimetres(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
+    ring = truth.lagrangian.arm.ring
     groups = [lengths] if len(lengths) > 1 else []
     for names in (*groups, *([name] for name in lengths)):
         values = {name: ring.constant(name) * MILLIMETRES for name in names}
         place = names[0] if len(names) == 1 else ""
-        yield Variant(MadeAt("millimetres_for_metres"), _replaced(lag, values), place, 2)
+        yield Variant(MadeAt("millimetres_for_metres"), _replaced(truth, values), place, 2)
 
 
-def _tilts(lag: Lagrangian) -> Iterator[Variant]:
+def _tilts(truth: Truth) -> Iterator[Variant]:
     """Yield constant angles that are forgotten, or whose sine and cosine are exchanged or have another sign."""
-    ring = lag.arm.ring
+    ring = truth.lagrangian.arm.ring
     for cosine in ring.constants:
         if not cosine.startswith("cos(") or (sine := f"sin{cosine[3:]}") not in ring.constants:
             continue
@@ -80,7 +79,7 @@ def _tilts(lag: Lagrangian) -> Iterator[Variant]:
             ("parameter_sign", {sine: -s}),
             ("parameter_sin_cos", {cosine: s, sine: c}),
         ):
-            yield Variant(MadeAt(identity), _replaced(lag, values), place, 1)
+            yield Variant(MadeAt(identity), _replaced(truth, values), place, 1)
 
 
 def _kinds(description: Description) -> dict[str, str]:
@@ -128,6 +127,13 @@ def _is_free(ring: Ring, name: str) -> bool:
     return not any(name in constant.symbols and constant.text != name for constant in ring.given)
 
 
-def _replaced(lag: Lagrangian, values: Mapping[str, Element]) -> Make:
-    places = {lag.arm.ring.place("constant", name): value for name, value in values.items()}
-    return lambda quantity: translated_array(right(lag, quantity), places) - right(lag, quantity)
+def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
+    places = {truth.lagrangian.arm.ring.place("constant", name): value for name, value in values.items()}
+
+    def make(quantity: str) -> Elements:
+        whole = right(truth.lagrangian, quantity)
+        if quantity == "tau" and truth.friction:
+            whole = whole + truth.viscous
+        return translated_array(whole, places) - whole
+
+    return make

@@ -1,0 +1,102 @@
+"""How the frames and joint variables of a table differ from the file's where both tables are one arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from dhkit.description import Array
+
+__all__ = ["SAME", "Change", "FrameChange", "frame_changes", "joint_changes", "wrapped"]
+
+SAME = 1e-9
+"""rad, or share of the reach: two arms whose poses differ by less, in every state tried, are one arm."""
+
+
+class Change(Enum):
+    """What is another choice, with the sentence that says so."""
+
+    Z_REVERSED = "frame {number}'s z axis points the other way"
+    Z_ELSEWHERE = "frame {number}'s z axis points elsewhere: along {vector} of the file's frame {number}"
+    X_REVERSED = "frame {number}'s x axis points the other way"
+    X_TURNED = "frame {number}'s x axis is another: turned by {first:.6g} degrees about z"
+    X_ELSEWHERE = "frame {number}'s x axis is another: along {vector}"
+    ORIGIN_ELSEWHERE = "frame {number}'s origin is elsewhere: at {vector} m in the file's frame {number}"
+    FRAME_SLID = "frame {number} is slid along its z axis, by {first:.6g} m"
+    JOINT_REVERSED = "q{number} is counted the other way round"
+    JOINT_HALF_TURN = "q{number} is counted from the other end: by 180 degrees"
+    JOINT_TURNED = "q{number} is counted from another zero: there the file's q{number} is {first:.6g} degrees"
+    JOINT_SLID = "q{number} is counted from another zero: there the file's q{number} is {first:.6g} m"
+
+    @property
+    def concerns_joint(self) -> bool:
+        """Whether a joint variable is meant, and not a frame."""
+        return self in (Change.JOINT_REVERSED, Change.JOINT_HALF_TURN, Change.JOINT_TURNED, Change.JOINT_SLID)
+
+
+@dataclass(frozen=True)
+class FrameChange:
+    """One choice of a table that is not the file's.
+
+    Attributes
+    ----------
+    change
+        What is another choice.
+    number
+        Of the frame, from 0, or of the joint, from 1.
+    values
+        By how much, m or degrees; a direction or a point as three numbers.
+    """
+
+    change: Change
+    number: int
+    values: tuple[float, ...] = ()
+
+    def __str__(self) -> str:
+        """Return the choice in words."""
+        vector = "(" + ", ".join(f"{x:.4g}" for x in self.values) + ")"
+        return self.change.value.format(number=self.number, vector=vector, first=next(iter(self.values), 0.0))
+
+
+def frame_changes(i: int, D: Array) -> Iterator[FrameChange]:
+    """Yield how frame i differs from the file's; D is its pose in the file's frame i, shape (4, 4)."""
+    if abs(abs(D[2, 2]) - 1) > SAME:
+        yield FrameChange(Change.Z_ELSEWHERE, i, _vector(D[:3, 2]))
+    elif D[2, 2] < 0:
+        yield FrameChange(Change.Z_REVERSED, i)
+    angle = float(np.arctan2(D[1, 0], D[0, 0])) if abs(D[2, 0]) < SAME else np.nan
+    if abs(abs(angle) - np.pi) < SAME:
+        yield FrameChange(Change.X_REVERSED, i)
+    elif np.isnan(angle):
+        yield FrameChange(Change.X_ELSEWHERE, i, _vector(D[:3, 0]))
+    elif not abs(angle) < SAME:
+        yield FrameChange(Change.X_TURNED, i, (float(np.degrees(angle)),))
+    if np.max(np.abs(D[:2, 3])) > SAME:
+        yield FrameChange(Change.ORIGIN_ELSEWHERE, i, _vector(D[:3, 3]))
+    elif abs(D[2, 3]) > SAME:
+        yield FrameChange(Change.FRAME_SLID, i, (float(D[2, 3]),))
+
+
+def joint_changes(i: int, is_revolute: bool, sense: float, offset: float) -> Iterator[FrameChange]:
+    """Yield how joint i, from 1, counts: its sense, +1 or -1, and the file's value at its zero, rad or m."""
+    if sense < 0:
+        yield FrameChange(Change.JOINT_REVERSED, i)
+    offset = wrapped(offset) if is_revolute else offset
+    if is_revolute and abs(abs(offset) - np.pi) < SAME:
+        yield FrameChange(Change.JOINT_HALF_TURN, i)
+    elif abs(offset) > SAME:
+        change = Change.JOINT_TURNED if is_revolute else Change.JOINT_SLID
+        yield FrameChange(change, i, (float(np.degrees(offset)) if is_revolute else float(offset),))
+
+
+def wrapped(angle: float) -> float:
+    """Return an angle in (-pi, pi]."""
+    return float(np.arctan2(np.sin(angle), np.cos(angle)))
+
+
+def _vector(vector: Array) -> tuple[float, ...]:
+    """Return a vector without the rounding of its zeros."""
+    return tuple(float(x) + 0.0 for x in np.where(np.abs(vector) < SAME, 0.0, vector))

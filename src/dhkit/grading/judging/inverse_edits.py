@@ -1,0 +1,407 @@
+"""Single local changes of a formula of inverse kinematics, each with the mistake that it puts right.
+
+One literal, one function, one order of arguments, one exponent, one name, one sign. They are tried in the order of
+:data:`ORDER`: where two changes give the same values, the mistake that is made more often is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import combinations, islice
+
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.grading.answers.given import POSE_NAMES
+from dhkit.grading.judging.numeric import names_of, parts_of
+
+__all__ = ["ROOTS", "Edit", "Lengths", "edits", "has_call", "renamed", "renamings", "replaced_everywhere"]
+
+ORDER = (
+    "atan2_arguments",
+    "quadrant",
+    "elbow_sign",
+    "degrees_for_radians",
+    "millimetres_for_metres",
+    "joint_sign",
+    "missing_offset",
+    "supplement",
+    "cosine_law_factor",
+    "cosine_law_sign",
+    "cosine_law_squares",
+    "rotation_matrix_transposed",
+    "earlier_joints_forgotten",
+    "root_forgotten",
+    "square_forgotten",
+    "square_too_much",
+    "arc_function_forgotten",
+    "axis_exchanged",
+    "lengths_exchanged",
+    "offset_forgotten",
+    "tool_length_forgotten",
+    "term_function",
+    "term_parameter",
+    "term_sign",
+    "term_factor",
+    "term_extra",
+)
+"""Mistakes in the order in which they are tried."""
+MOST_EDITS = 4_000
+"""Of one formula: a PUMA's longest, 200 nodes, has 2,500."""
+MOST_LENGTHS = 12
+"""Lengths of the robot that are tried as a missing offset."""
+POSITIONS = POSE_NAMES[:3]
+ROTATIONS = POSE_NAMES[3:]
+ARCS = ("acos", "asin", "atan")
+ROOTS = ("sqrt", "acos", "asin")
+"""Functions that know one sign of two."""
+LAW_TERMS = 3
+"""Terms of the numerator in a law of cosines, at least: two squares of links, and a squared distance."""
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A formula with one change.
+
+    Attributes
+    ----------
+    mistake
+        The identity of the mistake that the change puts right.
+    tree
+        The changed formula.
+    old, new
+        The part that is changed, as it was and as it is now: the same part may stand in other formulas too.
+    """
+
+    mistake: str
+    tree: Tree
+    old: Tree
+    new: Tree
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Names and numbers of a robot that formulas may hold.
+
+    Attributes
+    ----------
+    parameters
+        Names of the robot's parameters.
+    trees
+        What may be a missing offset: parameters, and lengths of the table, of base and of tool that are none.
+    """
+
+    parameters: tuple[str, ...]
+    trees: tuple[Tree, ...]
+
+
+def edits(tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float], lengths: Lengths) -> list[Edit]:
+    """Return the changes of a formula in the order in which they are tried, :data:`MOST_EDITS` at most.
+
+    Parameters
+    ----------
+    tree
+        The formula.
+    is_revolute
+        Whether it is that of an angle.
+    others
+        Variables of joints of the same kind, turning or sliding, that it may use.
+    offsets
+        By how much it may be off, rad or m.
+    lengths
+        The robot's.
+    """
+    found = [
+        *(Edit(mistake, new, tree, new) for mistake, new in _of_the_whole(tree, is_revolute, others, offsets)),
+        *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MOST_EDITS),
+        *(
+            Edit(mistake, new, tree, new)
+            for mistake, change in renamings([tree], lengths)
+            if (new := renamed(tree, change)) is not tree
+        ),
+    ]
+    return sorted(found, key=lambda edit: ORDER.index(edit.mistake))[:MOST_EDITS]
+
+
+def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, dict[str, Tree]]]:
+    """Yield what names of some formulas may stand for: another component, another length, one less an offset."""
+    names = set().union(*map(names_of, trees))
+    if any(f"r{i}{j}" in names for i in "123" for j in "123" if i != j):
+        yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i in "123" for j in "123"}
+    for a, b in combinations(POSITIONS, 2):
+        if names & {a, b}:
+            yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
+    for a, b in combinations([name for name in lengths.parameters if name in names], 2):
+        yield "lengths_exchanged", {a: Name(b, 0), b: Name(a, 0)}
+    for length in lengths.trees[:MOST_LENGTHS]:
+        for subtracted in (True, False):
+            for p in POSITIONS:
+                if p in names:
+                    yield "offset_forgotten", {p: Sum(((True, Name(p, 0)), (not subtracted, length)))}
+            for column in "123":
+                tool = {
+                    p: Sum(((True, Name(p, 0)), (not subtracted, _times(length, Name(f"r{i}{column}", 0)))))
+                    for i, p in enumerate(POSITIONS, start=1)
+                }
+                if names & {*POSITIONS}:
+                    yield "tool_length_forgotten", tool
+
+
+def renamed(tree: Tree, change: dict[str, Tree]) -> Tree:
+    """Return a formula with names replaced, all at once."""
+    if isinstance(tree, Name):
+        return change.get(tree.text, tree)
+    return _with_children(tree, [renamed(child, change) for child in _children(tree)])
+
+
+def replaced_everywhere(tree: Tree, old: Tree, new: Tree) -> Tree:
+    """Return a formula with a part replaced wherever it stands."""
+    text = _plain_text(old)
+
+    def replaced(part: Tree) -> Tree:
+        if _plain_text(part) == text:
+            return new
+        return _with_children(part, [replaced(child) for child in _children(part)])
+
+    return replaced(tree)
+
+
+def _plain_text(tree: Tree) -> str:
+    """Return a text that equal formulas share, wherever they stand."""
+    match tree:
+        case Number(value=value):
+            return str(value)
+        case Name(text):
+            return text
+        case Call(function, arguments):
+            return f"{function}({', '.join(map(_plain_text, arguments))})"
+        case Power(base, exponent):
+            return f"({_plain_text(base)})^({_plain_text(exponent)})"
+        case Product(factors):
+            return "[" + "".join(("*" if up else "/") + _plain_text(factor) for up, factor in factors) + "]"
+        case Sum(terms):
+            return "(" + "".join(("+" if added else "-") + _plain_text(term) for added, term in terms) + ")"
+
+
+def has_call(tree: Tree, functions: Sequence[str]) -> bool:
+    """Whether a formula calls one of some functions."""
+    return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
+
+
+def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
+    """Return a formula with all its calls of some functions changed; the formula itself where it has none."""
+    changed = _with_children(tree, [with_calls_changed(child, functions, change) for child in _children(tree)])
+    return change(changed) if isinstance(changed, Call) and changed.function in functions else changed
+
+
+def minus(tree: Tree) -> Tree:
+    """Return a formula with a minus in front."""
+    return Sum(((False, tree),))
+
+
+# Changes of a whole formula
+
+
+def _of_the_whole(
+    tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float]
+) -> Iterator[tuple[str, Tree]]:
+    if is_revolute:
+        yield "degrees_for_radians", _times(tree, Name("deg", 0))
+        yield "supplement", Sum(((True, Name("pi", 0)), (False, tree)))
+    else:
+        yield "millimetres_for_metres", _times(tree, Name("mm", 0))
+    yield "joint_sign", minus(tree)
+    for offset in offsets:
+        yield "missing_offset", Sum(((True, tree), (True, Number(Fraction(offset), str(offset), 0))))
+    for count in range(1, len(others) + 1):
+        for chosen in combinations(others, count):
+            for added in (False, True):
+                yield "earlier_joints_forgotten", Sum(((True, tree), *((added, Name(name, 0)) for name in chosen)))
+    for arc in ARCS:
+        yield "arc_function_forgotten", _call(arc, tree)
+        yield "arc_function_forgotten", minus(_call(arc, tree))
+    yield "root_forgotten", _call("sqrt", tree)
+    for mistake, functions, change in (("elbow_sign", ROOTS, minus), ("atan2_arguments", ("atan2",), _exchanged)):
+        new = with_calls_changed(tree, functions, change)
+        if new is not tree:
+            yield mistake, new
+
+
+# Changes of one part
+
+Rebuild = Callable[[Tree], Tree]
+
+
+def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> Iterator[Edit]:
+    """Yield changes of a part and of the parts in it.
+
+    Parameters
+    ----------
+    tree
+        The part.
+    lengths
+        The robot's.
+    rebuild
+        From a changed part to the whole formula.
+    in_law
+        Whether the part stands in a law of cosines.
+    """
+    for mistake, new in _changes(tree, lengths, in_law):
+        yield Edit(mistake, rebuild(new), tree, new)
+    children = _children(tree)
+    for k, child in enumerate(children):
+
+        def around(part: Tree, k: int = k) -> Tree:
+            return rebuild(_with_children(tree, [*children[:k], part, *children[k + 1 :]]))
+
+        yield from _of_parts(child, lengths, around, in_law or _is_law(child))
+
+
+def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
+    """Yield what a part may have to be."""
+    match tree:
+        case Number():
+            yield from _of_number(tree, in_law)
+        case Name(text):
+            yield from _of_name(text, lengths)
+            yield "cosine_law_squares" if in_law else "square_forgotten", _squared(tree)
+        case Call():
+            yield from _of_call(tree, in_law)
+        case Power(base, exponent) if isinstance(exponent, Number) and exponent.value == 2:
+            yield "square_too_much", base
+        case Product(factors):
+            yield from _scaled(tree, in_law)
+            for k in range(len(factors)):
+                yield "term_factor", _product([*factors[:k], *factors[k + 1 :]])
+        case Sum(terms):
+            yield from _of_sum(terms, in_law)
+
+
+def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
+    if number.value == 1:
+        return
+    yield "degrees_for_radians", _times(number, Name("deg", 0))
+    yield "millimetres_for_metres", _times(number, Name("mm", 0))
+    yield "cosine_law_squares" if in_law else "square_forgotten", _squared(number)
+
+
+def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
+    if text in ROTATIONS:
+        yield "rotation_matrix_transposed", Name(f"r{text[2]}{text[1]}", 0)
+    family = next((family for family in (POSITIONS, ROTATIONS, lengths.parameters) if text in family), ())
+    for other in family:
+        if other != text:
+            yield "term_parameter" if text in lengths.parameters else "axis_exchanged", Name(other, 0)
+    if text in POSITIONS:
+        for length in lengths.trees[:MOST_LENGTHS]:
+            for added in (False, True):
+                yield "offset_forgotten", Sum(((True, Name(text, 0)), (added, length)))
+
+
+def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
+    first = call.arguments[0]
+    yield from _scaled(call, in_law)
+    match call.function:
+        case "atan2":
+            second = call.arguments[-1]
+            yield "atan2_arguments", _exchanged(call)
+            for signs in ((False, True), (True, False), (False, False)):
+                signed = tuple(x if sign else minus(x) for sign, x in zip(signs, (first, second), strict=True))
+                yield "term_sign", replace(call, arguments=signed)
+        case "sin" | "cos":
+            yield "term_function", replace(call, function="cos" if call.function == "sin" else "sin")
+        case "atan":
+            if isinstance(first, Product) and any(not up for up, _ in first.factors):
+                above, below = ([(True, x) for up, x in first.factors if up is way] for way in (True, False))
+                yield "quadrant", Call("atan2", (_product(above), _product(below)), 0)
+        case "acos" | "asin":
+            yield "elbow_sign", minus(call)
+            yield "supplement", replace(call, arguments=(minus(first), *call.arguments[1:]))
+            yield "term_function", replace(call, function="asin" if call.function == "acos" else "acos")
+        case "sqrt":
+            yield "elbow_sign", minus(call)
+            yield "cosine_law_squares" if in_law else "square_forgotten", first
+    yield "cosine_law_squares" if in_law else "square_forgotten", _squared(call)
+
+
+def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tuple[str, Tree]]:
+    yield "root_forgotten", _call("sqrt", Sum(terms))
+    for count in (1, 2) if in_law else (1,):
+        for chosen in combinations(range(len(terms)), count):
+            turned = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
+            yield "cosine_law_sign" if in_law else "term_sign", Sum(turned)
+    for k in range(len(terms)) if len(terms) > 1 else ():
+        yield "term_extra", Sum((*terms[:k], *terms[k + 1 :]))
+    bare = [isinstance(term, Name | Number) for _, term in terms]
+    if sum(bare) > 1:
+        squared = tuple(
+            (added, _squared(term) if alone else term) for alone, (added, term) in zip(bare, terms, strict=True)
+        )
+        yield "cosine_law_squares" if in_law else "square_forgotten", Sum(squared)
+
+
+def _scaled(tree: Tree, in_law: bool) -> Iterator[tuple[str, Tree]]:
+    for factor in (Fraction(2), Fraction(1, 2)):
+        yield "cosine_law_factor" if in_law else "term_factor", _times(tree, Number(factor, str(factor), 0))
+
+
+def _is_law(tree: Tree) -> bool:
+    """Whether a part looks like a law of cosines: a sum of three terms at least over a product."""
+    if not isinstance(tree, Product) or all(up for up, _ in tree.factors):
+        return False
+    return any(up and _count(factor) >= LAW_TERMS for up, factor in tree.factors)
+
+
+def _count(tree: Tree) -> int:
+    """Return the number of terms, those of sums in a sum included."""
+    return sum(_count(term) for _, term in tree.terms) if isinstance(tree, Sum) else 1
+
+
+# Trees
+
+
+def _children(tree: Tree) -> tuple[Tree, ...]:
+    match tree:
+        case Call(_, arguments):
+            return arguments
+        case Power(base, exponent):
+            return base, exponent
+        case Product(parts) | Sum(parts):
+            return tuple(part for _, part in parts)
+    return ()
+
+
+def _with_children(tree: Tree, children: Sequence[Tree]) -> Tree:
+    """Return a part with others in it; the part itself where they are the same."""
+    if all(new is old for new, old in zip(children, _children(tree), strict=True)):
+        return tree
+    match tree:
+        case Call():
+            return replace(tree, arguments=tuple(children))
+        case Power():
+            return replace(tree, base=children[0], exponent=children[1])
+        case Product(parts):
+            return Product(tuple((up, child) for (up, _), child in zip(parts, children, strict=True)))
+        case Sum(parts):
+            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
+    return tree
+
+
+def _exchanged(call: Call) -> Tree:
+    return replace(call, arguments=call.arguments[::-1])
+
+
+def _product(factors: Sequence[tuple[bool, Tree]]) -> Tree:
+    return Product(tuple(factors)) if factors else Number(Fraction(1), "1", 0)
+
+
+def _times(tree: Tree, factor: Tree) -> Tree:
+    return Product(((True, tree), (True, factor)))
+
+
+def _squared(tree: Tree) -> Tree:
+    return Power(tree, Number(Fraction(2), "2", 0), 0)
+
+
+def _call(function: str, argument: Tree) -> Tree:
+    return Call(function, (argument,), 0)

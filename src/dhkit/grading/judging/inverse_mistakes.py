@@ -1,0 +1,212 @@
+"""Which mistakes explain a branch of inverse kinematics that does not reach the poses asked for.
+
+The best explanation is a single local change of the formula that is wrong first which makes the whole branch right;
+then one in a formula before it, or of the same part in several formulas; then a sign or a quadrant that is lost for
+some poses. A joint is never blamed whose value agrees with a solution, given the joints before it. The search is
+bounded by counted changes, never by time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.expressions import exact
+from dhkit.expressions.syntax import Name, Number, Tree
+from dhkit.grading.judging.inverse_branch import Branch
+from dhkit.grading.judging.inverse_edits import (
+    Edit,
+    Lengths,
+    edits,
+    has_call,
+    renamed,
+    renamings,
+    replaced_everywhere,
+)
+from dhkit.grading.judging.inverse_poses import Mask
+
+__all__ = ["Explanation", "Search"]
+
+MOST_POSES = 100
+"""Poses that fail, and poses that close, on which mistakes are looked for."""
+MOST_CHANGES = 20_000
+"""Changes of formulas that are worked out for one answer: a second's work."""
+AGREEING = 0.5
+"""Share of the poses: a change whose values are a solution's less often is not followed further."""
+SUBSTANTIAL = 0.3
+"""Share of the failing poses: a mistake that explains so many is one, though others are made besides."""
+FREQUENT = frozenset(
+    ("atan2_arguments", "quadrant", "elbow_sign", "degrees_for_radians", "millimetres_for_metres", "joint_sign")
+)
+"""Mistakes that are named where they explain a good part of the poses alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A mistake in a branch.
+
+    Attributes
+    ----------
+    mistake
+        The identity of a mistake of the library; None where none is found.
+    joint
+        Whose formula is meant, from 0; None where it is several formulas, or none in particular.
+    repaired
+        The branch with the mistake put right; None where there is none.
+    """
+
+    mistake: str | None
+    joint: int | None
+    repaired: Branch | None = None
+
+
+class Search:
+    """The search for mistakes in the branches of one answer.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+
+    def __init__(self, description: Description) -> None:
+        self.revolute = [kind == "R" for kind in description.kinds]
+        self.lengths = lengths_of(description)
+        self.left = MOST_CHANGES
+
+    def explanations(self, branch: Branch) -> Iterator[Explanation]:
+        """Yield what went wrong, each mistake put right before the next is looked for."""
+        current: Branch | None = branch.sample(MOST_POSES)
+        while current is not None and not current.is_right:
+            joint = current.wrong_joint()
+            found = self._anywhere(current) if joint is None else self._explained(current, joint)
+            yield found
+            current = found.repaired
+
+    def _anywhere(self, branch: Branch) -> Explanation:
+        """Return a change that makes a branch right whose wrong joint is not known."""
+        for joint in branch.order if not branch.poses.isolated else ():
+            for edit in self._edits(branch, joint):
+                repaired = branch.with_tree(joint, edit.tree)
+                if repaired.is_right:
+                    return Explanation(edit.mistake, joint, repaired)
+        return Explanation(None, None)
+
+    def _explained(self, branch: Branch, joint: int) -> Explanation:
+        """Return a mistake, given the first joint that is wrong."""
+        here = self._agreeing(branch, joint)
+        candidates = [Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree)) for edit in here]
+        halves = [
+            Explanation(mistake, other, repaired)
+            for other in branch.order[: branch.rank(joint) + 1]
+            for mistake, repaired in _lost_halves(branch, other, joint)
+        ]
+        for found in (*candidates, *self._before(branch, joint), *self._in_several(branch, here), *halves):
+            if found.repaired is not None and found.repaired.is_right:
+                return found
+        for found in (*candidates, *halves):
+            following = found.repaired.wrong_joint() if found.repaired is not None else joint
+            if following is None or branch.rank(following) > branch.rank(joint):
+                return found
+        frequent = [
+            Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree))
+            for edit in self._edits(branch, joint)
+            if edit.mistake in FREQUENT
+        ]
+        best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
+        gained = _count_of_closed(best) - int(np.sum(branch.closed))
+        return best if gained > SUBSTANTIAL * np.sum(branch.failing) else Explanation(None, joint)
+
+    def _edits(self, branch: Branch, joint: int) -> list[Edit]:
+        """Return the changes of a joint's formula, as many as are left to try."""
+        same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
+        offsets = _offsets(branch, joint)
+        names = [f"q{k + 1}" for k in same_kind]
+        found = edits(branch.trees[joint], self.revolute[joint], names, offsets, self.lengths)[: self.left]
+        self.left -= len(found)
+        return found
+
+    def _agreeing(self, branch: Branch, joint: int) -> list[Edit]:
+        """Return the changes of a joint's formula that give values of a solution where the branch should close."""
+        formula, found = branch.editable(joint), []
+        asked = branch.reachable
+        for edit in self._edits(branch, joint):
+            x = branch.repaired(joint, formula.of(edit.tree))
+            if np.mean(branch.agrees(joint, x)[asked]) >= AGREEING:
+                found.append(edit)
+        return found
+
+    def _before(self, branch: Branch, joint: int) -> Iterator[Explanation]:
+        """Yield changes of formulas before the first wrong joint: their values may be those of another solution."""
+        for other in branch.order[: branch.rank(joint)]:
+            for edit in self._agreeing(branch, other):
+                yield Explanation(edit.mistake, other, branch.with_tree(other, edit.tree))
+
+    def _in_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
+        """Yield changes of the same part, or of the same names, in several formulas."""
+        for edit in agreeing:
+            trees = [replaced_everywhere(tree, edit.old, edit.new) for tree in branch.trees]
+            if sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
+                yield Explanation(edit.mistake, None, branch.with_trees(trees))
+        for mistake, change in renamings(branch.trees, self.lengths):
+            trees = [renamed(tree, change) for tree in branch.trees]
+            if self.left > 0 and sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
+                self.left -= 1
+                yield Explanation(mistake, None, branch.with_trees(trees))
+
+
+def lengths_of(description: Description) -> Lengths:
+    """Return what formulas for a robot may hold as lengths."""
+    parameters = tuple(description.parameters)
+    numbers, values = description.numbers, description.numbers.values
+    known = [*numbers.d, *numbers.a, *description.base.p, *description.tool.p]
+    found: list[Tree] = [Name(name, 0) for name in parameters]
+    seen = {round(abs(float(values[name])), 12) for name in parameters} | {0.0}
+    for length in known:
+        size = round(abs(float(length)), 12)
+        if size not in seen:
+            seen.add(size)
+            found.append(Number(exact(size).rational or 0, str(size), 0))
+    return Lengths(parameters, tuple(found))
+
+
+def _count_of_closed(found: Explanation) -> int:
+    return int(np.sum(found.repaired.closed)) if found.repaired is not None else 0
+
+
+def _wrong(branch: Branch, joint: int) -> Mask:
+    """Return on which poses a joint is the first that is wrong."""
+    wrong: Mask = branch.failing & (branch.agreement[0] == branch.rank(joint))
+    return wrong
+
+
+def _offsets(branch: Branch, joint: int) -> list[float]:
+    """Return by how much a joint may be off, from the first pose where it is wrong."""
+    wrong = _wrong(branch, joint) & np.isfinite(branch.q[:, joint])
+    if not np.any(wrong):
+        return []
+    s = int(np.argmax(wrong))
+    alive = branch.alive[branch.rank(joint)][s]
+    return [float(x) for x in np.unique((branch.poses.truths[s, alive, joint] - branch.q[s, joint]).round(12))]
+
+
+def _lost_halves(branch: Branch, joint: int, first: int) -> Iterator[tuple[str, Branch]]:
+    """Yield what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
+
+    The wrong half may be the value of another solution, and then a later joint is the first that is wrong.
+    """
+    wrong, tree = _wrong(branch, first), branch.trees[joint]
+    revolute = branch.poses.description.kinds[joint] == "R"
+    own = joint == first
+
+    def where_wrong(change: Array) -> Array:
+        return np.where(wrong, change, 0.0)
+
+    if revolute and (own or has_call(tree, ("atan", "asin"))):
+        yield "quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))
+        yield "quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))
+    if own or has_call(tree, ("acos",)):
+        yield "sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))
