@@ -56,6 +56,42 @@ BAD = {
         GOOD + changed("com = [0, 0, 0]", "com = [0, 0]", BODY),
         "com: found 2 entries; expected at least 3",
     ),
+    "body and bodies": (
+        GOOD + BODY + "bodies = [{ mass = 1 }]",
+        r"joint 1 \(elbow\): found both body and bodies; expected one of them",
+    ),
+    "no bodies": (GOOD + "bodies = []", r"joint 1 \(elbow\): bodies: found 0 entries; expected at least 1"),
+    "17 bodies": (GOOD + f"bodies = [{'{ mass = 1 }, ' * 17}]", "bodies: found 17 entries; expected at most 16"),
+    "bodies of one name": (
+        GOOD + 'bodies = [{ name = "rod", mass = 1 }, { name = "rod", mass = 2 }]',
+        r"joint 1 \(elbow\): name 'rod' is another body's already",
+    ),
+    "a body with the default name of another": (
+        GOOD + 'bodies = [{ name = "body 2", mass = 1 }, { mass = 2 }]',
+        "name 'body 2' is another body's already",
+    ),
+    "bodies as a table": (GOOD + "bodies = { mass = 1 }", "bodies: found .*expected list"),
+    "a body that is a number": (GOOD + "bodies = [1]", r"bodies\[0\]: found 1; expected a table"),
+    "a body name that is a number": (GOOD + "bodies = [{ name = 1, mass = 1 }]", r"bodies\[0\].name: found 1; expected"),
+    "a body name with a slash": (GOOD + 'bodies = [{ name = "a/b", mass = 1 }]', "body 1 has the name 'a/b'"),
+    "a body name on two lines": (GOOD + 'body = { name = "a\\nb", mass = 1 }', r"body 1 has the name 'a\\nb'"),
+    "one of the bodies without mass": (GOOD + "bodies = [{ mass = 1 }, { }]", r"bodies\[1\]: key 'mass' is missing"),
+    "unknown key of bodies": (
+        GOOD + "bodies = [{ mass = 1, con = [0, 0, 0] }]",
+        r"bodies\[0\]: unknown key 'con'; did you mean 'com'",
+    ),
+    "one of the bodies negative": (
+        GOOD + 'bodies = [{ mass = 1 }, { name = "load", mass = -1 }]',
+        r"joint 1 \(elbow\), load: body.mass is -1 kg; expected none below 0",
+    ),
+    "one of the bodies impossible": (
+        GOOD + "bodies = [{ mass = 1 }, { mass = 1, inertia = { xx = -1 } }]",
+        r"joint 1 \(elbow\), body 2: body.inertia has the eigenvalue -1 kg m",
+    ),
+    "one of the bodies in an unknown length": (
+        GOOD + 'bodies = [{ mass = 1 }, { mass = 1, com = ["l9", 0, 0] }]',
+        r"joint 1 \(elbow\), body 2: body.com\[0\]: unknown name 'l9'",
+    ),
     "limits reversed": (GOOD + "limits = [1, -1]", r"limits \[1, -1\] are the wrong way round"),
     "one limit": (GOOD + "limits = [1]", "limits: found 1 entries"),
     "negative velocity": (GOOD + "velocity = -1", "velocity is -1; expected a positive"),

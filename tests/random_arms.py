@@ -45,7 +45,7 @@ def arms(draw: st.DrawFn, least: int = 1, most: int = 7) -> Description:
     """Draw an arm with a body and a drive on every link."""
     arm = draw(tables(least, most))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    joints = tuple(replace(joint, body=random_body(rng), drive=random_drive(rng)) for joint in arm.joints)
+    joints = tuple(replace(joint, bodies=(random_body(rng),), drive=random_drive(rng)) for joint in arm.joints)
     return replace(arm, joints=joints)
 
 

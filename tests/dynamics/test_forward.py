@@ -22,7 +22,7 @@ def without_drives(arm):
 
 
 def with_bodies(arm, *bodies):
-    return replace(arm, joints=tuple(replace(j, body=body) for j, body in zip(arm.joints, bodies, strict=True)))
+    return replace(arm, joints=tuple(replace(j, bodies=(body,)) for j, body in zip(arm.joints, bodies, strict=True)))
 
 
 def point(mass, x):

@@ -7,9 +7,9 @@ import pytest
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError
 from dhkit.grading import grade
+from dhkit.grading.answers.documents.statements import left_hand_name, statements_of
 from dhkit.grading.answers.sheet import Chain, Entries, Refusal
 from dhkit.grading.answers.sources import read_source
-from dhkit.grading.answers.statements import left_hand_name, statements_of
 
 ROBOT = library_robot("planar2r")
 V = r"\tfrac12 m_1 g l_1 s_1 + m_2 g (l_1 s_1 + \tfrac12 l_2 s_{12})"

@@ -119,7 +119,7 @@ def test_sliding_joints_behind_any_twist(kinds, twists):
     rows = [(0, 0.2, 0.3, twist) for twist in twists]
     bare = from_dh(rows, kinds=kinds, angle="deg", parameters={"beta": 0.3})
     rng = np.random.default_rng(0)
-    arm = replace(bare, joints=tuple(replace(joint, body=random_body(rng)) for joint in bare.joints))
+    arm = replace(bare, joints=tuple(replace(joint, bodies=(random_body(rng),)) for joint in bare.joints))
     base = base_parameters(arm)
     assert base.prove()
     assert len(base) == numeric_rank(arm)

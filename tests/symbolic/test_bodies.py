@@ -107,7 +107,7 @@ def test_arms_of_a_pattern_share_an_expression():
     heavier = replace(
         arm,
         joints=tuple(
-            replace(j, body=replace(j.body, mass=j.body.mass * Fraction(11, 10))) if i == 2 else j
+            replace(j, bodies=(replace(j.body, mass=j.body.mass * Fraction(11, 10)),)) if i == 2 else j
             for i, j in enumerate(arm.joints)
         ),
     )

@@ -104,7 +104,7 @@ def test_a_singular_mass_matrix_is_said():
     planar = library_robot("planar2r")
     body = replace(planar.joints[1].body, mass=planar.joints[1].body.mass * 0)
     light = replace(body, inertia=type(body.inertia)())
-    report = verify(replace(planar, joints=(planar.joints[0], replace(planar.joints[1], body=light))), 5)
+    report = verify(replace(planar, joints=(planar.joints[0], replace(planar.joints[1], bodies=(light,)))), 5)
     assert report.ok
     assert any("forward dynamics not compared" in note and "elbow" in note for note in report.notes)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.arguments import joint_values
 from dhkit.cli.output import print_json, print_table, say
-from dhkit.description import Array, Description, Joint, pose_parts, robots
+from dhkit.description import Description, Joint, pose_parts, robots
+from dhkit.description.parameters import resolved
+from dhkit.expressions import substitute
 from dhkit.kinematics import classify
 
 __all__ = ["forward", "list_robots", "show"]
@@ -42,6 +44,10 @@ def show(arm: Arm, json: bool) -> None:
         say("parameters (SI): " + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.values.items()) + "\n")
     rows = [_joint_row(i, joint, description) for i, joint in enumerate(description.joints)]
     print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "assumed"), rows)
+    for i, joint in enumerate(description.joints, start=1):
+        if len(joint.bodies) > 1:
+            listed = (f"{one['name']} {one['mass']:.4g} kg at {_vector(one['com'])} m" for one in _bodies(joint, arm))
+            say(f"link {i}: {', '.join(listed)}")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")
     say(f"total mass {np.nansum(numbers.mass):.4g} kg{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
@@ -86,17 +92,30 @@ def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...
         f"{numbers.lower[i] * scale:.5g}{unit} to {numbers.upper[i] * scale:.5g}{unit}" if limited else "unlimited",
         f"{numbers.velocity[i] * scale:.4g}{unit}/s" if joint.velocity is not None else "unlimited",
         f"{numbers.effort[i]:.4g} {force}" if joint.effort is not None else "unlimited",
-        "no body" if joint.body is None else f"{numbers.mass[i]:.4g}",
+        "no body" if not joint.bodies else f"{numbers.mass[i]:.4g}",
         f"{numbers.armature[i]:.4g}",
         ", ".join(joint.assumed),
     )
+
+
+def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
+    """Return name, mass, kg, and centre of mass, m, of each body of a link."""
+    values = resolved(arm.description.parameters)
+    return [
+        {
+            "name": body.name,
+            "mass": float(substitute(body.mass, values)),
+            "com": [float(substitute(x, values)) for x in body.com],
+        }
+        for body in joint.bodies
+    ]
 
 
 def _motion(value: float, joint: Joint) -> str:
     return f"{math.degrees(value):.4g}°" if joint.is_revolute else f"{value:.4g} m"
 
 
-def _vector(entries: Array) -> str:
+def _vector(entries: Iterable[float]) -> str:
     return f"({', '.join(f'{entry + 0.0:.5g}' for entry in entries)})"
 
 
@@ -111,6 +130,7 @@ def _facts(arm: Arm) -> dict[str, Any]:
     joints = [
         {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
         | {column: float(getattr(numbers, column)[i]) for column in columns}
+        | {"bodies": _bodies(joint, arm)}
         for i, joint in enumerate(description.joints)
     ]
     return {

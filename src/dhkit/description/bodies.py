@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def moved_body(body: Body, T: ExactPose) -> Body:
     R = T[:3, :3]
     com = R @ np.array(body.com, dtype=object) + T[:3, 3]
     tensor = R @ np.array(body.inertia.rows, dtype=object) @ R.T
-    return Body(body.mass, vector(com), _inertia(tensor), body.unphysical)
+    return replace(body, com=vector(com), inertia=_inertia(tensor))
 
 
 def joined(bodies: Sequence[Body]) -> Body:
@@ -57,22 +58,22 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     return Body(mass, vector((first + last) / 2), _inertia(_steiner(last - first, mass / 12)))
 
 
-def require_bodies(description: Description) -> tuple[Body, ...]:
-    """Return the links' bodies, and refuse an arm whose dynamics are unknown.
+def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
+    """Return the bodies of each link, and refuse an arm whose dynamics are unknown.
 
     Raises
     ------
     DescriptionError
         Names the joints whose links have no body.
     """
-    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if joint.body is None]
+    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if not joint.bodies]
     if bare:
         raise DescriptionError(
             f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
             f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
             "or use with_uniform_links"
         )
-    return tuple(joint.body for joint in description.joints if joint.body is not None)
+    return tuple(joint.bodies for joint in description.joints)
 
 
 def _steiner(lever: NDArray[Any], mass: Expression) -> NDArray[Any]:

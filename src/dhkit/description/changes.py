@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description.bodies import joined, moved_body, rod
+from dhkit.description.bodies import moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
 from dhkit.description.named import Named
 from dhkit.description.parameters import resolved
@@ -61,7 +62,7 @@ def with_payload(
     com: Sequence[Quantity] = (0, 0, 0),
     inertia: ArrayLike | None = None,
 ) -> Description:
-    """Return the arm with a rigid load joined to its last link.
+    """Return the arm with a rigid load on its last link: a body of its own, named ``payload``.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def with_payload(
         The last link has no body to join it to, or the load is no body.
     """
     last = description.joints[-1]
-    if last.body is None:
+    if not last.bodies:
         raise DescriptionError(
             f"joint {description.n} ({last.name}) has no body to join a payload to; see with_uniform_links"
         )
@@ -86,12 +87,17 @@ def with_payload(
     if len(com) != 3:
         raise DescriptionError(f"payload: com has {len(com)} numbers; expected 3")
     x, y, z = (quantity(f"payload: com[{i}]", entry, names) for i, entry in enumerate(com))
-    load = Body(quantity("payload: mass", mass, names), (x, y, z), _tensor(inertia))
-    T_last_tool = pose_of(description.tool.placement)
-    body = joined([last.body, moved_body(load, T_last_tool)])
-    # What is joined is checked as a whole by the description; the load must be a body by itself.
+    load = Body(quantity("payload: mass", mass, names), (x, y, z), _tensor(inertia), name=_payload_name(last.bodies))
     check_body(load, "payload", resolved(names))
-    return replace(description, joints=(*description.joints[:-1], replace(last, body=body)))
+    bodies = (*last.bodies, moved_body(load, pose_of(description.tool.placement)))
+    return replace(description, joints=(*description.joints[:-1], replace(last, bodies=bodies)))
+
+
+def _payload_name(bodies: Sequence[Body]) -> str:
+    """Return a name for one more payload beside these bodies."""
+    taken = {body.name for body in bodies}
+    names = itertools.chain(["payload"], (f"payload {k}" for k in itertools.count(2)))
+    return next(name for name in names if name not in taken)
 
 
 def with_uniform_links(description: Description, masses: Sequence[Quantity] | None = None) -> Description:
@@ -114,7 +120,7 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     if masses is not None and len(masses) != n:
         raise DescriptionError(f"{len(masses)} masses; expected {n}, one a link")
     symbols = [f"m{i}" for i in range(1, n + 1)]
-    bare = replace(description, joints=tuple(replace(joint, body=None) for joint in description.joints))
+    bare = replace(description, joints=tuple(replace(joint, bodies=()) for joint in description.joints))
     if taken := names_in(bare) & set(symbols):
         raise DescriptionError(f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass")
     values = [exact(1)] * n if masses is None else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
@@ -122,7 +128,7 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     joints = tuple(
         replace(
             joint,
-            body=rod(Expression.symbol(symbol), *end),
+            bodies=(rod(Expression.symbol(symbol), *end),),
             assumed=tuple(dict.fromkeys((*joint.assumed, "body"))),
         )
         for joint, symbol, end in zip(description.joints, symbols, ends, strict=True)

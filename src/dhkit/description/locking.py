@@ -158,7 +158,7 @@ def _locked(description: Description, held: dict[int, Expression]) -> Descriptio
 
     So no common normal is taken of two axes of which one goes into the base: nearly parallel ones would cost digits.
     """
-    bodies = tuple((joint.body,) for joint in description.joints)
+    bodies = tuple(joint.bodies or (None,) for joint in description.joints)
     base: tuple[Body | None, ...] = (description.base.body,) if description.base.body is not None else ()
     chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
     values = resolved(description.parameters)
@@ -171,7 +171,7 @@ def _locked(description: Description, held: dict[int, Expression]) -> Descriptio
     configurations = Named({name: tuple(q[i] for i in kept) for name, q in description.configurations.items()})
     on_base = [body for body in chain.bodies[0] if body is not None]
     joints = tuple(
-        replace(joint, body=None if None in parts else joined([part for part in parts if part is not None]))
+        replace(joint, bodies=_link_bodies(joint, parts))
         for joint, parts in zip(chain.joints, chain.bodies[1:], strict=True)
     )
     return replace(
@@ -181,6 +181,13 @@ def _locked(description: Description, held: dict[int, Expression]) -> Descriptio
         tool=chain.tool,
         configurations=configurations,
     )
+
+
+def _link_bodies(joint: Joint, parts: tuple[Body | None, ...]) -> tuple[Body, ...]:
+    """Return the bodies of a link: its own where no other link was joined to it, otherwise all as one."""
+    if parts == joint.bodies:
+        return joint.bodies
+    return () if None in parts else (joined([part for part in parts if part is not None]),)
 
 
 def _places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:

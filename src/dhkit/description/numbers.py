@@ -96,7 +96,7 @@ class Numbers:
         """Round a description's exact numbers."""
         values = resolved(description.parameters)
         joints = description.joints
-        bodies = [joint.body for joint in joints]
+        bodies = [_as_one(joint.bodies, values) for joint in joints]
         drives = [joint.drive for joint in joints]
 
         def known(expression: Expression) -> Expression:
@@ -156,6 +156,16 @@ def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
     return np.array(
         [[float(substitute(entry, values)) for entry in row] for row in pose_of(placement, values)], dtype=float
     )
+
+
+def _as_one(bodies: tuple[Body, ...], values: dict[str, Expression]) -> Body | None:
+    """Return a link's bodies as one, several joined as numbers: a parameter that is zero divides nothing then."""
+    from dhkit.description.bodies import joined
+    from dhkit.description.traversal import with_values
+
+    if len(bodies) < 2:
+        return bodies[0] if bodies else None
+    return joined(with_values(bodies, values))
 
 
 def _tensor(body: Body | None, array: Callable[[Vector], Array]) -> Array:

@@ -97,7 +97,7 @@ class _Reader:
             base=Base(
                 self.placement("base", form.base.xyz, form.base.rpy),
                 self.shapes("base", form.base.shape),
-                self.body("base", form.base.body),
+                None if form.base.body is None else self.body("base", form.base.body),
             ),
             tool=Tool(self.placement("tool", form.tool.xyz, form.tool.rpy), self.shapes("tool", form.tool.shape)),
             configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
@@ -151,15 +151,20 @@ class _Reader:
             limits=limits,
             velocity=None if form.velocity is None else self.motion(f"{where}: velocity", kind, form.velocity),
             effort=None if form.effort is None else self.number(f"{where}: effort", form.effort),
-            body=self.body(where, form.body),
+            bodies=self.bodies(where, form),
             drive=self.drive(where, form.drive),
             shapes=self.shapes(where, form.shape),
             assumed=tuple(form.assumed),
         )
 
-    def body(self, where: str, form: BodyForm | None) -> Body | None:
-        if form is None:
-            return None
+    def bodies(self, where: str, form: JointForm) -> tuple[Body, ...]:
+        if form.bodies is None:
+            return () if form.body is None else (self.body(where, form.body),)
+        return tuple(
+            self.body(f"{where}, {one.name[:40] or f'body {k}'}", one) for k, one in enumerate(form.bodies, start=1)
+        )
+
+    def body(self, where: str, form: BodyForm) -> Body:
         tensor = {
             key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key))
             for key in ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -169,6 +174,7 @@ class _Reader:
             self.vector(f"{where}: body.com", form.com, self.units.metres),
             Inertia(**tensor),
             form.unphysical,
+            form.name,
         )
 
     def drive(self, where: str, form: DriveForm | None) -> Drive | None:

@@ -112,8 +112,9 @@ class InertiaForm(Form):
 
 
 class BodyForm(Form):
-    """Mass, kg, centre of mass and inertia of a link in its own DH frame."""
+    """Mass, kg, centre of mass and inertia of a link, or of a part of it, in the link's own DH frame."""
 
+    name: Text = ""
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
     inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _Also(lambda _: THREE_BY_THREE)] = InertiaForm()
@@ -182,6 +183,8 @@ Shapes = Annotated[
 class JointForm(Form):
     """A row of the DH table, and the link that its joint moves."""
 
+    model_config = ConfigDict(json_schema_extra={"not": {"required": ["body", "bodies"]}})
+
     name: Text = ""
     type: Literal["revolute", "prismatic"]
     a: Number
@@ -192,11 +195,18 @@ class JointForm(Form):
     velocity: Number | None = None
     effort: Number | None = None
     body: BodyForm | None = None
+    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=16)] | None = None
     drive: DriveForm | None = None
     shape: Shapes
     assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
         Field(default=[], max_length=10)
     )
+
+    @model_validator(mode="after")
+    def _one_of_body_and_bodies(self) -> JointForm:
+        if self.body is not None and self.bodies is not None:
+            raise PydanticCustomError("both", "found both body and bodies; expected one of them")
+        return self
 
 
 class BaseForm(Form):
@@ -271,6 +281,8 @@ def _one_line(error: ErrorDetails, document: Mapping[str, Any]) -> str:
             count = error["ctx"]
             bound = f"at most {count['max_length']}" if "max_length" in count else f"at least {count['min_length']}"
             return f"{_place(path, document)}found {len(found)} entries; expected {bound}"
+        case "both":
+            return f"{_place(path, document)}{error['msg']}"
         case "literal_error":
             expected = str(error["ctx"]["expected"])
         case "number" | "inertia" | "shape":
@@ -303,6 +315,7 @@ def _hint(path: tuple[int | str, ...]) -> str:
         "joint": JointForm,
         "units": UnitsForm,
         "body": BodyForm,
+        "bodies": BodyForm,
         "inertia": InertiaForm,
         "drive": DriveForm,
         "shape": ShapeForm,

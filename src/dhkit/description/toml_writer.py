@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import tomlkit
-from tomlkit.items import Float, InlineTable, Item, Table, Trivia
+from tomlkit.items import Array, Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.files import write_atomically
 from dhkit.description.robot import Description
@@ -78,8 +78,10 @@ def _joint(joint: Joint, units: Units) -> Table:
         content["velocity"] = _motion(joint.velocity, joint, units)
     if joint.effort is not None:
         content["effort"] = _entry(joint.effort)
-    if joint.body is not None:
-        content["body"] = _body(joint.body, units)
+    if len(joint.bodies) == 1:
+        content["body"] = _body(joint.bodies[0], units)
+    elif joint.bodies:
+        content["bodies"] = _list(_body(body, units) for body in joint.bodies).multiline(True)
     if joint.drive is not None:
         content["drive"] = _drive(joint.drive)
     if joint.shapes:
@@ -90,7 +92,8 @@ def _joint(joint: Joint, units: Units) -> Table:
 
 
 def _body(body: Body, units: Units) -> InlineTable:
-    content: dict[str, Any] = {"mass": _entry(body.mass)}
+    content: dict[str, Any] = {"name": body.name} if body.name else {}
+    content["mass"] = _entry(body.mass)
     if not all(x.is_zero for x in body.com):
         content["com"] = _entries(body.com, units.metres)
     moments = {key: _entry(moment) for key, moment in vars(body.inertia).items() if not moment.is_zero}
@@ -161,7 +164,7 @@ def _entry(value: Expression, unit: Expression = ONE) -> Item:
     return Float(float(bare), Trivia(), text)
 
 
-def _list(entries: Iterable[Any]) -> Item:
+def _list(entries: Iterable[Any]) -> Array:
     array = tomlkit.array()
     for entry in entries:
         array.append(entry)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,9 +23,11 @@ MAX_JOINTS = 32
 MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
 MAX_SHAPES = 50
+MAX_BODIES = 16
 MAX_MESH_BYTES = 50_000_000
 """A million triangles: more than a browser shows well."""
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
+BODY_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\- ]{0,63}", re.ASCII)
 RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of the URDF's links and fixed joints: a joint of the same name would confuse Pinocchio."""
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
@@ -75,7 +77,7 @@ def check(description: Description) -> tuple[str, ...]:
     for joint in description.joints:
         warnings += _check_shapes(joint.shapes, f"link of {joint.name}", value, description)
     if description.base.body is not None:
-        warnings += _check_body(description.base.body, "base", value)
+        warnings += _check_lone_body(description.base.body, "base", value)
     _check_configurations(description, value)
     return tuple(warnings)
 
@@ -128,8 +130,28 @@ def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
             raise DescriptionError(f"{where}: {key} is {limit}; expected a positive number of {unit}")
     if joint.drive is not None:
         _check_drive(joint.drive, where, value)
-    if joint.body is not None:
-        yield from _check_body(joint.body, where, value)
+    if len(joint.bodies) == 1:
+        _check_body_names(joint.bodies, where)
+        yield from _check_lone_body(joint.bodies[0], where, value)
+    elif joint.bodies:
+        _check_body_names(joint.bodies, where)
+        for body in joint.bodies:
+            yield from _check_body(body, f"{where}, {body.name}", value)
+
+
+def _check_body_names(bodies: Sequence[Body], where: str) -> None:
+    if len(bodies) > MAX_BODIES:
+        raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {MAX_BODIES}")
+    seen: set[str] = set()
+    for k, body in enumerate(bodies, start=1):
+        if body.name and not BODY_NAME.fullmatch(body.name):
+            raise DescriptionError(
+                f"{where}: body {k} has the name {body.name[:80]!r}; expected letters, digits, '_', '.', '-' and "
+                "spaces, beginning with a letter"
+            )
+        if body.name in seen:
+            raise DescriptionError(f"{where}: name {body.name!r} is another body's already")
+        seen.add(body.name)
 
 
 def _check_drive(drive: Drive, where: str, value: Value) -> None:
@@ -152,8 +174,7 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
         raise DescriptionError(f"{where}: body.mass is {mass:g} kg; expected none below 0")
     for i, entry in enumerate(body.com):
         value(f"{where}: body.com[{i}]", entry)
-    rows = [[value(f"{where}: body.inertia", entry) for entry in row] for row in body.inertia.rows]
-    lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(np.array(rows)))
+    lowest, middle, largest = _principal_moments(body, where, value)
     slack = ABSOLUTE_SLACK + RELATIVE_SLACK * abs(largest)
     if lowest < -slack:
         message = f"{where}: body.inertia has the eigenvalue {lowest:.6g} kg m^2; expected none below 0"
@@ -167,8 +188,22 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
         )
     if mass == 0 and largest > slack:
         yield f"{where}: a body without mass has inertia"
+
+
+def _check_lone_body(body: Body, where: str, value: Value) -> Iterator[str]:
+    """Check the only body of a link: one of several may well be a point mass."""
+    yield from _check_body(body, where, value)
+    mass = value(f"{where}: body.mass", body.mass)
+    lowest, _, largest = _principal_moments(body, where, value)
     if mass > 0 and math.isclose(max(abs(lowest), abs(largest)), 0.0, abs_tol=ABSOLUTE_SLACK):
         yield f"{where}: a body of {mass:g} kg has no inertia"
+
+
+def _principal_moments(body: Body, where: str, value: Value) -> tuple[float, float, float]:
+    """Return the eigenvalues of the inertia, kg m^2, the lowest first."""
+    rows = [[value(f"{where}: body.inertia", entry) for entry in row] for row in body.inertia.rows]
+    lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(np.array(rows)))
+    return lowest, middle, largest
 
 
 def _check_placement(placement: Placement, prefix: str, value: Value) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 from typing import TypeAlias
 
 from dhkit.expressions import PI, ZERO, Expression, exact
@@ -102,13 +103,15 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Body:
-    """A link's mass, kg, centre of mass, m, and inertia about it, in the axes of the link's own DH frame."""
+    """A rigid body's mass, kg, centre of mass, m, and inertia about it, in the axes of its link's own DH frame."""
 
     mass: Expression
     com: Vector = ORIGIN
     inertia: Inertia = Inertia()
     unphysical: bool = False
     """The inertia is known to be impossible and kept as published: a warning, no error."""
+    name: str = ""
+    """Empty: the joint calls it ``body 1``, ``body 2`` ... by its place, where its link has several bodies."""
 
 
 @dataclass(frozen=True)
@@ -210,12 +213,25 @@ class Joint:
     """Largest speed, rad/s or m/s."""
     effort: Expression | None = None
     """Largest torque or force, N m or N."""
-    body: Body | None = None
+    bodies: tuple[Body, ...] = ()
+    """What the link is made of; without one its dynamics are unknown."""
     drive: Drive | None = None
     shapes: tuple[Shape, ...] = ()
     """Without one, the link is drawn from the table."""
     assumed: tuple[str, ...] = ()
     """Keys of this joint whose numbers are nobody's publication."""
+
+    def __post_init__(self) -> None:
+        if len(self.bodies) > 1:
+            named = (body if body.name else replace(body, name=f"body {k}") for k, body in enumerate(self.bodies, 1))
+            object.__setattr__(self, "bodies", tuple(named))
+
+    @cached_property
+    def body(self) -> Body | None:
+        """The link as one rigid body: the only one itself, several joined about their common centre of mass."""
+        from dhkit.description.bodies import joined
+
+        return joined(self.bodies) if self.bodies else None
 
     @property
     def is_revolute(self) -> bool:

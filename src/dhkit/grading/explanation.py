@@ -15,7 +15,7 @@ from dhkit.symbolic import Lagrangian, lagrangian
 from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, Elements, element_array
-from dhkit.symbolic.textbook import LinkMotion, TextbookDerivation, derive
+from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 from dhkit.symbolic.textbook_kinematics import derive_kinematics
 
 __all__ = ["Step", "explanation_html", "explanation_text", "worked_solution"]
@@ -95,7 +95,10 @@ class _Solution:
             [(f"A{i + 1}", A) for i, A in enumerate(kinematics.A)],
         )
         for i, link in enumerate(self.textbook.links, start=1):
-            yield from self._link(i, link)
+            for k, body in enumerate(link.bodies, start=1):
+                several = len(link.bodies) > 1
+                name = f"Link {i}, {body.body.name}" if several else f"Link {i}"
+                yield from self._body(name, i, f"{i}{k}" if several else f"{i}", body)
         yield self._step(
             "Energies of the arm",
             "Sums over the links, and over the drives' rotors: G^2 J qd^2/2 each.",
@@ -112,22 +115,23 @@ class _Solution:
         if n <= 3:
             yield self._step("Joint torques", "tau = M qdd + h + g.", [("tau", lag.tau)])
 
-    def _link(self, i: int, link: LinkMotion) -> Iterator[Step]:
+    def _body(self, name: str, i: int, number: str, body: BodyMotion) -> Iterator[Step]:
+        """Yield the steps for a body of link i, from 1, whose quantities have this number."""
         yield self._step(
-            f"Link {i}: where its centre of mass is",
-            f"In frame 0: p_{i} = o_{i} + R_{i} c_{i}.",
-            [(f"p{i}", link.com)],
+            f"{name}: where its centre of mass is",
+            f"In frame 0: p_{number} = o_{i} + R_{i} c_{number}.",
+            [(f"p{number}", body.com)],
         )
         yield self._step(
-            f"Link {i}: its velocities",
+            f"{name}: its velocities",
             "The time derivative of p, and the sum of the turning joints' axes times their rates, both resolved in the "
             "link's own axes.",
-            [(f"v{i}", link.velocity), (f"w{i}", link.omega)],
+            [(f"v{number}", body.velocity), (f"w{number}", body.omega)],
         )
         yield self._step(
-            f"Link {i}: its energies",
+            f"{name}: its energies",
             "K = m v.v/2 + w.I w/2, V = -m g.p, with I about the centre of mass.",
-            [(f"K{i}", element_array(link.K)), (f"V{i}", element_array(link.V))],
+            [(f"K{number}", element_array(body.K)), (f"V{number}", element_array(body.V))],
         )
 
     def _step(self, title: str, words: str, quantities: Sequence[tuple[str, Elements]]) -> Step:

@@ -22,16 +22,18 @@ from dhkit.grading.answers.given import (
     with_entries_gathered,
 )
 from dhkit.grading.answers.quantity_names import QuantityNames
-from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names
+from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names, shape_of
 from dhkit.grading.answers.typeset import typeset
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.functions import judge_function
-from dhkit.grading.judging.kinematic_entries import KinematicEntries, inverse_entries, table_entries
+from dhkit.grading.judging.inverse import inverse_entries
+from dhkit.grading.judging.kinematic_judgement import KinematicJudgement
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
-from dhkit.grading.judging.truth import Truth, shape_of, truth_of
+from dhkit.grading.judging.tables import table_entries
+from dhkit.grading.judging.truth import Truth, truth_of
 from dhkit.grading.mistakes.explaining import explain
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict
 from dhkit.symbolic import ExactArm
@@ -186,15 +188,15 @@ def _judge_one(
 
 def _kinematic(
     description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, seed: int
-) -> tuple[list[KinematicEntries], dict[str, DhkitError]]:
+) -> tuple[list[KinematicJudgement], dict[str, DhkitError]]:
     """Judge a sheet's table and formulas of inverse kinematics, as :func:`_judged` does its quantities."""
     n = description.n
 
-    def table() -> KinematicEntries:
+    def table() -> KinematicJudgement:
         convention, rows = sheet.table or ("", ())
         return table_entries(description, given_rows(rows, n, vocabulary), convention, sheet.task, seed)
 
-    def inverse() -> KinematicEntries:
+    def inverse() -> KinematicJudgement:
         own = vocabulary_of(description, sheet.names, inverse=True)
         return inverse_entries(description, given_branches(sheet.branches, n, own), seed)
 
@@ -243,8 +245,8 @@ def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocab
             values = truth.arm(name).parameters
             listed = tuple(f"{p} = {values[p]:g}" for p in sorted(quantity.numbers))
             notes.append(Note(NoteKind.NUMBERS, name, listed))
-        for index in quantity.contradictions:
-            notes.append(Note(NoteKind.SIDES_DIFFER, Entry(name, index, Verdict.WRONG).name))
+        contradictory = (Entry(name, index, Verdict.WRONG).name for index in quantity.contradictions)
+        notes += [Note(NoteKind.SIDES_DIFFER, entry) for entry in contradictory]
     if "C" in judged:
         notes += _about_C(truth, judged["C"])
     notes += [Note(NoteKind.TAKEN_FOR, values=(typed, meant)) for typed, meant in vocabulary.taken_for.items()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dhkit.description import Description
-from dhkit.grading.judging.truth import shape_of
+from dhkit.grading.answers.sheet import shape_of
 
 __all__ = ["template"]
 

@@ -1,12 +1,12 @@
 """Mistakes as values, and those that are made while deriving equations of motion as a textbook does.
 
 A mistake has an identity that stays the same over versions, a subject, what is then the case, and where to look. Those
-of this module are places in :mod:`dhkit.symbolic.textbook`, made at every link or at one.
+of this module are places in :mod:`dhkit.symbolic.textbook`, made at every link, at one, or at one body of a link.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -77,13 +77,17 @@ class MadeAt:
         Of the mistake.
     link
         The link, from 1; None where it is made throughout.
+    body
+        The name of one of the link's bodies; None where it is made at all of them.
     """
 
     identity: str
     link: int | None = None
+    body: str | None = None
 
     def __str__(self) -> str:
-        return self.identity if self.link is None else f"{self.identity} at link {self.link}"
+        link = "" if self.link is None else f" at link {self.link}"
+        return f"{self.identity}{link}" if self.body is None else f"{self.identity}{link}, {self.body}"
 
 
 def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:
@@ -244,20 +248,35 @@ LINK_MISTAKES = frozenset(MISTAKES) - {*VELOCITY_FACTORS, *STEP_FACTORS, *ROTOR_
 """Those that change a link's own energies."""
 
 
-def has(mistakes: Iterable[MadeAt], identity: str, i: int | None = None) -> bool:
-    """Return whether a mistake is made throughout, or at link i (from 0) if one is given."""
-    return MadeAt(identity) in mistakes or (i is not None and MadeAt(identity, i + 1) in mistakes)
+def has(mistakes: Collection[MadeAt], identity: str, i: int | None = None, body: str | None = None) -> bool:
+    """Return whether a mistake is made throughout, at link i (from 0) if one is given, or at its body of that name."""
+    if MadeAt(identity) in mistakes:
+        return True
+    return i is not None and (MadeAt(identity, i + 1) in mistakes or MadeAt(identity, i + 1, body) in mistakes)
 
 
-def check_mistake(made: object, n: int, known: Mapping[str, Mistake] = MISTAKES) -> None:
-    """Refuse what is no mistake of a catalogue, or made at no link of an arm of n joints.
+def check_mistake(
+    made: object, n: int, known: Mapping[str, Mistake] = MISTAKES, bodies: Sequence[Sequence[str]] = ()
+) -> None:
+    """Refuse what is no mistake of a catalogue, or made at no link or body of an arm of n joints.
+
+    Parameters
+    ----------
+    made
+        A mistake where it is made.
+    n
+        The number of joints.
+    known
+        The catalogue.
+    bodies
+        The names of each link's bodies, where a mistake may be made at one of them.
 
     Raises
     ------
     TypeError
         Not a :class:`MadeAt`.
     ValueError
-        No such mistake, or no such link.
+        No such mistake, no such link, or no such body.
     """
     if not isinstance(made, MadeAt):
         raise TypeError(f"mistake {made!r}: expected MadeAt(identity, link)")
@@ -265,3 +284,10 @@ def check_mistake(made: object, n: int, known: Mapping[str, Mistake] = MISTAKES)
         raise ValueError(f"no mistake {made.identity!r}; expected one of {', '.join(known)}")
     if made.link is not None and not 1 <= made.link <= n:
         raise ValueError(f"mistake {made.identity!r}: no link {made.link}; expected 1 to {n}")
+    if made.body is None:
+        return
+    names = bodies[made.link - 1] if made.link is not None and bodies else ()
+    if made.identity not in LINK_MISTAKES or made.body not in names:
+        where = "" if made.link is None else f" of link {made.link}"
+        expected = ", ".join(filter(None, names)) or "none"
+        raise ValueError(f"mistake {made.identity!r}: no body {made.body!r}{where}; expected {expected}")

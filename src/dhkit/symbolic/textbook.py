@@ -1,53 +1,82 @@
 """Lagrange's equations as a textbook derives them, every step kept, with the places where students go wrong.
 
 Positions of the centres of mass, their velocities by differentiation, angular velocities as sums over the joints'
-axes, kinetic and potential energy of each link, the Lagrangian, and d/dt dL/dqd - dL/dq (Spong, Hutchinson &
-Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1). It shares the
-table with :mod:`dhkit.symbolic.exact.composite`, and nothing else.
+axes, kinetic and potential energy of each body of each link, the Lagrangian, and d/dt dL/dqd - dL/dq (Spong,
+Hutchinson & Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1). It
+shares the table and the bodies with :mod:`dhkit.symbolic.exact.composite`, and nothing else.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 
 from dhkit.description import Description
-from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm, point_inertia
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, Symbols, exact_arm, point_inertia
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
 from dhkit.symbolic.ring import Element, Elements, Ring
 
-__all__ = ["LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
+__all__ = ["BodyMotion", "LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
 
 HALF = Fraction(1, 2)
 
 
 @dataclass(frozen=True, eq=False)
-class LinkMotion:
-    """What the derivation finds of a link; vectors of shape (3,).
+class BodyMotion:
+    """What the derivation finds of a body of a link; vectors of shape (3,).
 
     Attributes
     ----------
-    R
-        The link's DH frame in frame 0, shape (3, 3).
-    origin, com
-        The frame's origin and the centre of mass, in frame 0.
+    body
+        What moves.
+    com
+        The centre of mass in frame 0.
     velocity, omega
         Of the centre of mass, and angular, both in the link's own axes.
     K, V
         Kinetic and potential energy.
     """
 
-    R: Elements
-    origin: Elements
+    body: ExactBody
     com: Elements
     velocity: Elements
     omega: Elements
     K: Element
     V: Element
+
+
+@dataclass(frozen=True, eq=False)
+class LinkMotion:
+    """What the derivation finds of a link.
+
+    Attributes
+    ----------
+    R
+        The link's DH frame in frame 0, shape (3, 3).
+    origin
+        The frame's origin in frame 0, shape (3,).
+    bodies
+        What it finds body by body.
+    """
+
+    R: Elements
+    origin: Elements
+    bodies: tuple[BodyMotion, ...]
+
+    @property
+    def K(self) -> Element:
+        """Kinetic energy, J."""
+        return reduce(operator.add, (body.K for body in self.bodies))
+
+    @property
+    def V(self) -> Element:
+        """Potential energy, J."""
+        return reduce(operator.add, (body.V for body in self.bodies))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,8 +199,8 @@ def derive(
     description
         The robot.
     mistakes
-        Of :data:`dhkit.symbolic.MISTAKES`, by identity where they are made at every link, or ``MadeAt(identity, 2)``
-        for link 2 alone.
+        Of :data:`dhkit.symbolic.MISTAKES`, by identity where they are made at every link, ``MadeAt(identity, 2)`` for
+        link 2 alone, or ``MadeAt(identity, 2, "payload")`` for its body of that name.
     symbols
         See :func:`dhkit.symbolic.exact.exact_arm`.
 
@@ -180,9 +209,9 @@ def derive(
     DescriptionError
         A link has no body.
     ValueError
-        No such mistake, or no such link.
+        No such mistake, no such link, or no such body.
     TypeError
-        Mistakes that are neither.
+        Mistakes that are none of these.
 
     Examples
     --------
@@ -192,22 +221,26 @@ def derive(
     True
     """
     made = made_at(mistakes)
-    for mistake in made:
-        check_mistake(mistake, description.n)
     arm = exact_arm(description, symbols)
-    motions = []
-    for i in range(arm.n):
-        concerned = frozenset(mistake.identity for mistake in made if mistake.link in (None, i + 1))
-        motions.append(_motion(arm, i, concerned & LINK_MISTAKES))
-    return TextbookDerivation(arm, tuple(motions), made)
+    names = [[body.name for body in bodies] for bodies in arm.bodies]
+    for mistake in made:
+        check_mistake(mistake, description.n, bodies=names)
+    links = []
+    for i, place in enumerate(_places(arm)):
+        motions = []
+        for body in arm.bodies[i]:
+            concerned = frozenset(mistake for mistake in LINK_MISTAKES if has(made, mistake, i, body.name))
+            motions.append(_motion(arm, i, body, concerned))
+        links.append(LinkMotion(place.R, place.origin, tuple(motions)))
+    return TextbookDerivation(arm, tuple(links), made)
 
 
 @lru_cache(maxsize=4096)
-def _motion(arm: ExactArm, i: int, mistakes: frozenset[str]) -> LinkMotion:
-    """Return what is found of link i, from 0; derivations that share it do not find it twice."""
+def _motion(arm: ExactArm, i: int, body: ExactBody, mistakes: frozenset[str]) -> BodyMotion:
+    """Return what is found of a body of link i, from 0; derivations that share it do not find it twice."""
     places = _places(arm)
     axes = [place.axis for place in places[: i + 1]]
-    return _Link(arm, mistakes, i, places[i]).motion(axes)
+    return _MovingBody(arm, mistakes, i, body, places[i]).motion(axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,33 +276,31 @@ def _places(arm: ExactArm) -> tuple[_Place, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Link:
-    """One link in one state of the derivation."""
+class _MovingBody:
+    """One body of link i in one state of the derivation."""
 
     arm: ExactArm
     mistakes: frozenset[str]
     i: int
+    body: ExactBody
     at: _Place
 
     def has(self, mistake: str) -> bool:
         return mistake in self.mistakes
 
-    def motion(self, axes: list[Elements]) -> LinkMotion:
+    def motion(self, axes: list[Elements]) -> BodyMotion:
         velocity, omega = self.velocity(), self.omega(axes)
         K = self.kinetic(velocity, omega)
-        return LinkMotion(
-            self.at.R, self.at.origin, self.place("velocity_relative_angle"), velocity, omega, K, self.potential()
-        )
+        return BodyMotion(self.body, self.place("velocity_relative_angle"), velocity, omega, K, self.potential())
 
     @property
     def mass(self) -> Element:
-        return self.arm.bodies[self.i].mass * (0 if self.has("mass_forgotten") else 1)
+        return self.body.mass * (0 if self.has("mass_forgotten") else 1)
 
     @property
     def com(self) -> Elements:
         """The centre of mass in the link's own frame."""
-        com = self.arm.bodies[self.i].com
-        return self.end if self.has("com_at_end") else com
+        return self.end if self.has("com_at_end") else self.body.com
 
     @property
     def joint(self) -> Elements:
@@ -311,7 +342,7 @@ class _Link:
 
     def inertia(self) -> Elements:
         """Return the tensor about the centre of mass, in the link's axes."""
-        tensor = self.arm.bodies[self.i].inertia
+        tensor = self.body.inertia
         if self.has("inertia_forgotten"):
             return 0 * tensor
         if self.has("inertia_doubled"):

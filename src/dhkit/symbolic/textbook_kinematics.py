@@ -344,10 +344,10 @@ def with_massless_links(description: Description) -> Description:
 
     Kinematics need no bodies, and the exact arm, which is the dynamics' as well, needs all of them.
     """
-    if all(joint.body is not None for joint in description.joints):
+    if all(joint.bodies for joint in description.joints):
         return description
     massless = Body(ZERO)
-    joints = tuple(joint if joint.body is not None else replace(joint, body=massless) for joint in description.joints)
+    joints = tuple(joint if joint.bodies else replace(joint, bodies=(massless,)) for joint in description.joints)
     return replace(description, joints=joints)
 
 

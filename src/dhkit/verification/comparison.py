@@ -63,7 +63,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     reference = Reference(pinocchio_model(description), motion)
     comparisons = list(_kinematics(description, reference))
     notes: list[str] = []
-    missing = [joint.name for joint in description.joints if joint.body is None]
+    missing = [joint.name for joint in description.joints if not joint.bodies]
     if missing:
         notes.append(f"dynamics not compared: no body on {', '.join(missing)}")
     else:

@@ -36,7 +36,7 @@ def differences(description: Description, model: PinocchioModel, tolerance: floa
     apart = [i for i in range(description.n) if _distance(ours[i], theirs[i], reach) > least]
     if apart:
         yield from _axes(description, ours, theirs, apart[0], reach, least)
-    elif all(joint.body is not None for joint in description.joints):
+    elif all(joint.bodies for joint in description.joints):
         yield from _bodies(description, pinocchio_model(description), model, least)
 
 

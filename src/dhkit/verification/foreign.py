@@ -78,7 +78,7 @@ def verify_urdf(
     comparisons = list(_tool(description, reference, chain.tip, tolerance, notes))
     if not any(note.startswith(BASE_MOVED) for note in notes):
         notes += differences(description, model, tolerance)
-    if all(joint.body is not None for joint in description.joints):
+    if all(joint.bodies for joint in description.joints):
         comparisons += _dynamics(description, reference, tolerance)
     else:
         notes.append("dynamics not compared: the table has links without a body")

@@ -13,11 +13,11 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
+from dhkit.grading.answers.documents.statements import Statement, has_relation, statements_of
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of, read_matrix
 from dhkit.grading.answers.sheet import Chain, Entries, Names, Refusal
-from dhkit.grading.answers.statements import Statement, has_relation, statements_of
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 

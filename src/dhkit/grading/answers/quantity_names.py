@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dhkit.description import Description
-from dhkit.grading.answers.sheet import ALIASES, quantity_names
+from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
 __all__ = ["SCALARS", "QuantityNames", "Target"]
@@ -62,11 +62,7 @@ class QuantityNames:
 
     def shape(self, quantity: str) -> tuple[int, ...]:
         """Return a quantity's shape; () of a scalar."""
-        if quantity in SCALARS:
-            return ()
-        if quantity in ("h", "g", "tau"):
-            return (self.n,)
-        return (self.n, self.n) if quantity in ("M", "C") else (6, self.n) if quantity == "J" else (4, 4)
+        return shape_of(quantity, self.n)
 
     def is_scalar(self, quantity: str) -> bool:
         """Whether a quantity has one entry, so that a formula without brackets gives it whole."""

@@ -29,6 +29,7 @@ __all__ = [
     "read_sheet",
     "read_task",
     "read_text",
+    "shape_of",
     "sheet_of",
 ]
 
@@ -239,6 +240,17 @@ def read_task(path: Path) -> AnswerSheet:
 def quantity_names(n: int) -> list[str]:
     """Return what an arm of n joints may be asked for."""
     return ["M", "C", "h", "g", "tau", "K", "V", "L", *(f"A{i}" for i in range(1, n + 1)), "T", "J"]
+
+
+def shape_of(quantity: str, n: int) -> tuple[int, ...]:
+    """Return the shape of a quantity for an arm of n joints; () of a scalar."""
+    if quantity in ("M", "C"):
+        return (n, n)
+    if quantity in ("h", "g", "tau"):
+        return (n,)
+    if quantity in ("K", "V", "L"):
+        return ()
+    return (6, n) if quantity == "J" else (4, 4)
 
 
 def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:

@@ -8,12 +8,12 @@ from typing import TypeAlias
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import Program
-from dhkit.grading.answers.latex_document import latex_answers
-from dhkit.grading.answers.matlab_program import matlab_program
-from dhkit.grading.answers.notebook import notebook_code
-from dhkit.grading.answers.program_answers import answers_of
-from dhkit.grading.answers.python_program import python_program
+from dhkit.grading.answers.documents.latex_document import latex_answers
+from dhkit.grading.answers.programs.bindings import Program
+from dhkit.grading.answers.programs.matlab_program import matlab_program
+from dhkit.grading.answers.programs.notebook import notebook_code
+from dhkit.grading.answers.programs.program_answers import answers_of
+from dhkit.grading.answers.programs.python_program import python_program
 from dhkit.grading.answers.sheet import AnswerSheet, read_text
 
 __all__ = ["LANGUAGES", "MAX_CHARACTERS", "read_source"]

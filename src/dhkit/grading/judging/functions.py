@@ -11,10 +11,11 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.given import Given
+from dhkit.grading.answers.sheet import shape_of
 from dhkit.grading.isolation import Limits, result_of
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in
-from dhkit.grading.judging.truth import Truth, shape_of
+from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Verdict, Witness
 
 __all__ = ["judge_function"]

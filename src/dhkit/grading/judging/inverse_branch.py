@@ -157,7 +157,7 @@ class Branch:
         return self.order[turn] if turn < self.n else None
 
     def sample(self, most: int) -> Branch:
-        """Return the branch on some of its poses: so many that it should close and does not, and as many that it does."""
+        """Return the branch on so many poses that it should close and does not, and on as many that it closes."""
         chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
         return Branch(self.poses.at(chosen), self.trees)
 

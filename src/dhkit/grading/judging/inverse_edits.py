@@ -15,7 +15,17 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.numeric import names_of, parts_of
 
-__all__ = ["ROOTS", "Edit", "Lengths", "edits", "has_call", "renamed", "renamings", "replaced_everywhere"]
+__all__ = [
+    "ROOTS",
+    "Edit",
+    "Lengths",
+    "edits",
+    "has_call",
+    "renamed",
+    "renamings",
+    "replaced_everywhere",
+    "with_signs_changed",
+]
 
 ORDER = (
     "atan2_arguments",
@@ -55,6 +65,8 @@ ROTATIONS = POSE_NAMES[3:]
 ARCS = ("acos", "asin", "atan")
 ROOTS = ("sqrt", "acos", "asin")
 """Functions that know one sign of two."""
+SMALLEST = 10
+"""Degrees or millimetres: smaller numbers are factors and exponents."""
 LAW_TERMS = 3
 """Terms of the numerator in a law of cosines, at least: two squares of links, and a squared distance."""
 
@@ -95,7 +107,9 @@ class Lengths:
     trees: tuple[Tree, ...]
 
 
-def edits(tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float], lengths: Lengths) -> list[Edit]:
+def edits(
+    tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float], lengths: Lengths
+) -> list[Edit]:
     """Return the changes of a formula in the order in which they are tried, :data:`MOST_EDITS` at most.
 
     Parameters
@@ -139,7 +153,7 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
                 if p in names:
                     yield "offset_forgotten", {p: Sum(((True, Name(p, 0)), (not subtracted, length)))}
             for column in "123":
-                tool = {
+                tool: dict[str, Tree] = {
                     p: Sum(((True, Name(p, 0)), (not subtracted, _times(length, Name(f"r{i}{column}", 0)))))
                     for i, p in enumerate(POSITIONS, start=1)
                 }
@@ -186,6 +200,16 @@ def _plain_text(tree: Tree) -> str:
 def has_call(tree: Tree, functions: Sequence[str]) -> bool:
     """Whether a formula calls one of some functions."""
     return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
+
+
+def with_signs_changed(tree: Tree) -> Iterator[Tree]:
+    """Yield a formula with the sign of one root or arc cosine changed, one after the other; then of all of them."""
+    alone = Lengths((), ())
+    for edit in _of_parts(tree, alone, lambda part: part, in_law=False):
+        if edit.mistake == "elbow_sign":
+            yield edit.tree
+    if has_call(tree, ROOTS):
+        yield with_calls_changed(tree, ROOTS, minus)
 
 
 def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
@@ -280,8 +304,9 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
 def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if number.value == 1:
         return
-    yield "degrees_for_radians", _times(number, Name("deg", 0))
-    yield "millimetres_for_metres", _times(number, Name("mm", 0))
+    if number.value >= SMALLEST:
+        yield "degrees_for_radians", _times(number, Name("deg", 0))
+        yield "millimetres_for_metres", _times(number, Name("mm", 0))
     yield "cosine_law_squares" if in_law else "square_forgotten", _squared(number)
 
 

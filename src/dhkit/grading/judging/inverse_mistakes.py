@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.expressions import exact
 from dhkit.expressions.syntax import Name, Number, Tree
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import (
@@ -162,14 +162,14 @@ def lengths_of(description: Description) -> Lengths:
     """Return what formulas for a robot may hold as lengths."""
     parameters = tuple(description.parameters)
     numbers, values = description.numbers, description.numbers.values
-    known = [*numbers.d, *numbers.a, *description.base.p, *description.tool.p]
+    known = [*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]]
     found: list[Tree] = [Name(name, 0) for name in parameters]
     seen = {round(abs(float(values[name])), 12) for name in parameters} | {0.0}
     for length in known:
         size = round(abs(float(length)), 12)
         if size not in seen:
             seen.add(size)
-            found.append(Number(exact(size).rational or 0, str(size), 0))
+            found.append(Number(Fraction(str(size)), str(size), 0))
     return Lengths(parameters, tuple(found))
 
 

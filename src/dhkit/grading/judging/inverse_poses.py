@@ -93,7 +93,7 @@ class Poses:
     @property
     def has_closed_form(self) -> bool:
         """Whether the solutions are those of a closed form, all of them."""
-        return self.solutions.shape[1] > 0
+        return bool(self.solutions.shape[1])
 
     @cached_property
     def scale(self) -> float:
@@ -119,7 +119,7 @@ class Poses:
         if self.has_closed_form:
             return True
         J = self._derivatives(self.q[:1], self.T[:1])[0]
-        return bool(np.linalg.matrix_rank(J, 1e-5) == self.description.n)
+        return int(np.linalg.matrix_rank(J, 1e-5)) == self.description.n
 
     def _found(self) -> Array:
         """Return solutions found by Newton's method from random starts, shape (S, STARTS, n); NaN where none is."""

@@ -16,21 +16,10 @@ from dhkit.symbolic import ExactArm, Lagrangian, lagrangian
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
 
-__all__ = ["DYNAMICS", "Truth", "exact_number", "kinematic_quantity", "shape_of", "substituted", "truth_of"]
+__all__ = ["DYNAMICS", "Truth", "exact_number", "kinematic_quantity", "substituted", "truth_of"]
 
 DYNAMICS = ("M", "C", "h", "g", "tau", "K", "V", "L")
 """Quantities of the equations of motion, in the order in which they are derived from one another."""
-
-
-def shape_of(quantity: str, n: int) -> tuple[int, ...]:
-    """Return the shape of a quantity for an arm of n joints."""
-    if quantity in ("M", "C"):
-        return (n, n)
-    if quantity in ("h", "g", "tau"):
-        return (n,)
-    if quantity in ("K", "V", "L"):
-        return ()
-    return (6, n) if quantity == "J" else (4, 4)
 
 
 @dataclass(frozen=True, eq=False)

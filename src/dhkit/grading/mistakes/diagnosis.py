@@ -288,5 +288,6 @@ def _fits(keys: Mapping[Index, Key], wanted: Mapping[Index, Key]) -> bool:
 
 
 def _apart(a: MadeAt, b: MadeAt) -> bool:
-    """Whether two mistakes are at different links, so that their changes add up."""
-    return a.link is not None and b.link is not None and a.link != b.link
+    """Whether two mistakes are at different links or bodies, so that their changes add up."""
+    bodies = a.body is not None and b.body is not None and a.body != b.body
+    return a.link is not None and b.link is not None and (a.link != b.link or bodies)

@@ -1,22 +1,20 @@
-"""Mistakes that change a link's energies, or a rotor's, and through them all equations."""
+"""Mistakes that change the energies of a link, of one of its bodies, or of a rotor, and through them all equations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from itertools import combinations
-
-import numpy as np
 
 from dhkit.description import Convention, Description
 from dhkit.errors import DhkitError
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.variants import Change, Variant
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
-from dhkit.symbolic.ring import Element, Elements, translated
-from dhkit.symbolic.textbook import LinkMotion, TextbookDerivation, derive
+from dhkit.symbolic.ring import Element, Elements, element_array, translated
+from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 
 __all__ = ["energy_variants"]
 
@@ -33,10 +31,48 @@ SHAPES = {
 EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 
 
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A body of a link, and what mistakes at it are called.
+
+    Attributes
+    ----------
+    link
+        From 1.
+    name
+        The body's; None where its link has no other body.
+    motion
+        What the derivation finds of it.
+    """
+
+    link: int
+    name: str | None
+    motion: BodyMotion
+
+    @property
+    def place(self) -> str:
+        """Where it is, in words."""
+        return f"link {self.link}" if self.name is None else f"link {self.link}, {self.name}"
+
+    def made(self, identity: str) -> MadeAt:
+        """Return a mistake at this body alone."""
+        return MadeAt(identity, self.link, self.name)
+
+
+def _parts(textbook: TextbookDerivation) -> list[_Part]:
+    """Return the bodies of all links."""
+    return [
+        _Part(i, motion.body.name if len(link.bodies) > 1 else None, motion)
+        for i, link in enumerate(textbook.links, start=1)
+        for motion in link.bodies
+    ]
+
+
 def energy_variants(truth: Truth) -> Iterator[Variant]:
     """Yield the mistakes that change energies: those made throughout before those made at one link."""
     textbook = derive(truth.description)
     yield from _textbook(textbook)
+    yield from _payloads(textbook)
     yield from _shapes(textbook)
     yield from _drives(textbook)
     yield from _slides(textbook)
@@ -52,6 +88,10 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
     for name in names:
         for i in range(1, n + 1) if n > 1 else ():
             yield Variant(MadeAt(name, i), _derived(textbook, MadeAt(name, i)), f"link {i}")
+    several = [part for part in _parts(textbook) if part.name is not None]
+    for name in names:
+        for part in several if name in LINK_MISTAKES else ():
+            yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1)
 
 
 def _derived(textbook: TextbookDerivation, made: MadeAt) -> Callable[[str], Elements]:
@@ -74,53 +114,74 @@ def _lazily(change: Callable[[], Change]) -> Callable[[str], Elements]:
     return make
 
 
+# Several bodies on a link
+
+
+def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
+    """Yield a link's second and further bodies left out, and placed where its first one is."""
+    arm = textbook.arm
+    for part in _parts(textbook):
+        if part.name is None or part.motion.body is arm.bodies[part.link - 1][0]:
+            continue
+        left_out = Change(-part.motion.K, -part.motion.V)
+        yield Variant(part.made("payload_forgotten"), left_out.of, part.place)
+        moved = partial(_of_description, textbook, _with_com_of_first(arm.description, part))
+        yield Variant(part.made("payload_at_com"), _lazily(moved), part.place)
+
+
+def _with_com_of_first(description: Description, part: _Part) -> Description:
+    """Return an arm with a body where its link's first one is."""
+    joints = list(description.joints)
+    own = joints[part.link - 1]
+    bodies = (replace(body, com=own.bodies[0].com) if body.name == part.name else body for body in own.bodies)
+    joints[part.link - 1] = replace(own, bodies=tuple(bodies))
+    return replace(description, joints=tuple(joints))
+
+
 # Shapes of bodies
 
 
 def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield the inertia of another body, or of another point, at all links alike or at one."""
-    n = textbook.arm.n
-    rods = [i for i in range(n) if _is_rod(textbook, i)]
+    """Yield the inertia of another body, or of another point, at all bodies alike or at one."""
+    parts = _parts(textbook)
+    rods = [part for part in parts if _is_rod(part)]
     for identity, factors in SHAPES.items():
         for factor in factors:
             yield from _scaled_inertia(textbook, identity, Fraction(factor), rods)
-    yield from _scaled_inertia(textbook, "inertia_halved", HALF, range(n))
-    for i in range(n):
+    yield from _scaled_inertia(textbook, "inertia_halved", HALF, parts)
+    for part in parts:
         for a, b in EXCHANGED_AXES:
-            place = f"link {i + 1}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
-            change = partial(_exchanged_moments, textbook, i, a, b)
-            yield Variant(MadeAt("inertia_moments_exchanged", i + 1), _lazily(change), place, 1)
+            place = f"{part.place}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
+            change = partial(_exchanged_moments, textbook, part, a, b)
+            yield Variant(part.made("inertia_moments_exchanged"), _lazily(change), place, 1)
 
 
 def _scaled_inertia(
-    textbook: TextbookDerivation, identity: str, factor: Fraction, links: Iterable[int]
+    textbook: TextbookDerivation, identity: str, factor: Fraction, parts: Sequence[_Part]
 ) -> Iterator[Variant]:
-    listed = list(links)
-    if len(listed) > 1:
-        yield Variant(MadeAt(identity), _lazily(partial(_more_inertia, textbook, listed, factor - 1)), rarity=1)
-    for i in listed:
-        place = f"link {i + 1}" if textbook.arm.n > 1 else ""
-        yield Variant(MadeAt(identity, i + 1), _lazily(partial(_more_inertia, textbook, [i], factor - 1)), place, 1)
+    if len(parts) > 1:
+        yield Variant(MadeAt(identity), _lazily(partial(_more_inertia, textbook, parts, factor - 1)), rarity=1)
+    for part in parts:
+        place = part.place if textbook.arm.n > 1 or part.name is not None else ""
+        yield Variant(part.made(identity), _lazily(partial(_more_inertia, textbook, [part], factor - 1)), place, 1)
 
 
-def _is_rod(textbook: TextbookDerivation, i: int) -> bool:
-    """Whether a link's inertia is m l^2/12 of a rod whose centre of mass is half its length from the frame."""
-    body = textbook.arm.bodies[i]
+def _is_rod(part: _Part) -> bool:
+    """Whether an inertia is m l^2/12 of a rod whose centre of mass is half its length from the link's frame."""
+    body = part.motion.body
     square = body.com @ body.com
     moment = body.mass * square * 4
     return bool(square) and any((body.inertia[k, k] * 12 - moment).is_zero for k in range(3))
 
 
-def _more_inertia(textbook: TextbookDerivation, links: Iterable[int], share: Fraction) -> Change:
-    ring = textbook.arm.ring
-    energies = [
-        textbook.links[i].omega @ textbook.arm.bodies[i].inertia @ textbook.links[i].omega * HALF * share for i in links
-    ]
+def _more_inertia(textbook: TextbookDerivation, parts: Iterable[_Part], share: Fraction) -> Change:
+    ring, motions = textbook.arm.ring, [part.motion for part in parts]
+    energies = [motion.omega @ motion.body.inertia @ motion.omega * HALF * share for motion in motions]
     return Change(ring.sum(energies), ring.zero)
 
 
-def _exchanged_moments(textbook: TextbookDerivation, i: int, a: int, b: int) -> Change:
-    tensor, omega = textbook.arm.bodies[i].inertia, textbook.links[i].omega
+def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int) -> Change:
+    tensor, omega = part.motion.body.inertia, part.motion.omega
     order = list(range(3))
     order[a], order[b] = b, a
     moments = tensor.diagonal()
@@ -182,18 +243,24 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
             continue
         for i in range(k, ring.n):
             place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
-            change = partial(_without_slide, textbook, textbook.links[i], i, k)
+            change = partial(_without_slide, textbook, textbook.links[i].bodies, k)
             yield Variant(MadeAt("slide_forgotten", i + 1), _lazily(change), place, 1)
+        for part in _parts(textbook):
+            if part.name is not None and part.link > k:
+                change = partial(_without_slide, textbook, [part.motion], k)
+                yield Variant(part.made("slide_forgotten"), _lazily(change), f"{part.place}, q{k + 1}", 1)
 
 
-def _without_slide(textbook: TextbookDerivation, link: LinkMotion, i: int, k: int) -> Change:
-    """Take a slide for fixed at zero where a link's centre of mass is placed; it may still turn with its joints."""
+def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
+    """Take a slide for fixed at zero where centres of mass are placed; they may still turn with their joints."""
     arm, ring = textbook.arm, textbook.arm.ring
-    place = np.array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in link.com], dtype=object)
-    velocity = np.array([x.by_time() for x in place], dtype=object)
-    mass = arm.bodies[i].mass
-    K = mass * (velocity @ velocity - link.velocity @ link.velocity) * HALF
-    V = -mass * (arm.gravity @ (place - link.com))
+    K, V = ring.zero, ring.zero
+    for motion in motions:
+        place = element_array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in motion.com])
+        velocity = element_array([x.by_time() for x in place])
+        mass = motion.body.mass
+        K = K + mass * (velocity @ velocity - motion.velocity @ motion.velocity) * HALF
+        V = V - mass * (arm.gravity @ (place - motion.com))
     return Change(K, V)
 
 

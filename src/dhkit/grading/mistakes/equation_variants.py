@@ -118,7 +118,7 @@ def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
     arm, link = textbook.arm, textbook.links[i]
     ring = arm.ring
     joint = textbook.links[i - 1].origin if arm.is_standard else link.origin
-    height = -arm.bodies[i].mass * (arm.gravity @ (link.com - joint))
+    height = -ring.sum(body.body.mass * (arm.gravity @ (body.com - joint)) for body in link.bodies)
     torques = element_array([height.by_position(j) for j in range(ring.n)])
     still: dict[int, Element] = {}
     for j in range(i):

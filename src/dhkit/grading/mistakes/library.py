@@ -93,13 +93,16 @@ INVERSE = catalogue(
         "Look again at this branch: which sign belongs to it?",
         elbow_sign="a root or an arc cosine has the wrong sign: it belongs to another branch",
         joint_sign="the joint value has the wrong sign",
-        duplicate_branch="this branch gives the same solutions as another",
+        duplicate_branch="the branch gives the same solutions as another",
     ),
     _of(
         Subject.INVERSE,
         "Look again at where this angle or length is counted from.",
         missing_offset="the joint value is off by a constant: an offset of the table is missing",
         supplement="the angle inside the triangle is given in place of the joint's, which is 180 degrees less it",
+        earlier_joints_forgotten="the angles of the joints before are not subtracted: the sum of the angles is given",
+        offset_forgotten="a constant length of base or table is not taken off a component of the position",
+        tool_length_forgotten="the tool's length is not taken off the position: the triangle ends at the wrist",
     ),
     _of(
         Subject.INVERSE,
@@ -107,6 +110,20 @@ INVERSE = catalogue(
         cosine_law_factor="the law of cosines lacks its factor 2: c^2 = a^2 + b^2 - 2 a b cos(C)",
         cosine_law_sign="a square in the law of cosines has the wrong sign",
         cosine_law_squares="lengths in the law of cosines are not squared",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at squares and roots: which length, and which function of the angle, does the formula give?",
+        root_forgotten="a root is missing: the square of a length stands where the length belongs",
+        square_forgotten="a square is missing: a length or a cosine stands where its square belongs",
+        square_too_much="the square of a length stands where the length belongs",
+        arc_function_forgotten="the sine, cosine or tangent of the angle is given in place of the angle",
+    ),
+    _of(
+        Subject.INVERSE,
+        "Look again at which component of the pose and which length stand where.",
+        axis_exchanged="another component of the pose stands where this one belongs",
+        lengths_exchanged="two lengths are exchanged",
     ),
     _of(
         Subject.INVERSE,
@@ -127,6 +144,12 @@ EQUATION = catalogue(
         inertia_quarter_for_rod="the inertia is m l^2/4 in place of a rod's m l^2/12",
         rod_with_half_length="the inertia is that of a rod of half the length, m l^2/48, in place of m l^2/12",
         inertia_moments_exchanged="two principal moments of the inertia are exchanged",
+    ),
+    _of(
+        Subject.EQUATION,
+        "Look again at the bodies that a link is made of: is each there, and where is its centre of mass?",
+        payload_forgotten="the payload is missing",
+        payload_at_com="the payload is placed at the link's centre of mass",
     ),
     _of(
         Subject.ENERGY,

@@ -92,15 +92,14 @@ def _kinds(description: Description) -> dict[str, str]:
                 found.setdefault(name, kind)
 
     for joint in description.joints:
-        if joint.body is not None:
-            note("mass", joint.body.mass)
+        note("mass", *(body.mass for body in joint.bodies))
         if joint.drive is not None:
             note("gear", joint.drive.gear)
             note("rotor", joint.drive.rotor_inertia)
             note("friction", joint.drive.viscous)
         note("length", joint.a, joint.d)
     note("length", *description.tool.placement.xyz)
-    bodies = [joint.body for joint in description.joints if joint.body is not None]
+    bodies = [body for joint in description.joints for body in joint.bodies]
     for body in bodies:
         note("length", *body.com)
     for body in bodies:

@@ -8,14 +8,15 @@ from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.html import badge, page, sections, text
 from dhkit.grading.reports.plain import points
-from dhkit.grading.reports.sentences import mistakes_of
+from dhkit.grading.reports.sentences import mistakes_of, own_robots
 
 __all__ = ["html_class"]
 
 
 def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: str = "Class") -> str:
     """Return a class's page; the sheets in the order given."""
-    parts = [*_mistakes(reports), "<h2>Marks</h2>", _table(reports, marks)]
+    warnings = [f'<p class="error">{text(line)}</p>' for line in own_robots(reports)]
+    parts = [*warnings, *_mistakes(reports), "<h2>Marks</h2>", _table(reports, marks)]
     for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
         parts.append(f'<section id="sheet-{number}">\n<h2>{_name(report, number)}</h2>')
         parts += [*sections(report, sheet), "</section>"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict, Witness
@@ -14,6 +14,7 @@ __all__ = [
     "fault_of",
     "found",
     "mistakes_of",
+    "own_robots",
     "provenance",
     "reading",
     "remarks",
@@ -88,6 +89,13 @@ def provenance(report: GradeReport) -> str:
     """Return which dhkit judged by which robot, and the seed of its random states."""
     seed = "" if report.seed is None else f", seed {report.seed}"
     return f"dhkit {plain(report.version, 40)}, {plain(report.robot, 80)}, digest {plain(report.digest, 80)}{seed}"
+
+
+def own_robots(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield a warning where sheets named the robots that they were judged by: a student may choose an easier one."""
+    own = sorted({plain(report.robot, 40) for report in reports if report.own_robot and report.robot})
+    if own:
+        yield f"each sheet named its own robot ({', '.join(own)}): give the task's by --robot or --task"
 
 
 def mistakes_of(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:

@@ -16,6 +16,7 @@ from dhkit.grading.reports.sentences import (
     fault_of,
     found,
     mistakes_of,
+    own_robots,
     provenance,
     reading,
     remarks,
@@ -96,16 +97,8 @@ def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> Re
             Text(f"{points(mark.points)} of {points(mark.most)}"),
             Text(fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
-    lines = [Text(line, style="yellow") for line in _robots(reports)]
+    lines = [Text(line, style="yellow") for line in own_robots(reports)]
     return Group(*lines, table, *_bars(mistakes_of(reports), len(reports)))
-
-
-def _robots(reports: Sequence[GradeReport]) -> Iterator[str]:
-    """Yield a warning where the sheets named their own robots: a student may choose an easier one."""
-    digests = {report.digest: report.robot for report in reports if report.digest}
-    if any(report.own_robot for report in reports):
-        listed = ", ".join(sorted({plain(name, 40) for name in digests.values()}))
-        yield f"each sheet named its own robot ({listed}): give the task's by --robot or --task"
 
 
 def _bars(mistakes: Sequence[tuple[str, int]], sheets: int) -> Iterator[RenderableType]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 
@@ -210,7 +211,7 @@ def _kept(arm: ExactArm) -> list[Constant]:
     for row in arm.rows:
         geometry += [row.a, row.d, *row.alpha, *row.theta]
     inertial = [*arm.gear, *arm.rotor]
-    for body in arm.bodies:
+    for body in chain.from_iterable(arm.bodies):
         inertial += [body.mass, *body.moment, *body.second.flat]
     names = _constants(inertial) - _constants(geometry)
     return [constant for constant in arm.ring.given if constant.text not in names and not constant.symbols & names]

@@ -7,8 +7,10 @@ parameters from the first line on, so that expressions stay as short as they can
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -115,7 +117,10 @@ def joint_steps(arm: ExactArm) -> list[Step]:
 
 def joint_bodies(arm: ExactArm) -> list[RigidBody]:
     """Return each link in its joint's frame."""
-    masses = [RigidBody(body.mass, body.moment, body.second) for body in arm.bodies]
+    masses = [
+        reduce(operator.add, (RigidBody(body.mass, body.moment, body.second) for body in bodies))
+        for bodies in arm.bodies
+    ]
     if not arm.is_standard:
         return masses
     return [body.moved(_behind(arm.ring, row)) for body, row in zip(masses, arm.rows, strict=True)]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import INERTIA_PLACES, Array, Convention, Description, joint_array, require_bodies
 from dhkit.expressions import ZERO, Expression, exact_angle
-from dhkit.symbolic.exact.naming import LinkNumbers, Naming, Symbols
+from dhkit.symbolic.exact.naming import BodyNumbers, LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.reading import Direction
@@ -31,8 +31,10 @@ class ExactRow:
 
 @dataclass(frozen=True, eq=False)
 class ExactBody:
-    """A link's inertia in the axes of its DH frame."""
+    """A body of a link in the axes of the link's DH frame."""
 
+    name: str
+    """As in the description; empty where it is its link's only one, and may be then."""
     mass: Element
     com: Elements
     """Shape (3,)."""
@@ -54,8 +56,10 @@ class ExactArm:
         What it was made from.
     ring
         Where its elements are.
-    rows, bodies
+    rows
         One a joint.
+    bodies
+        Those of each link; one that stands for all where every inertial parameter is a symbol.
     gear, rotor, viscous
         Gear ratio, rotor inertia and motor-side viscous friction of each joint's drive; 1, 0 and 0 without one.
     base
@@ -80,7 +84,7 @@ class ExactArm:
     symbols: Symbols
     ring: Ring
     rows: tuple[ExactRow, ...]
-    bodies: tuple[ExactBody, ...]
+    bodies: tuple[tuple[ExactBody, ...], ...]
     gear: tuple[Element, ...]
     rotor: tuple[Element, ...]
     viscous: tuple[Element, ...]
@@ -177,7 +181,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         raise ValueError(f"symbols is {symbols!r}; expected 'none', 'file' or 'inertial'")
     bodies = require_bodies(description)
     naming = Naming(description, symbols)
-    links = [naming.link(i, body) for i, body in enumerate(bodies)]
+    links = [naming.link(i, own) for i, own in enumerate(bodies)]
     gravity = naming.gravity()
     placement = description.base.placement
     xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
@@ -187,14 +191,10 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     expressions = [*gravity, *xyz, *tool, *viscous, *needed]
     angles = [*rpy]
     for link in links:
-        expressions += [
-            *link.row[:2],
-            link.mass,
-            *link.com,
-            *(link.inertia or link.second or ()),
-            link.gear,
-            link.rotor,
-        ]
+        expressions += link.row[:2]
+        for body in link.bodies:
+            expressions += [body.mass, *body.com, *(body.inertia or body.second or ())]
+        expressions += [link.gear, link.rotor]
         angles += link.row[2:]
     constants = Constants.of(expressions, angles)
     ring = Ring(description.kinds, list(constants.found.values()))
@@ -204,7 +204,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         symbols,
         ring,
         tuple(_row(ring, i, link) for i, link in enumerate(links)),
-        tuple(_body(ring, link) for link in links),
+        tuple(tuple(_body(ring, body) for body in link.bodies) for link in links),
         tuple(ring.read(link.gear) for link in links),
         tuple(ring.read(link.rotor) for link in links),
         tuple(ring.read(x) for x in viscous),
@@ -237,15 +237,15 @@ def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
     return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
 
 
-def _body(ring: Ring, link: LinkNumbers) -> ExactBody:
-    mass = ring.read(link.mass)
-    com = np.array([ring.read(x) for x in link.com], dtype=object)
+def _body(ring: Ring, body: BodyNumbers) -> ExactBody:
+    mass = ring.read(body.mass)
+    com = np.array([ring.read(x) for x in body.com], dtype=object)
     moment = np.array([mass * x for x in com], dtype=object)
     steiner = point_inertia(com, moment)
-    tensor = _symmetric([ring.read(x) for x in (link.inertia or link.second or ())])
-    if link.second is None:
-        return ExactBody(mass, com, tensor, moment, tensor + steiner)
-    return ExactBody(mass, com, tensor - steiner, moment, tensor)
+    tensor = _symmetric([ring.read(x) for x in (body.inertia or body.second or ())])
+    if body.second is None:
+        return ExactBody(body.name, mass, com, tensor, moment, tensor + steiner)
+    return ExactBody(body.name, mass, com, tensor - steiner, moment, tensor)
 
 
 def point_inertia(lever: Elements, moment: Elements) -> Elements:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -10,7 +10,7 @@ from dhkit.description import INERTIA_PLACES, Body, Description, Drive
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, exact_angle, substitute
 
-__all__ = ["LinkNumbers", "Naming", "Symbols"]
+__all__ = ["BodyNumbers", "LinkNumbers", "Naming", "Symbols"]
 
 Symbols: TypeAlias = Literal["none", "file", "inertial"]
 """Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
@@ -19,16 +19,25 @@ ONE = exact(1)
 
 
 @dataclass(frozen=True)
-class LinkNumbers:
-    """What is read of a link, as expressions."""
+class BodyNumbers:
+    """What is read of a body, as expressions."""
 
-    row: tuple[Expression, Expression, Expression, Expression]
-    """a, d, alpha, theta."""
+    name: str
     mass: Expression
     com: tuple[Expression, ...]
     inertia: tuple[Expression, ...] | None
     """In the order of ``INERTIA_PLACES``, about the centre of mass; None where ``second`` is given."""
     second: tuple[Expression, ...] | None
+
+
+@dataclass(frozen=True)
+class LinkNumbers:
+    """What is read of a link, as expressions."""
+
+    row: tuple[Expression, Expression, Expression, Expression]
+    """a, d, alpha, theta."""
+    bodies: tuple[BodyNumbers, ...]
+    """One that stands for all where every inertial parameter is a symbol."""
     gear: Expression
     rotor: Expression
 
@@ -84,7 +93,7 @@ class Naming:
             return [x if x.is_zero else g if float(x) > 0 else -g for x in vector]
         return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
 
-    def link(self, i: int, body: Body) -> LinkNumbers:
+    def link(self, i: int, bodies: Sequence[Body]) -> LinkNumbers:
         """Return what link i, from 0, is read from."""
         joint, number = self.description.joints[i], i + 1
         row = (
@@ -96,9 +105,7 @@ class Naming:
         drive = joint.drive or Drive()
         gear, rotor = self.known(drive.gear), self.known(drive.rotor_inertia)
         if self.symbols != "inertial":
-            inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_PLACES)
-            com = tuple(self.known(x) for x in body.com)
-            return LinkNumbers(row, self.known(body.mass), com, inertia, None, gear, rotor)
+            return LinkNumbers(row, tuple(self._body(body) for body in bodies), gear, rotor)
         m, x, y, z, *second = map(exact, self.description.numbers.inertial_parameters[i].tolist())
         mass = self.inertial_symbol(f"m{number}", m)
         moments = [self.inertial_symbol(f"r{axis}{number}", r) for axis, r in zip("xyz", (x, y, z), strict=True)]
@@ -108,7 +115,12 @@ class Naming:
         if not rotor.is_zero:
             gear = gear if gear == ONE else self.symbol(f"G{number}", substitute(drive.gear, self.values))
             rotor = self.inertial_symbol(f"Jm{number}", substitute(drive.rotor_inertia, self.values))
-        return LinkNumbers(row, mass, tuple(r / mass for r in moments), None, tensor, gear, rotor)
+        whole = BodyNumbers("", mass, tuple(r / mass for r in moments), None, tensor)
+        return LinkNumbers(row, (whole,), gear, rotor)
+
+    def _body(self, body: Body) -> BodyNumbers:
+        inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_PLACES)
+        return BodyNumbers(body.name, self.known(body.mass), tuple(self.known(x) for x in body.com), inertia, None)
 
 
 def _through(parameters: Mapping[str, Expression], name: str) -> Expression:

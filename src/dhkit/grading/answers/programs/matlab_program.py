@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import (
+from dhkit.grading.answers.programs.bindings import (
     STRUCTURE,
     Formula,
     FunctionNamed,
@@ -19,8 +19,8 @@ from dhkit.grading.answers.bindings import (
     Symbol,
     Value,
 )
-from dhkit.grading.answers.matlab_formulas import FUNCTIONS, MatlabFormulas, closing, split_rows
-from dhkit.grading.answers.matlab_statements import MatlabToken, Statement, statements
+from dhkit.grading.answers.programs.matlab_formulas import FUNCTIONS, MatlabFormulas, closing, split_rows
+from dhkit.grading.answers.programs.matlab_statements import MatlabToken, Statement, statements
 
 __all__ = ["matlab_program"]
 

@@ -9,12 +9,8 @@ from typing import Any
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.latex import latex_tokens
-from dhkit.grading.answers.latex_rows import ROWS
-from dhkit.grading.answers.quantity_names import QuantityNames, Target
-from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refusal, quantity_names
-from dhkit.grading.answers.standing import NameTable
-from dhkit.grading.answers.statements import (
+from dhkit.grading.answers.documents.latex_rows import ROWS
+from dhkit.grading.answers.documents.statements import (
     STARTS,
     STARTS_WITH_RELATION,
     Statement,
@@ -22,6 +18,10 @@ from dhkit.grading.answers.statements import (
     latex_statements,
     left_hand_name,
 )
+from dhkit.grading.answers.latex import latex_tokens
+from dhkit.grading.answers.programs.standing import NameTable
+from dhkit.grading.answers.quantity_names import QuantityNames, Target
+from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refusal, quantity_names
 from dhkit.grading.answers.tokens import folded
 from dhkit.grading.answers.vocabulary import plain_name
 

@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dhkit.grading.answers.bindings import Formula, Read, Use
-from dhkit.grading.answers.matlab_statements import MatlabToken
-from dhkit.grading.answers.python_formulas import joined
+from dhkit.grading.answers.programs.bindings import Formula, Read, Use
+from dhkit.grading.answers.programs.matlab_statements import MatlabToken
+from dhkit.grading.answers.programs.python_formulas import joined
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
 __all__ = ["MatlabFormulas", "closing", "split_rows"]

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import (
+from dhkit.grading.answers.programs.bindings import (
     Formula,
     FunctionNamed,
     ModuleNamed,
@@ -21,8 +21,8 @@ from dhkit.grading.answers.bindings import (
     Use,
     Value,
 )
-from dhkit.grading.answers.python_effects import Effects, bound_names
-from dhkit.grading.answers.python_formulas import VECTORS, PythonFormulas, constant_index, spelled
+from dhkit.grading.answers.programs.python_effects import Effects, bound_names
+from dhkit.grading.answers.programs.python_formulas import VECTORS, PythonFormulas, constant_index, spelled
 from dhkit.grading.answers.tokens import dotted
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 

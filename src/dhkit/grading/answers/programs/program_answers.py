@@ -9,11 +9,11 @@ from typing import Any
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import Binding, Formula, NotUnderstood, Program, Scope, Use
-from dhkit.grading.answers.definitions import Definitions, Node
+from dhkit.grading.answers.programs.bindings import Binding, Formula, NotUnderstood, Program, Scope, Use
+from dhkit.grading.answers.programs.definitions import Definitions, Node
+from dhkit.grading.answers.programs.standing import NameTable, Standing
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refusal, quantity_names
-from dhkit.grading.answers.standing import NameTable, Standing
 
 __all__ = ["answers_of"]
 

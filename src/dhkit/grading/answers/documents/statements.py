@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from dhkit.grading.answers.documents.latex_rows import Row, rows_of
 from dhkit.grading.answers.latex import is_latex
-from dhkit.grading.answers.latex_rows import Row, rows_of
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import (
+from dhkit.grading.answers.programs.bindings import (
     STRUCTURE,
     Binding,
     Formula,
@@ -18,9 +18,9 @@ from dhkit.grading.answers.bindings import (
     Symbol,
     Use,
 )
+from dhkit.grading.answers.programs.standing import TOLERANCE, NameTable, Standing
 from dhkit.grading.answers.rewriting import DERIVATIVES, MODULES
 from dhkit.grading.answers.sheet import Refusal
-from dhkit.grading.answers.standing import TOLERANCE, NameTable, Standing
 from dhkit.grading.answers.tokens import MAX_LENGTH
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from dhkit.grading.answers.python_formulas import MATRIX_CALLS
+from dhkit.grading.answers.programs.python_formulas import MATRIX_CALLS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
 __all__ = ["Effects", "Found", "bound_names", "part_names"]

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from dhkit.description import Description
-from dhkit.grading.answers.bindings import (
+from dhkit.grading.answers.programs.bindings import (
     Binding,
     Formula,
     FunctionNamed,

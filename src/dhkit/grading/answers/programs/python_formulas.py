@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import accumulate
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.bindings import Formula, Read, Use
+from dhkit.grading.answers.programs.bindings import Formula, Read, Use
 from dhkit.grading.answers.rewriting import MODULES
 from dhkit.grading.answers.tokens import folded
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
