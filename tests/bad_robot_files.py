@@ -72,7 +72,10 @@ BAD = {
     ),
     "bodies as a table": (GOOD + "bodies = { mass = 1 }", "bodies: found .*expected list"),
     "a body that is a number": (GOOD + "bodies = [1]", r"bodies\[0\]: found 1; expected a table"),
-    "a body name that is a number": (GOOD + "bodies = [{ name = 1, mass = 1 }]", r"bodies\[0\].name: found 1; expected"),
+    "a body name that is a number": (
+        GOOD + "bodies = [{ name = 1, mass = 1 }]",
+        r"bodies\[0\].name: found 1; expected",
+    ),
     "a body name with a slash": (GOOD + 'bodies = [{ name = "a/b", mass = 1 }]', "body 1 has the name 'a/b'"),
     "a body name on two lines": (GOOD + 'body = { name = "a\\nb", mass = 1 }', r"body 1 has the name 'a\\nb'"),
     "one of the bodies without mass": (GOOD + "bodies = [{ mass = 1 }, { }]", r"bodies\[1\]: key 'mass' is missing"),

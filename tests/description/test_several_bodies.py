@@ -1,13 +1,16 @@
 """Links of several bodies: read and written, joined to one where one is needed, kept apart where they stay apart."""
 
+import re
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bad_robot_files import GOOD
 from dhkit import Arm
 from dhkit.description import (
     Body,
@@ -95,7 +98,7 @@ def test_several_bodies_are_one_by_the_parallel_axis_theorem(count, seed):
     com = m @ c / m.sum()
     levers = c - com
     expected = sum(
-        I + w * (r @ r * np.eye(3) - np.outer(r, r)) for I, w, r in zip(tensors, m, levers, strict=True)
+        tensor + w * (r @ r * np.eye(3) - np.outer(r, r)) for tensor, w, r in zip(tensors, m, levers, strict=True)
     )
     assert np.abs(arm.numbers.mass - m.sum()).max() < ROUNDED
     assert np.abs(arm.numbers.com[0] - com).max() < ROUNDED
@@ -148,3 +151,11 @@ def test_what_is_no_set_of_bodies_is_refused():
     many = replace(arm.joints[0], bodies=arm.joints[0].bodies * 17)
     with pytest.raises(DescriptionError, match=r"joint 1 \(joint1\): 17 bodies; expected at most 16"):
         replace(arm, joints=(many, arm.joints[1]))
+
+
+def test_the_bodies_of_the_documentation_are_some():
+    page = Path(__file__).resolve().parents[2] / "docs" / "robot-file.md"
+    (snippet,) = re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    arm = from_toml(f"{GOOD}{snippet}[parameters]\nm1 = 2\nl1 = 0.5\nmp = 1\n")
+    assert [body.name for body in arm.joints[0].bodies] == ["rod", "payload"]
+    assert arm.numbers.com[0, 0] == pytest.approx(-1 / 6)

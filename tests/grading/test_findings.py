@@ -1,7 +1,9 @@
 """Ways to a wrong verdict that were found from outside, each with relatives: none of them leads there any more."""
 
+import io
 import os
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -75,6 +77,42 @@ def test_an_entry_given_twice_or_beside_its_quantity_is_refused():
     for answers in ({"M": [[M11, M12], [M12, M22]], "M11": M11}, {"g": G, "g1": G[0]}):
         with pytest.raises(Exception, match="given whole and entry by entry"):
             ARM.grade(answers)
+
+
+def forms(report):
+    """Return a report in every form."""
+    from rich.console import Console
+
+    from dhkit.grading.marks import marks
+    from dhkit.grading.reports import gradescope, html_class, html_report, junit, marks_csv, terminal_report
+    from dhkit.grading.rubric import Rubric
+
+    sheet = marks(report, Rubric())
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(terminal_report(report, sheet))
+    return {
+        "terminal": console.export_text(),
+        "html": html_report(report, sheet),
+        "class": html_class([report], [sheet]),
+        "junit": junit([report], [sheet]),
+        "csv": marks_csv([report], [sheet]),
+        "gradescope": gradescope(report, sheet)["output"],
+        "json": report.to_json(),
+        "text": str(report),
+    }
+
+
+def test_what_is_missing_and_left_out_stands_in_every_form(tmp_path):
+    (tmp_path / "a.py").write_text(
+        f"g1 = {G[0].replace('^', '**')}\nM = undefined(g1)\nzz = 3\n".replace("c12", "cos(q1+q2)")
+    )
+    report = grade(tmp_path / "a.py", library_robot("planar2r"))
+    assert "g2" in report.missing
+    for name, form in forms(report).items():
+        assert "g2" in form or name == "json", name
+        assert "incomplete" in form or "unreadable" in form, name
+    report = replace(report, left_out=("line 2: M = undefined(g1)",))
+    assert all("undefined(g1)" in form for name, form in forms(report).items() if name != "text")
 
 
 # 3. Derivatives
@@ -308,23 +346,13 @@ def test_friction_stays_a_symbol(tmp_path, first, second, mistake):
 
 @pytest.mark.parametrize("g", [["29.43*c1", "4.905*0"], ["(m1/2 + m2)*9.81*c1", "0"]])
 def test_numbers_for_parameters_stand_in_every_form(g, tmp_path):
-    from dhkit.grading.marks import marks
-    from dhkit.grading.reports import gradescope, html_report, junit, marks_csv
-    from dhkit.grading.rubric import Rubric
-
     report = ARM.grade(g=[f"({G[0]})".replace("g*", "9.81*"), G[1].replace("g*", "9.81*")])
     assert report and report.judged_at == {"g": 9.81}
-    sheet = marks(report, Rubric())
-    forms = [
-        str(report),
-        html_report(report, sheet),
-        junit([report], [sheet]),
-        marks_csv([report], [sheet]),
-        gradescope(report, sheet)["output"],
-        report.to_json(),
-    ]
-    assert all("9.81" in form for form in forms)
-    assert all("judged at g = 9.81" in form for form in (forms[0], forms[1], forms[2], forms[4]))
+    written = forms(report)
+    assert all("9.81" in form for form in written.values())
+    assert all(
+        "judged at g = 9.81" in written[name] for name in ("terminal", "html", "class", "junit", "gradescope", "text")
+    )
 
 
 # 10. Statements say what was shown
@@ -492,6 +520,10 @@ def test_matrices_of_other_programs(matrix):
     assert verdict(M=matrix) is Verdict.CORRECT
 
 
+V_LATEX = (r"m_1 g \frac{l_1}{2} s_1", r"+ m_2 g (l_1 s_1 + \frac{l_2}{2} s_{12})")
+G_LATEX = ("(m_1/2 + m_2) g l_1 c_1 + m_2 g l_2 c_{12}/2", "m_2 g l_2 c_{12}/2")
+
+
 @pytest.mark.parametrize(
     ("answers", "expected"),
     [
@@ -499,30 +531,58 @@ def test_matrices_of_other_programs(matrix):
         ({"g": ["g_2 = " + G[0], "g_1 = " + G[1]]}, Verdict.UNREADABLE),
         ({"V": rf"V = 3 = {V}"}, Verdict.CORRECT),
         ({"V": rf"V = {V} = 3"}, Verdict.WRONG),
-        (
-            {
-                "V": r"\begin{aligned} V &= m_1 g \frac{l_1}{2} s_1 \\ &\quad + m_2 g (l_1 s_1 + \frac{l_2}{2} s_{12}) \end{aligned}"
-            },
-            Verdict.CORRECT,
-        ),
-        (
-            {
-                "g": r"\begin{cases} g_1 = (m_1/2 + m_2) g l_1 c_1 + m_2 g l_2 c_{12}/2 \\ g_2 = m_2 g l_2 c_{12}/2 \end{cases}"
-            },
-            Verdict.CORRECT,
-        ),
-        (
-            {
-                "g": r"\begin{cases} g_2 = (m_1/2 + m_2) g l_1 c_1 + m_2 g l_2 c_{12}/2 \\ g_1 = m_2 g l_2 c_{12}/2 \end{cases}"
-            },
-            Verdict.WRONG,
-        ),
+        ({"V": rf"\begin{{aligned}} V &= {V_LATEX[0]} \\ &\quad {V_LATEX[1]} \end{{aligned}}"}, Verdict.CORRECT),
+        ({"g": rf"\begin{{cases}} g_1 = {G_LATEX[0]} \\ g_2 = {G_LATEX[1]} \end{{cases}}"}, Verdict.CORRECT),
+        ({"g": rf"\begin{{cases}} g_2 = {G_LATEX[0]} \\ g_1 = {G_LATEX[1]} \end{{cases}}"}, Verdict.WRONG),
         ({"V": f"m1 = {V}"}, Verdict.UNREADABLE),
         ({"V": f"q1 = {V}"}, Verdict.UNREADABLE),
     ],
 )
 def test_names_in_front_of_an_entry(answers, expected):
     assert verdict(**answers) is expected
+
+
+def pretty(element, change=lambda text: text):
+    """Return what sympy prints of an element over several lines."""
+    import sympy
+
+    return change(sympy.pretty(element, use_unicode=True, wrap_line=False))
+
+
+@pytest.mark.parametrize("name", ["planar2r", "polar_rp", "cart_pendulum", "planar3r", "pan_tilt"])
+@pytest.mark.parametrize("form", ["expand", "factor", "together", "powsimp"])
+def test_what_sympy_prints_over_several_lines(name, form):
+    import sympy
+
+    arm = Arm.load(name)
+    lag = arm.lagrangian.sympy()
+    for quantity in ("V", "M", "g"):
+        value = lag[quantity]
+        change = getattr(sympy, form)
+        written = value.applyfunc(change) if hasattr(value, "applyfunc") else change(value)
+        assert verdict(arm, **{quantity: pretty(written)}) is Verdict.CORRECT
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: "\n".join(line.lstrip() for line in text.splitlines()),
+        lambda text: text.strip(),
+        lambda text: "\n".join(text.splitlines()[1:]),
+        lambda text: "\n".join(text.splitlines()[:-1]),
+        lambda text: text.replace("  ", " "),
+        lambda text: text.replace("⎞", " "),
+        lambda text: text.replace("─", "-"),
+    ],
+)
+def test_a_formula_over_several_lines_that_lost_its_spaces(change):
+    M = ARM.lagrangian.sympy()["M"]
+    assert verdict(M=[[pretty(M[0, 0], change), M12], [M12, M22]]) in (Verdict.UNREADABLE, Verdict.CORRECT)
+
+
+def test_derivatives_over_several_lines():
+    assert reading("d        \n──(q₁(t))\ndt       ") == "qd1"
+    assert reading("  2       \n d        \n───(q₁(t))\n  2       \ndt        ") == "qdd1"
 
 
 def test_sheets_that_name_their_own_robot_say_so(tmp_path):

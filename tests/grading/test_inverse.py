@@ -227,7 +227,6 @@ def test_the_formulas_that_mistakes_are_made_in_are_right(name):
         ("puma3", 2, "(pz - 0.6)^2", "(pz - 0.6)", "cosine_law_squares"),
         ("planar3r", 2, "r21", "r12", "rotation_matrix_transposed"),
         ("rpr", 2, "r21", "r12", "rotation_matrix_transposed"),
-        ("cobra600", 3, "r21", "r12", "rotation_matrix_transposed"),
         ("planar3r", 2, " - q1 - q2", "", "earlier_joints_forgotten"),
         ("planar3r", 2, " - q1", "", "earlier_joints_forgotten"),
         ("rpr", 2, " - q1", "", "earlier_joints_forgotten"),
@@ -247,7 +246,7 @@ def test_the_formulas_that_mistakes_are_made_in_are_right(name):
         ("rrp", 2, "(pz - 0.4)", "(px - 0.4)", "axis_exchanged"),
         ("planar2r", 0, "l2*sin(q2), l1 + l2*cos(q2)", "l1*sin(q2), l2 + l1*cos(q2)", "lengths_exchanged"),
         ("pan_tilt", 1, "pz - 0.08", "pz", "offset_forgotten"),
-        ("pan_tilt", 1, "pz - 0.08", "pz + 0.08", "offset_forgotten"),
+        ("pan_tilt", 1, "pz - 0.08", "pz + 0.08", "term_sign"),
         ("rrp", 1, "pz - 0.4", "pz", "offset_forgotten"),
         ("puma3", 1, "pz - 0.6", "pz", "offset_forgotten"),
         ("rrp", 1, "sin(q1)", "cos(q1)", "term_function"),
@@ -302,14 +301,12 @@ def test_the_same_change_in_several_formulas_is_one_mistake(name, changes, mista
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formula_is_never_blamed(name):
-    """Whatever stands for one joint, only it, or a joint whose formula uses it, is blamed."""
+    """Whatever stands for one joint, it alone is blamed."""
     arm, formulas = RIGHT[name]
     for joint in range(arm.n):
         changed = list(formulas)
         changed[joint] = "px + 0.3*py - 0.7*pz"
-        blamed = {place for mistake, place in mistakes(judge(arm, [changed], samples=200))}
-        users = {k for k, formula in enumerate(formulas) if f"q{joint + 1}" in formula}
-        assert blamed <= {joint} | users, (joint, blamed)
+        assert [place for _, place in mistakes(judge(arm, [changed], samples=200))] == [joint]
 
 
 def test_an_arm_without_a_closed_form_is_asked_for_what_determines_its_joints():
@@ -324,10 +321,10 @@ def test_an_arm_without_a_closed_form_is_asked_for_what_determines_its_joints():
 @pytest.mark.parametrize("name", RIGHT)
 def test_verdicts_do_not_depend_on_the_seed(name):
     arm, formulas = RIGHT[name]
-    seeds = range(200 if acceptance.ACCEPTING else 15)
+    seeds = range(200 if acceptance.ACCEPTING else 8)
     assert {judge(arm, [formulas], seed=seed).verdict for seed in seeds} == {CORRECT}
     spoiled = [*formulas[:-1], f"1.001*({formulas[-1]})"]
-    assert {judge(arm, [spoiled], seed=seed, samples=100).verdict for seed in seeds} == {WRONG}
+    assert {judge(arm, [spoiled], seed=seed, explained=False).verdict for seed in seeds} == {WRONG}
 
 
 # Several mistakes
@@ -394,6 +391,13 @@ def test_a_branch_is_excused_where_its_solution_does_not_exist():
     judged = judge("irb140", [[first, second, f"atan2({s3}, {c3})", fourth, fifth, sixth]])
     assert judged.closures[0].closed == judged.closures[0].poses < 1000, judged
     assert judged.verdict is CORRECT
+
+
+def test_joint_values_that_are_not_exact_enough_are_said_to_be_near():
+    judged = wrong("polar_rp", 1, "{} + 1e-8")
+    assert judged.verdict is WRONG
+    assert mistakes(judged) == [(None, None)]
+    assert "near to a solution" in judged.diagnosis[0].sentence
 
 
 def test_duplicates():

@@ -8,6 +8,7 @@ import pytest
 from dhkit.description import Convention, from_dh, library_robot, robots
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
+from dhkit.grading.answers.sheet import Task
 from dhkit.grading.judging.tables import judge_table
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Note, NoteKind, Verdict
@@ -343,6 +344,19 @@ def test_a_mirrored_turret_is_the_same_arm():
     judgement = judge("pan_tilt", with_entries(own_table(library_robot("pan_tilt")), alpha1="-pi/2"))
     assert "q2 is counted the other way round" in frames(judgement)
     assert mistakes(judgement) == [("alpha_sign", 0)]
+
+
+def test_a_task_may_give_frames_and_the_zero_pose():
+    description = library_robot("puma560")
+    turned = with_entries(own_table(description), theta2="q2 + pi/2", theta3="q3 - 30*deg")
+    trees = [[read(str(entry)) for entry in row] for row in turned]
+    for task in (Task(frames_given=True), Task(zero_given=True)):
+        judgement = judge_table(description, trees, description.convention, task=task)
+        assert judgement.verdict is WRONG
+        assert "the task gives the" in judgement.entries[1].statement
+        assert [found.mistake for found in judgement.diagnosis] == ["other_frames"]
+    trees = [[read(str(entry)) for entry in row] for row in turned_x(own_table(description), 2)]
+    assert judge_table(description, trees, description.convention, task=Task(zero_given=True)).verdict is UNDECIDED
 
 
 def test_one_joint():

@@ -414,7 +414,7 @@ def test_wrong_arguments_are_said():
     lag = lagrangian(library_robot("planar2r"))
     with pytest.raises(TypeError, match="mistakes is 'omega_relative'; expected a set of identities"):
         derive(lag.description, "omega_relative")
-    with pytest.raises(TypeError, match="mistake 1: expected a name"):
+    with pytest.raises(TypeError, match="mistake 1: expected MadeAt"):
         derive(lag.description, {1})
     with pytest.raises(RingError, match="is of planar3r with symbols 'file'; expected planar2r"):
         lag.prove_euler_lagrange(derive(library_robot("planar3r")))

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dhkit import Arm
-from dhkit.description import Body, Description, Inertia, from_toml, library_robot, with_payload
-from dhkit.expressions import exact
+from dhkit.description import Body, Description, Inertia, Named, from_toml, library_robot, with_payload
+from dhkit.expressions import exact, substitute
 from dhkit.symbolic.exact.base_parameters import base_parameters
 from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MadeAt
@@ -109,12 +109,9 @@ ROBOTS = {
 
 def joined_by_hand(description: Description) -> Description:
     """Return the arm with one body a link: masses added, moments added, tensors moved by Steiner's theorem."""
-    values = {name: value for name, value in description.parameters.items()}
 
     def number(x):
-        from dhkit.expressions import substitute
-
-        return substitute(x, values).rational
+        return substitute(x, description.parameters).rational
 
     joints = []
     for joint in description.joints:
@@ -166,8 +163,6 @@ def test_random_arms_with_bodies_agree(arm, count, seed):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_an_arm_is_the_one_whose_links_are_joined_by_hand(name):
     ours, theirs = ROBOTS[name], joined_by_hand(ROBOTS[name])
-    for x, y in zip(ours.joints, theirs.joints, strict=True):
-        assert np.allclose(float(x.body.mass.rational or 1), float(x.body.mass.rational or 1))
     assert np.array_equal(ours.numbers.inertial_parameters, theirs.numbers.inertial_parameters)
     ours, theirs = lagrangian(ours, "none"), lagrangian(theirs, "none")
     ring = ours.arm.ring
@@ -190,11 +185,11 @@ def test_base_parameters_are_those_of_the_joined_links(name):
 
 def test_a_payload_makes_no_reciprocal():
     planar = library_robot("planar2r")
-    loaded = with_payload(replace(planar, parameters=type(planar.parameters)({**planar.parameters, "mp": exact(1)})), "mp")
-    lag = lagrangian(loaded)
+    parameters = Named({**planar.parameters, "mp": exact(1)})
+    lag = lagrangian(with_payload(replace(planar, parameters=parameters), "mp"))
     ring = lag.arm.ring
     m2, mp, l2 = (ring.constant(name) for name in ("m2", "mp", "l2"))
-    assert lag.M[1, 1] == m2 * l2**2 * Fraction(1, 3) + mp * l2**2 - mp * l2**2
+    assert lag.M[1, 1] == m2 * l2**2 * Fraction(1, 3) + mp * l2**2
     assert not any("/" in text for text in ring.constants)
 
 
@@ -213,8 +208,8 @@ def test_mistakes_at_all_bodies_of_a_link_are_the_link_s(name, mistake):
     together = derive(description, {MadeAt(mistake, 2, body) for body in bodies})
     assert (link.K, link.V) == (together.K, together.V)
     ring = right.arm.ring
-    assert link.K - right.K == ring.sum(part.K - right.K for part in parts)
-    assert link.V - right.V == ring.sum(part.V - right.V for part in parts)
+    assert ring.sum(part.K - right.K for part in parts) == link.K - right.K
+    assert ring.sum(part.V - right.V for part in parts) == link.V - right.V
     for one, part in enumerate(parts):
         others = [k for k in range(len(bodies)) if k != one]
         assert all(part.links[1].bodies[k].K == right.links[1].bodies[k].K for k in others)

@@ -73,7 +73,7 @@ def judge(
     truth = truth_of(description, sheet.names.absolute, sheet.task.friction)
     vocabulary = vocabulary_of(description, sheet.names, truth.coordinates.sums)
     judged, refused = _judged(description, sheet, vocabulary, truth, digits, seed)
-    others, refused_others = _kinematic(description, sheet, vocabulary, seed)
+    others, refused_others = _kinematic(description, sheet, vocabulary, seed, explained)
     refused |= refused_others
     if refused and not judged and not others:
         raise next(iter(refused.values()))
@@ -187,7 +187,7 @@ def _judge_one(
 
 
 def _kinematic(
-    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, seed: int
+    description: Description, sheet: AnswerSheet, vocabulary: Vocabulary, seed: int, explained: bool
 ) -> tuple[list[KinematicJudgement], dict[str, DhkitError]]:
     """Judge a sheet's table and formulas of inverse kinematics, as :func:`_judged` does its quantities."""
     n = description.n
@@ -198,7 +198,7 @@ def _kinematic(
 
     def inverse() -> KinematicJudgement:
         own = vocabulary_of(description, sheet.names, inverse=True)
-        return inverse_entries(description, given_branches(sheet.branches, n, own), seed)
+        return inverse_entries(description, given_branches(sheet.branches, n, own), seed, explained=explained)
 
     found, refused = [], dict[str, DhkitError]()
     for name, judge_it, is_there in (("dh", table, sheet.table), ("ik", inverse, sheet.branches)):

@@ -15,6 +15,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.documents.statements import Statement, has_relation, statements_of
 from dhkit.grading.answers.objects import entry_tree, is_entry
+from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of, read_matrix
 from dhkit.grading.answers.sheet import Chain, Entries, Names, Refusal
@@ -33,7 +34,7 @@ __all__ = [
 ]
 
 LEFT_EMPTY = "left empty"
-BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
+BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
 """How the one entry of a matrix begins that stands in brackets."""
 POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
 """The tool's pose in the world, which inverse kinematics start from: its origin, m, and its rotation by rows."""
@@ -313,7 +314,9 @@ def _read(index: tuple[int, ...], value: Any, vocabulary: Vocabulary) -> Given:
     if _left_empty(value):
         return Given(index, "", error=LEFT_EMPTY)
     try:
-        return Given(index, *entry_tree(value.strip().rstrip(";,") if isinstance(value, str) else value, vocabulary))
+        if isinstance(value, str) and not is_pretty(value):  # whose first line's spaces count
+            value = value.strip().rstrip(";,")
+        return Given(index, *entry_tree(value, vocabulary))
     except AnswerError as error:
         shown_text = value if isinstance(value, str) else f"{type(value).__name__} object"
         return Given(index, shown_text[:1000], error=str(error))

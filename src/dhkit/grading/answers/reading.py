@@ -12,6 +12,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, To
 from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima, is_mathematica
 from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
+from dhkit.grading.answers.pretty import in_one_line
 from dhkit.grading.answers.rewriting import rewritten
 from dhkit.grading.answers.tokens import fail, folded, tokens
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
@@ -50,6 +51,7 @@ def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
     AnswerError
         No expression, an unknown name, or more than the limits allow; with the place.
     """
+    text = in_one_line(text)
     return _tree(_tokens(text, vocabulary), vocabulary, text)
 
 
@@ -66,7 +68,7 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     AnswerError
         As for :func:`read_answer`, or no matrix.
     """
-    text = _in_rows(text)
+    text = _in_rows(in_one_line(text))
     found = _stripped(_tokens(text, vocabulary))
     found = _in_one_bracket(found)
     start, end = _matrix_in(found, text)

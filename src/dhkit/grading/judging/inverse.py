@@ -88,7 +88,9 @@ class InverseJudgement(KinematicJudgement):
     covered: int | None = None
 
 
-def inverse_entries(description: Description, branches: Sequence[Sequence[Given]], seed: int = 0) -> KinematicJudgement:
+def inverse_entries(
+    description: Description, branches: Sequence[Sequence[Given]], seed: int = 0, *, explained: bool = True
+) -> KinematicJudgement:
     """Judge the formulas of a sheet; see :func:`judge_inverse`.
 
     Raises
@@ -99,12 +101,17 @@ def inverse_entries(description: Description, branches: Sequence[Sequence[Given]
     if unreadable := unreadable_entries("ik", branches):
         return KinematicJudgement(unreadable)
     trees = [[entry.tree for entry in branch if entry.tree is not None] for branch in branches]
-    judgement = judge_inverse(description, trees, seed=seed)
+    judgement = judge_inverse(description, trees, seed=seed, explained=explained)
     return replace(judgement, entries=with_texts(judgement.entries, branches))
 
 
 def judge_inverse(
-    description: Description, branches: Sequence[Sequence[Tree]], samples: int = 1000, seed: int = 0
+    description: Description,
+    branches: Sequence[Sequence[Tree]],
+    samples: int = 1000,
+    seed: int = 0,
+    *,
+    explained: bool = True,
 ) -> InverseJudgement:
     """Judge formulas of an arm's inverse kinematics.
 
@@ -123,6 +130,8 @@ def judge_inverse(
         whole turn, and slide by a metre outwards.
     seed
         Of the random poses.
+    explained
+        Whether mistakes are looked for; verdicts do not depend on it.
 
     Raises
     ------
@@ -145,9 +154,9 @@ def judge_inverse(
     repeats = {j: i for i, j in reversed(duplicates)}
     entries, diagnosis = [], []
     for k, answer in enumerate(answers):
-        found = [] if answer.is_right else list(search.explanations(answer))
+        found = [] if answer.is_right or not explained else list(search.explanations(answer))
         diagnosis += [_diagnosis(k, one) for one in sorted(found, key=lambda one: answer.rank(one.joint or 0))]
-        if k in repeats and all(one.joint is not None for one in found):
+        if k in repeats and explained and all(one.joint is not None for one in found):
             diagnosis.append(_of_duplicate(answers, repeats[k], k))
         entries.append(_entry(k, answer, found, repeats.get(k)))
     solutions, covered = _coverage(poses, answers)
@@ -217,6 +226,8 @@ def _diagnosis(k: int, found: Explanation) -> Diagnosis:
         sentence = sentence_of(found.mistake, joint)
     elif joint:
         sentence = f"{joint} is the first that is wrong."
+    elif found.is_near:
+        sentence = f"The joint values are near to a solution, but do not bring the tool to the pose to {CLOSES:g}."
     else:
         sentence = "The joint values do not bring the tool to the pose; no single mistake explains it."
     return Diagnosis(found.mistake, sentence, where, (_name(k),), hint_of(found.mistake))

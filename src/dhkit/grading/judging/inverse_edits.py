@@ -6,6 +6,7 @@ One literal, one function, one order of arguments, one exponent, one name, one s
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -20,6 +21,7 @@ __all__ = [
     "Edit",
     "Lengths",
     "edits",
+    "equal_parts",
     "has_call",
     "renamed",
     "renamings",
@@ -34,8 +36,8 @@ ORDER = (
     "degrees_for_radians",
     "millimetres_for_metres",
     "joint_sign",
-    "missing_offset",
     "supplement",
+    "missing_offset",
     "cosine_law_factor",
     "cosine_law_sign",
     "cosine_law_squares",
@@ -168,33 +170,44 @@ def renamed(tree: Tree, change: dict[str, Tree]) -> Tree:
     return _with_children(tree, [renamed(child, change) for child in _children(tree)])
 
 
-def replaced_everywhere(tree: Tree, old: Tree, new: Tree) -> Tree:
-    """Return a formula with a part replaced wherever it stands."""
-    text = _plain_text(old)
-
-    def replaced(part: Tree) -> Tree:
-        if _plain_text(part) == text:
-            return new
-        return _with_children(part, [replaced(child) for child in _children(part)])
-
-    return replaced(tree)
+def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
+    """Return by the id of each part of some formulas the ids of all parts that are equal to it."""
+    places: dict[str, list[int]] = defaultdict(list)
+    for tree in trees:
+        for part, text in _texts(tree):
+            places[text].append(id(part))
+    return {place: frozenset(same) for same in places.values() for place in same}
 
 
-def _plain_text(tree: Tree) -> str:
-    """Return a text that equal formulas share, wherever they stand."""
+def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
+    """Return a formula with its parts of these ids replaced."""
+    if id(tree) in places:
+        return new
+    return _with_children(tree, [replaced_everywhere(child, places, new) for child in _children(tree)])
+
+
+def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
+    """Yield a formula's parts with texts that equal parts share, the whole last."""
+    inner = []
+    for child in _children(tree):
+        found = list(_texts(child))
+        yield from found
+        inner.append(found[-1][1])
     match tree:
         case Number(value=value):
-            return str(value)
+            yield tree, str(value)
         case Name(text):
-            return text
-        case Call(function, arguments):
-            return f"{function}({', '.join(map(_plain_text, arguments))})"
-        case Power(base, exponent):
-            return f"({_plain_text(base)})^({_plain_text(exponent)})"
-        case Product(factors):
-            return "[" + "".join(("*" if up else "/") + _plain_text(factor) for up, factor in factors) + "]"
-        case Sum(terms):
-            return "(" + "".join(("+" if added else "-") + _plain_text(term) for added, term in terms) + ")"
+            yield tree, text
+        case Call(function):
+            yield tree, f"{function}({', '.join(inner)})"
+        case Power():
+            yield tree, f"({inner[0]})^({inner[1]})"
+        case Product(parts):
+            factors = (("*" if up else "/") + text for (up, _), text in zip(parts, inner, strict=True))
+            yield tree, f"[{''.join(factors)}]"
+        case Sum(parts):
+            terms = (("+" if added else "-") + text for (added, _), text in zip(parts, inner, strict=True))
+            yield tree, f"({''.join(terms)})"
 
 
 def has_call(tree: Tree, functions: Sequence[str]) -> bool:
@@ -357,11 +370,9 @@ def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tupl
             yield "cosine_law_sign" if in_law else "term_sign", Sum(turned)
     for k in range(len(terms)) if len(terms) > 1 else ():
         yield "term_extra", Sum((*terms[:k], *terms[k + 1 :]))
-    bare = [isinstance(term, Name | Number) for _, term in terms]
-    if sum(bare) > 1:
-        squared = tuple(
-            (added, _squared(term) if alone else term) for alone, (added, term) in zip(bare, terms, strict=True)
-        )
+    bare = [k for k, (_, term) in enumerate(terms) if isinstance(term, Name | Number | Sum)]
+    for squares in (*([k] for k in bare), bare):
+        squared = tuple((added, _squared(term) if k in squares else term) for k, (added, term) in enumerate(terms))
         yield "cosine_law_squares" if in_law else "square_forgotten", Sum(squared)
 
 

@@ -9,8 +9,9 @@ bounded by counted changes, never by time.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from dhkit.grading.judging.inverse_edits import (
     Edit,
     Lengths,
     edits,
+    equal_parts,
     has_call,
     renamed,
     renamings,
@@ -56,11 +58,14 @@ class Explanation:
         Whose formula is meant, from 0; None where it is several formulas, or none in particular.
     repaired
         The branch with the mistake put right; None where there is none.
+    is_near
+        Whether all joint values are near to a solution, but the tool is not near enough to the pose.
     """
 
     mistake: str | None
     joint: int | None
     repaired: Branch | None = None
+    is_near: bool = False
 
 
 class Search:
@@ -93,7 +98,7 @@ class Search:
                 repaired = branch.with_tree(joint, edit.tree)
                 if repaired.is_right:
                     return Explanation(edit.mistake, joint, repaired)
-        return Explanation(None, None)
+        return Explanation(None, None, is_near=branch.poses.isolated)
 
     def _explained(self, branch: Branch, joint: int) -> Explanation:
         """Return a mistake, given the first joint that is wrong."""
@@ -104,7 +109,7 @@ class Search:
             for other in branch.order[: branch.rank(joint) + 1]
             for mistake, repaired in _lost_halves(branch, other, joint)
         ]
-        for found in (*candidates, *self._before(branch, joint), *self._in_several(branch, here), *halves):
+        for found in chain(candidates, self._before(branch, joint), self._in_several(branch, here), halves):
             if found.repaired is not None and found.repaired.is_right:
                 return found
         for found in (*candidates, *halves):
@@ -131,12 +136,19 @@ class Search:
 
     def _agreeing(self, branch: Branch, joint: int) -> list[Edit]:
         """Return the changes of a joint's formula that give values of a solution where the branch should close."""
-        formula, found = branch.editable(joint), []
+        formula, found = branch.editable(joint), list[Edit]()
         asked = branch.reachable
+        tree = branch.trees[joint]
+        equal = equal_parts([tree])
         for edit in self._edits(branch, joint):
-            x = branch.repaired(joint, formula.of(edit.tree))
-            if np.mean(branch.agrees(joint, x)[asked]) >= AGREEING:
-                found.append(edit)
+            trees = [edit.tree]
+            if len(equal[id(edit.old)]) > 1:
+                trees.append(replaced_everywhere(tree, equal[id(edit.old)], edit.new))
+            for changed in trees:
+                x = branch.repaired(joint, formula.of(changed))
+                if np.mean(branch.agrees(joint, x)[asked]) >= AGREEING:
+                    found.append(replace(edit, tree=changed))
+                    break
         return found
 
     def _before(self, branch: Branch, joint: int) -> Iterator[Explanation]:
@@ -147,8 +159,9 @@ class Search:
 
     def _in_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
+        equal = equal_parts(branch.trees)
         for edit in agreeing:
-            trees = [replaced_everywhere(tree, edit.old, edit.new) for tree in branch.trees]
+            trees = [replaced_everywhere(tree, equal[id(edit.old)], edit.new) for tree in branch.trees]
             if sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
                 yield Explanation(edit.mistake, None, branch.with_trees(trees))
         for mistake, change in renamings(branch.trees, self.lengths):
