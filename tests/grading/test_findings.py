@@ -275,7 +275,7 @@ def test_c12_of_an_arm_of_twelve_joints():
     rows = [(0, 0, 0.1, 0)] * 12
     arm = Arm.from_dh(rows, order=("theta", "d", "a", "alpha"), kinds="R" * 12)
     for name in ("c12", "s12", r"c_{12}", "C12", "cos12"):
-        (entry, *_) = arm.grade(A1=[[name] * 4] * 4).entries
+        (entry, *_) = arm.grade(A1=[[name] * 4] * 4, explain=False).entries
         assert entry.verdict is Verdict.UNREADABLE
         assert "cos(q12)" in entry.statement or "sin(q12)" in entry.statement
     assert arm.grade(A1=[["c1"] * 4] * 4).entries[0].read == "cos(q1)"

@@ -343,9 +343,7 @@ class GradeReport:
             Diagnosis(**{**found, "entries": tuple(found["entries"]), "equivalent": tuple(found["equivalent"])})
             for found in data["diagnosis"]
         )
-        notes = tuple(
-            Note(NoteKind(note["kind"]), note["quantity"], tuple(note["values"])) for note in data["notes"]
-        )
+        notes = tuple(Note(NoteKind(note["kind"]), note["quantity"], tuple(note["values"])) for note in data["notes"])
         listed = {"notes": notes, "left_out": tuple(data["left_out"])}
         return cls(**{**data, "entries": entries, "diagnosis": diagnosis, **listed})
 

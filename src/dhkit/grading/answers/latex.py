@@ -8,103 +8,31 @@ from collections.abc import Callable
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import closing_bracket, dotted, fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
+from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
-__all__ = ["is_latex", "latex_tokens"]
+__all__ = ["GREEK", "is_latex", "latex_tokens"]
 
 MAX_DEPTH = 50
 MAX_LETTERS = 64
 PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
 MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
 """A number in front of a fraction, which is no subscript or exponent."""
-SPACES = frozenset(
-    [
-        ",",
-        ";",
-        ":",
-        "!",
-        ">",
-        "quad",
-        "qquad",
-        "displaystyle",
-        "textstyle",
-        "limits",
-        "nolimits",
-        "nonumber",
-        "notag",
-        "thinspace",
-        "enspace",
-        "space",
-        "middle",
-        "it",
-        "rm",
-        "bf",
-        "sf",
-    ]
-) | {" ", "\n", "("[:0]}
+SPACE_NAMES = """
+    quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf
+"""
+SPACES = frozenset(SPACE_NAMES.split()) | frozenset(",;:!> \n")
+"""Macros that set spaces and type, and say nothing."""
 SIZES = frozenset(
     ["left", "right", "big", "Big", "bigg", "Bigg", "bigl", "bigr", "Bigl", "Bigr", "biggl", "biggr", "Biggl", "Biggr"]
 )
 FRACTIONS = frozenset(("frac", "tfrac", "dfrac", "cfrac"))
-UPRIGHT = frozenset(
-    [
-        "mathrm",
-        "mathit",
-        "mathbf",
-        "mathsf",
-        "mathcal",
-        "text",
-        "textrm",
-        "operatorname",
-        "boldsymbol",
-        "bm",
-        "vec",
-        "hat",
-        "bar",
-        "mathnormal",
-    ]
-)
+UPRIGHT_NAMES = """
+    mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal
+"""
+UPRIGHT = frozenset(UPRIGHT_NAMES.split())
 TIMES = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
 DOTS = {"dot": "dot", "ddot": "ddot"}
-GREEK = frozenset(
-    [
-        "alpha",
-        "beta",
-        "gamma",
-        "delta",
-        "epsilon",
-        "varepsilon",
-        "zeta",
-        "eta",
-        "theta",
-        "vartheta",
-        "iota",
-        "kappa",
-        "lambda",
-        "mu",
-        "nu",
-        "xi",
-        "rho",
-        "varrho",
-        "sigma",
-        "tau",
-        "upsilon",
-        "phi",
-        "varphi",
-        "chi",
-        "psi",
-        "omega",
-        "Gamma",
-        "Delta",
-        "Theta",
-        "Lambda",
-        "Xi",
-        "Sigma",
-        "Upsilon",
-        "Phi",
-        "Psi",
-        "Omega",
-    ]
-)
+GREEK = LETTERS - {"pi", "Pi"} | {"varepsilon", "vartheta", "varrho", "varphi"}
 OVER = "\\over"
 MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
 

@@ -25,7 +25,8 @@ SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.DISAGREES: "{quantity} is not {agreement}",
     NoteKind.NUMBERS: "{quantity}: judged at the file's numbers: {values}",
     NoteKind.SIDES_DIFFER: "{quantity}: the sides of its chain of equations differ; the last one is judged",
-    NoteKind.CHRISTOFFEL: "C: judged by C qd; it is the one of the Christoffel symbols, so dM/dt - 2 C is skew-symmetric",
+    NoteKind.CHRISTOFFEL: "C: judged by C qd; it is the one of the Christoffel symbols, so dM/dt - 2 C is "
+    "skew-symmetric",
     NoteKind.SKEW: "C: judged by C qd; it is another valid factorization than that of the Christoffel symbols, and "
     "dM/dt - 2 C is skew-symmetric",
     NoteKind.NOT_SKEW: "C: judged by C qd; it is another valid factorization than that of the Christoffel symbols, and "

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from dhkit.grading.answers.documents.latex_rows import Row, rows_of
-from dhkit.grading.answers.latex import is_latex
+from dhkit.grading.answers.latex import GREEK, is_latex
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
 
@@ -370,49 +370,7 @@ def left_hand_name(side: str) -> str:
     return plain_name(letters) + below.replace(",", "")
 
 
-_GREEK = frozenset(
-    (
-        "alpha",
-        "beta",
-        "gamma",
-        "delta",
-        "epsilon",
-        "varepsilon",
-        "zeta",
-        "eta",
-        "theta",
-        "vartheta",
-        "iota",
-        "kappa",
-        "lambda",
-        "mu",
-        "nu",
-        "xi",
-        "rho",
-        "varrho",
-        "sigma",
-        "tau",
-        "upsilon",
-        "phi",
-        "varphi",
-        "chi",
-        "psi",
-        "omega",
-        "Gamma",
-        "Delta",
-        "Theta",
-        "Lambda",
-        "Xi",
-        "Sigma",
-        "Upsilon",
-        "Phi",
-        "Psi",
-        "Omega",
-        "ell",
-        "Tau",
-        "mathbf",
-    )
-)
+_GREEK = GREEK | {"ell", "Tau", "mathbf"}
 
 
 # Plain text
