@@ -245,6 +245,7 @@ def test_the_formulas_that_mistakes_are_made_in_are_right(name):
         ("cobra600", 2, "pz", "py", "axis_exchanged"),
         ("rrp", 2, "(pz - 0.4)", "(px - 0.4)", "axis_exchanged"),
         ("planar2r", 0, "l2*sin(q2), l1 + l2*cos(q2)", "l1*sin(q2), l2 + l1*cos(q2)", "lengths_exchanged"),
+        ("puma3", 1, "0.3*sin(q3), 0.4 + 0.3*cos(q3)", "0.4*sin(q3), 0.3 + 0.4*cos(q3)", "lengths_exchanged"),
         ("pan_tilt", 1, "pz - 0.08", "pz", "offset_forgotten"),
         ("pan_tilt", 1, "pz - 0.08", "pz + 0.08", "term_sign"),
         ("rrp", 1, "pz - 0.4", "pz", "offset_forgotten"),
@@ -281,6 +282,7 @@ def test_a_local_change_of_a_formula_is_named(name, joint, old, new, mistake):
         ("planar2r", {"- l1^2 - l2^2": "- l1^2 + l2^2"}, "cosine_law_sign"),
         ("planar3r", {"l1^2 - l2^2": "l1 - l2"}, "cosine_law_squares"),
         ("planar3r", {" - l3*r11": "", " - l3*r21": ""}, "tool_length_forgotten"),
+        ("rpr", {" - 0.3*r11": "", " - 0.3*r21": ""}, "tool_length_forgotten"),
         ("puma560_cao", {"px": "py", "py": "px"}, "axis_exchanged"),
         (
             "puma560_cao",
@@ -291,7 +293,7 @@ def test_a_local_change_of_a_formula_is_named(name, joint, old, new, mistake):
     ],
 )
 def test_the_same_change_in_several_formulas_is_one_mistake(name, changes, mistake):
-    arm, formulas = library_robot(name) if name in ARMS else PUMA3, ARMS.get(name, [PUMA3_RIGHT])[0]
+    arm, formulas = (library_robot(name), ARMS[name][0]) if name in ARMS else RIGHT[name]
     pattern = re.compile("|".join(map(re.escape, changes)))
     changed = [pattern.sub(lambda found: changes[found.group()], formula) for formula in formulas]
     judged = judge(arm, [changed])
@@ -333,6 +335,8 @@ def test_verdicts_do_not_depend_on_the_seed(name):
 def test_several_mistakes_of_a_branch_are_all_named():
     formulas = ["atan(py/px)", "sqrt(px^2 + py^2)*1000"]
     assert mistakes(judge("polar_rp", [formulas])) == [("quadrant", 0), ("millimetres_for_metres", 1)]
+    formulas = ["acos(px/sqrt(px^2 + py^2))", "px^2 + py^2"]
+    assert mistakes(judge("polar_rp", [formulas])) == [("sign_lost", 0), ("root_forgotten", 1)]
     puma = list(ARMS["puma560_cao"][0])
     puma[0], puma[5] = f"{puma[0]} + pi/3", f"({puma[5]})/deg"
     assert mistakes(judge("puma560_cao", [puma])) == [("missing_offset", 0), ("degrees_for_radians", 5)]
@@ -471,3 +475,13 @@ def test_a_formula_may_use_joints_that_are_found_before_it():
     assert judged.verdict is Verdict.CORRECT and judged.covered == 2
     exchanged = judge("planar2r", [[shoulder.replace("py, px", "px, py"), elbow]])
     assert mistakes(exchanged) == [("atan2_arguments", 0)]
+
+
+def test_the_search_for_mistakes_is_bounded():
+    """Long formulas: a sum of 450 terms, squares nested 40 deep, 6 wrong formulas of a PUMA at once."""
+    long = "+".join(f"{k}*px*py" for k in range(1, 450))
+    nested = "px" + "+1)^2" * 40
+    for formula in (long, "(" * 40 + nested):
+        assert judge("planar2r", [[formula, f"q1 + {formula}"]]).verdict is WRONG
+    branches = [[f"sin({formula})" for formula in branch] for branch in ARMS["puma560_cao"]]
+    assert judge("puma560_cao", branches).verdict is WRONG

@@ -3,7 +3,7 @@
 from dhkit.grading.judgement import grade, grade_answers, robot_of
 from dhkit.grading.marks import Mark, Marks, marks
 from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict, Witness
 from dhkit.grading.rubric import Credit, Rubric
 
 __all__ = [
@@ -14,6 +14,8 @@ __all__ = [
     "GradeReport",
     "Mark",
     "Marks",
+    "Note",
+    "NoteKind",
     "Rubric",
     "Verdict",
     "Witness",

@@ -148,7 +148,14 @@ def judge_inverse(
     ('wrong', 'ik, branch 1, q1', 'quadrant')
     """
     _check(description, branches)
-    poses, search = Poses.random(description, samples, seed), Search(description)
+    with np.errstate(all="ignore"):
+        return _judged(description, branches, Poses.random(description, samples, seed), explained)
+
+
+def _judged(
+    description: Description, branches: Sequence[Sequence[Tree]], poses: Poses, explained: bool
+) -> InverseJudgement:
+    search = Search(description)
     answers = [Branch(poses, tuple(branch)) for branch in branches]
     duplicates = tuple((i, j) for j in range(len(answers)) for i in range(j) if poses.same(answers[i].q, answers[j].q))
     repeats = {j: i for i, j in reversed(duplicates)}

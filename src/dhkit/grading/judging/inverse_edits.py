@@ -6,7 +6,6 @@ One literal, one function, one order of arguments, one exponent, one name, one s
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,6 +13,20 @@ from itertools import combinations, islice
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
+from dhkit.grading.judging.changed_formulas import (
+    applied,
+    exchanged,
+    has_call,
+    leaf_text,
+    minus,
+    operands,
+    product_of,
+    renamed,
+    square_of,
+    times,
+    with_calls_changed,
+    with_operands,
+)
 from dhkit.grading.judging.numeric import names_of, parts_of
 
 __all__ = [
@@ -21,11 +34,7 @@ __all__ = [
     "Edit",
     "Lengths",
     "edits",
-    "equal_parts",
-    "has_call",
-    "renamed",
     "renamings",
-    "replaced_everywhere",
     "with_signs_changed",
 ]
 
@@ -69,6 +78,8 @@ ROOTS = ("sqrt", "acos", "asin")
 """Functions that know one sign of two."""
 SMALLEST = 10
 """Degrees or millimetres: smaller numbers are factors and exponents."""
+MOST_LAW_TERMS = 8
+"""Terms of which pairs of signs are tried."""
 LAW_TERMS = 3
 """Terms of the numerator in a law of cosines, at least: two squares of links, and a squared distance."""
 
@@ -106,7 +117,7 @@ class Lengths:
     """
 
     parameters: tuple[str, ...]
-    trees: tuple[Tree, ...]
+    trees: tuple[Name | Number, ...]
 
 
 def edits(
@@ -147,8 +158,11 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     for a, b in combinations(POSITIONS, 2):
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
-    for a, b in combinations([name for name in lengths.parameters if name in names], 2):
-        yield "lengths_exchanged", {a: Name(b, 0), b: Name(a, 0)}
+    parts = [part for tree in trees for part in parts_of(tree) if isinstance(part, Number)]
+    numbers = {leaf_text(number) for number in parts if number.value.denominator != 1}  # whole ones are exponents
+    known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
+    for first, second in combinations(known[:MOST_LENGTHS], 2):
+        yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
     for length in lengths.trees[:MOST_LENGTHS]:
         for subtracted in (True, False):
             for p in POSITIONS:
@@ -156,63 +170,11 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
                     yield "offset_forgotten", {p: Sum(((True, Name(p, 0)), (not subtracted, length)))}
             for column in "123":
                 tool: dict[str, Tree] = {
-                    p: Sum(((True, Name(p, 0)), (not subtracted, _times(length, Name(f"r{i}{column}", 0)))))
+                    p: Sum(((True, Name(p, 0)), (not subtracted, times(length, Name(f"r{i}{column}", 0)))))
                     for i, p in enumerate(POSITIONS, start=1)
                 }
                 if names & {*POSITIONS}:
                     yield "tool_length_forgotten", tool
-
-
-def renamed(tree: Tree, change: dict[str, Tree]) -> Tree:
-    """Return a formula with names replaced, all at once."""
-    if isinstance(tree, Name):
-        return change.get(tree.text, tree)
-    return _with_children(tree, [renamed(child, change) for child in _children(tree)])
-
-
-def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
-    """Return by the id of each part of some formulas the ids of all parts that are equal to it."""
-    places: dict[str, list[int]] = defaultdict(list)
-    for tree in trees:
-        for part, text in _texts(tree):
-            places[text].append(id(part))
-    return {place: frozenset(same) for same in places.values() for place in same}
-
-
-def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
-    """Return a formula with its parts of these ids replaced."""
-    if id(tree) in places:
-        return new
-    return _with_children(tree, [replaced_everywhere(child, places, new) for child in _children(tree)])
-
-
-def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
-    """Yield a formula's parts with texts that equal parts share, the whole last."""
-    inner = []
-    for child in _children(tree):
-        found = list(_texts(child))
-        yield from found
-        inner.append(found[-1][1])
-    match tree:
-        case Number(value=value):
-            yield tree, str(value)
-        case Name(text):
-            yield tree, text
-        case Call(function):
-            yield tree, f"{function}({', '.join(inner)})"
-        case Power():
-            yield tree, f"({inner[0]})^({inner[1]})"
-        case Product(parts):
-            factors = (("*" if up else "/") + text for (up, _), text in zip(parts, inner, strict=True))
-            yield tree, f"[{''.join(factors)}]"
-        case Sum(parts):
-            terms = (("+" if added else "-") + text for (added, _), text in zip(parts, inner, strict=True))
-            yield tree, f"({''.join(terms)})"
-
-
-def has_call(tree: Tree, functions: Sequence[str]) -> bool:
-    """Whether a formula calls one of some functions."""
-    return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
 
 
 def with_signs_changed(tree: Tree) -> Iterator[Tree]:
@@ -225,17 +187,6 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
         yield with_calls_changed(tree, ROOTS, minus)
 
 
-def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
-    """Return a formula with all its calls of some functions changed; the formula itself where it has none."""
-    changed = _with_children(tree, [with_calls_changed(child, functions, change) for child in _children(tree)])
-    return change(changed) if isinstance(changed, Call) and changed.function in functions else changed
-
-
-def minus(tree: Tree) -> Tree:
-    """Return a formula with a minus in front."""
-    return Sum(((False, tree),))
-
-
 # Changes of a whole formula
 
 
@@ -243,10 +194,10 @@ def _of_the_whole(
     tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float]
 ) -> Iterator[tuple[str, Tree]]:
     if is_revolute:
-        yield "degrees_for_radians", _times(tree, Name("deg", 0))
+        yield "degrees_for_radians", times(tree, Name("deg", 0))
         yield "supplement", Sum(((True, Name("pi", 0)), (False, tree)))
     else:
-        yield "millimetres_for_metres", _times(tree, Name("mm", 0))
+        yield "millimetres_for_metres", times(tree, Name("mm", 0))
     yield "joint_sign", minus(tree)
     for offset in offsets:
         yield "missing_offset", Sum(((True, tree), (True, Number(Fraction(offset), str(offset), 0))))
@@ -255,10 +206,10 @@ def _of_the_whole(
             for added in (False, True):
                 yield "earlier_joints_forgotten", Sum(((True, tree), *((added, Name(name, 0)) for name in chosen)))
     for arc in ARCS:
-        yield "arc_function_forgotten", _call(arc, tree)
-        yield "arc_function_forgotten", minus(_call(arc, tree))
-    yield "root_forgotten", _call("sqrt", tree)
-    for mistake, functions, change in (("elbow_sign", ROOTS, minus), ("atan2_arguments", ("atan2",), _exchanged)):
+        yield "arc_function_forgotten", applied(arc, tree)
+        yield "arc_function_forgotten", minus(applied(arc, tree))
+    yield "root_forgotten", applied("sqrt", tree)
+    for mistake, functions, change in (("elbow_sign", ROOTS, minus), ("atan2_arguments", ("atan2",), exchanged)):
         new = with_calls_changed(tree, functions, change)
         if new is not tree:
             yield mistake, new
@@ -285,11 +236,11 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
     """
     for mistake, new in _changes(tree, lengths, in_law):
         yield Edit(mistake, rebuild(new), tree, new)
-    children = _children(tree)
+    children = operands(tree)
     for k, child in enumerate(children):
 
         def around(part: Tree, k: int = k) -> Tree:
-            return rebuild(_with_children(tree, [*children[:k], part, *children[k + 1 :]]))
+            return rebuild(with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
 
         yield from _of_parts(child, lengths, around, in_law or _is_law(child))
 
@@ -301,7 +252,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
             yield from _of_number(tree, in_law)
         case Name(text):
             yield from _of_name(text, lengths)
-            yield "cosine_law_squares" if in_law else "square_forgotten", _squared(tree)
+            yield "cosine_law_squares" if in_law else "square_forgotten", square_of(tree)
         case Call():
             yield from _of_call(tree, in_law)
         case Power(base, exponent) if isinstance(exponent, Number) and exponent.value == 2:
@@ -309,7 +260,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
         case Product(factors):
             yield from _scaled(tree, in_law)
             for k in range(len(factors)):
-                yield "term_factor", _product([*factors[:k], *factors[k + 1 :]])
+                yield "term_factor", product_of([*factors[:k], *factors[k + 1 :]])
         case Sum(terms):
             yield from _of_sum(terms, in_law)
 
@@ -318,9 +269,9 @@ def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if number.value == 1:
         return
     if number.value >= SMALLEST:
-        yield "degrees_for_radians", _times(number, Name("deg", 0))
-        yield "millimetres_for_metres", _times(number, Name("mm", 0))
-    yield "cosine_law_squares" if in_law else "square_forgotten", _squared(number)
+        yield "degrees_for_radians", times(number, Name("deg", 0))
+        yield "millimetres_for_metres", times(number, Name("mm", 0))
+    yield "cosine_law_squares" if in_law else "square_forgotten", square_of(number)
 
 
 def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
@@ -342,7 +293,7 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
     match call.function:
         case "atan2":
             second = call.arguments[-1]
-            yield "atan2_arguments", _exchanged(call)
+            yield "atan2_arguments", exchanged(call)
             for signs in ((False, True), (True, False), (False, False)):
                 signed = tuple(x if sign else minus(x) for sign, x in zip(signs, (first, second), strict=True))
                 yield "term_sign", replace(call, arguments=signed)
@@ -351,7 +302,7 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
         case "atan":
             if isinstance(first, Product) and any(not up for up, _ in first.factors):
                 above, below = ([(True, x) for up, x in first.factors if up is way] for way in (True, False))
-                yield "quadrant", Call("atan2", (_product(above), _product(below)), 0)
+                yield "quadrant", Call("atan2", (product_of(above), product_of(below)), 0)
         case "acos" | "asin":
             yield "elbow_sign", minus(call)
             yield "supplement", replace(call, arguments=(minus(first), *call.arguments[1:]))
@@ -359,12 +310,12 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
         case "sqrt":
             yield "elbow_sign", minus(call)
             yield "cosine_law_squares" if in_law else "square_forgotten", first
-    yield "cosine_law_squares" if in_law else "square_forgotten", _squared(call)
+    yield "cosine_law_squares" if in_law else "square_forgotten", square_of(call)
 
 
 def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tuple[str, Tree]]:
-    yield "root_forgotten", _call("sqrt", Sum(terms))
-    for count in (1, 2) if in_law else (1,):
+    yield "root_forgotten", applied("sqrt", Sum(terms))
+    for count in (1, 2) if in_law and len(terms) <= MOST_LAW_TERMS else (1,):
         for chosen in combinations(range(len(terms)), count):
             turned = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
             yield "cosine_law_sign" if in_law else "term_sign", Sum(turned)
@@ -372,13 +323,13 @@ def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tupl
         yield "term_extra", Sum((*terms[:k], *terms[k + 1 :]))
     bare = [k for k, (_, term) in enumerate(terms) if isinstance(term, Name | Number | Sum)]
     for squares in (*([k] for k in bare), bare):
-        squared = tuple((added, _squared(term) if k in squares else term) for k, (added, term) in enumerate(terms))
+        squared = tuple((added, square_of(term) if k in squares else term) for k, (added, term) in enumerate(terms))
         yield "cosine_law_squares" if in_law else "square_forgotten", Sum(squared)
 
 
 def _scaled(tree: Tree, in_law: bool) -> Iterator[tuple[str, Tree]]:
     for factor in (Fraction(2), Fraction(1, 2)):
-        yield "cosine_law_factor" if in_law else "term_factor", _times(tree, Number(factor, str(factor), 0))
+        yield "cosine_law_factor" if in_law else "term_factor", times(tree, Number(factor, str(factor), 0))
 
 
 def _is_law(tree: Tree) -> bool:
@@ -391,53 +342,3 @@ def _is_law(tree: Tree) -> bool:
 def _count(tree: Tree) -> int:
     """Return the number of terms, those of sums in a sum included."""
     return sum(_count(term) for _, term in tree.terms) if isinstance(tree, Sum) else 1
-
-
-# Trees
-
-
-def _children(tree: Tree) -> tuple[Tree, ...]:
-    match tree:
-        case Call(_, arguments):
-            return arguments
-        case Power(base, exponent):
-            return base, exponent
-        case Product(parts) | Sum(parts):
-            return tuple(part for _, part in parts)
-    return ()
-
-
-def _with_children(tree: Tree, children: Sequence[Tree]) -> Tree:
-    """Return a part with others in it; the part itself where they are the same."""
-    if all(new is old for new, old in zip(children, _children(tree), strict=True)):
-        return tree
-    match tree:
-        case Call():
-            return replace(tree, arguments=tuple(children))
-        case Power():
-            return replace(tree, base=children[0], exponent=children[1])
-        case Product(parts):
-            return Product(tuple((up, child) for (up, _), child in zip(parts, children, strict=True)))
-        case Sum(parts):
-            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
-    return tree
-
-
-def _exchanged(call: Call) -> Tree:
-    return replace(call, arguments=call.arguments[::-1])
-
-
-def _product(factors: Sequence[tuple[bool, Tree]]) -> Tree:
-    return Product(tuple(factors)) if factors else Number(Fraction(1), "1", 0)
-
-
-def _times(tree: Tree, factor: Tree) -> Tree:
-    return Product(((True, tree), (True, factor)))
-
-
-def _squared(tree: Tree) -> Tree:
-    return Power(tree, Number(Fraction(2), "2", 0), 0)
-
-
-def _call(function: str, argument: Tree) -> Tree:
-    return Call(function, (argument,), 0)

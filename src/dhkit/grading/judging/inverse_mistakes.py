@@ -16,26 +16,21 @@ from itertools import chain
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.expressions.syntax import Name, Number, Tree
+from dhkit.expressions.syntax import Name, Number
+from dhkit.grading.judging.changed_formulas import equal_parts, has_call, renamed, replaced_everywhere
 from dhkit.grading.judging.inverse_branch import Branch
-from dhkit.grading.judging.inverse_edits import (
-    Edit,
-    Lengths,
-    edits,
-    equal_parts,
-    has_call,
-    renamed,
-    renamings,
-    replaced_everywhere,
-)
+from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
+from dhkit.grading.judging.numeric import parts_of
 
 __all__ = ["Explanation", "Search"]
 
 MOST_POSES = 100
 """Poses that fail, and poses that close, on which mistakes are looked for."""
-MOST_CHANGES = 20_000
-"""Changes of formulas that are worked out for one answer: a second's work."""
+MOST_WORK = 4_000_000
+"""Changes that are worked out for one answer, each times the parts of its formula: a few seconds' work at most."""
+MOST_PARTS = 1_000
+"""Parts of a formula, at most, in which mistakes are looked for: a PUMA's longest has 200."""
 AGREEING = 0.5
 """Share of the poses: a change whose values are a solution's less often is not followed further."""
 SUBSTANTIAL = 0.3
@@ -80,7 +75,7 @@ class Search:
     def __init__(self, description: Description) -> None:
         self.revolute = [kind == "R" for kind in description.kinds]
         self.lengths = lengths_of(description)
-        self.left = MOST_CHANGES
+        self.left = MOST_WORK
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:
         """Yield what went wrong, each mistake put right before the next is looked for."""
@@ -130,8 +125,12 @@ class Search:
         same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
         offsets = _offsets(branch, joint)
         names = [f"q{k + 1}" for k in same_kind]
-        found = edits(branch.trees[joint], self.revolute[joint], names, offsets, self.lengths)[: self.left]
-        self.left -= len(found)
+        tree = branch.trees[joint]
+        size = sum(1 for _ in parts_of(tree))
+        if size > MOST_PARTS:
+            return []
+        found = edits(tree, self.revolute[joint], names, offsets, self.lengths)[: self.left // size]
+        self.left -= len(found) * size
         return found
 
     def _agreeing(self, branch: Branch, joint: int) -> list[Edit]:
@@ -159,6 +158,9 @@ class Search:
 
     def _in_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
+        size = sum(1 for tree in branch.trees for _ in parts_of(tree))
+        if size > MOST_PARTS * branch.n:
+            return
         equal = equal_parts(branch.trees)
         for edit in agreeing:
             trees = [replaced_everywhere(tree, equal[id(edit.old)], edit.new) for tree in branch.trees]
@@ -166,8 +168,8 @@ class Search:
                 yield Explanation(edit.mistake, None, branch.with_trees(trees))
         for mistake, change in renamings(branch.trees, self.lengths):
             trees = [renamed(tree, change) for tree in branch.trees]
-            if self.left > 0 and sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
-                self.left -= 1
+            if self.left > size and sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
+                self.left -= size
                 yield Explanation(mistake, None, branch.with_trees(trees))
 
 
@@ -176,7 +178,7 @@ def lengths_of(description: Description) -> Lengths:
     parameters = tuple(description.parameters)
     numbers, values = description.numbers, description.numbers.values
     known = [*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]]
-    found: list[Tree] = [Name(name, 0) for name in parameters]
+    found: list[Name | Number] = [Name(name, 0) for name in parameters]
     seen = {round(abs(float(values[name])), 12) for name in parameters} | {0.0}
     for length in known:
         size = round(abs(float(length)), 12)
@@ -206,8 +208,8 @@ def _offsets(branch: Branch, joint: int) -> list[float]:
     return [float(x) for x in np.unique((branch.poses.truths[s, alive, joint] - branch.q[s, joint]).round(12))]
 
 
-def _lost_halves(branch: Branch, joint: int, first: int) -> Iterator[tuple[str, Branch]]:
-    """Yield what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
+def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Branch]]:
+    """Return what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
 
     The wrong half may be the value of another solution, and then a later joint is the first that is wrong.
     """
@@ -218,8 +220,11 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> Iterator[tuple[str, 
     def where_wrong(change: Array) -> Array:
         return np.where(wrong, change, 0.0)
 
+    found = []
     if revolute and (own or has_call(tree, ("atan", "asin"))):
-        yield "quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))
-        yield "quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))
+        found.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))))
+        found.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
     if own or has_call(tree, ("acos",)):
-        yield "sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))
+        found.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
+    # Both may give a solution: what the formula's own function does not know is meant.
+    return found[::-1] if has_call(tree, ("acos",)) and not has_call(tree, ("atan", "asin")) else found

@@ -81,7 +81,7 @@ def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
     """Return what changes where d/dt of cos(q) is taken for -sin(q), without q's rate."""
     ring = lag.arm.ring
     bare = element_array([ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta])
-    return bare - _mass_rate(lag, momenta)  # type: ignore[no-any-return]
+    return bare - _mass_rate(lag, momenta)
 
 
 def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
@@ -281,8 +281,8 @@ def _in_robots(coordinates: Coordinates, quantity: str, change: Elements) -> Ele
     if coordinates.is_relative or quantity not in DYNAMICS:
         return change
     if quantity in ("M", "C"):
-        return coordinates.S.T @ change @ coordinates.S  # type: ignore[no-any-return]
-    return coordinates.S.T @ change if change.ndim == 1 else change  # type: ignore[no-any-return]
+        return coordinates.S.T @ change @ coordinates.S
+    return coordinates.S.T @ change if change.ndim == 1 else change
 
 
 def _zero_poses(truth: Truth) -> Iterator[Variant]:

@@ -7,7 +7,7 @@ described by its terms.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -21,11 +21,19 @@ from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
 from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
 from dhkit.grading.mistakes.diagnosis import Differences, Index, Variants, place_of, variants_of
-from dhkit.grading.mistakes.library import FACTORS, LIBRARY, hint_of, sentence_of
+from dhkit.grading.mistakes.library import FACTORS, hint_of
+from dhkit.grading.mistakes.parts import split_in_parts
 from dhkit.grading.mistakes.slips import Slip, slip_in
 from dhkit.grading.mistakes.terms import describe
 from dhkit.grading.mistakes.variants import Variant
-from dhkit.grading.report import Diagnosis, Entry, Verdict
+from dhkit.grading.mistakes.wording import (
+    diagnosis_of,
+    diagnosis_of_slip,
+    entry_names,
+    merged,
+    wrong_entries,
+)
+from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
 
@@ -41,8 +49,6 @@ PARTS = {
 IN_DEGREES = (Fraction(1, 180), Fraction(180))
 LIKELY = 1
 """The largest rarity of a mistake that is named before slips in single terms are looked for."""
-MAX_ALTERNATIVES = 3
-"""Mistakes that give the same answers and are named in one sentence."""
 LEAST_DIGITS = 2
 """Significant digits of decimals that are told to be too few rather than wrong."""
 LEAST_TERMS_OF_A_PAIR, MOST_TERMS_OF_A_PAIR = 3, 600
@@ -79,7 +85,7 @@ def explain(
     _take(left, found, _single(truth, judged, left, lambda rarity: rarity <= LIKELY))
     _take(left, found, _nearly(truth, left, digits))
     for name in list(left):
-        if all(index in (follows or {}).get(name, {}) for index in _wrong_entries(left[name])):
+        if all(index in (follows or {}).get(name, {}) for index in wrong_entries(left[name])):
             del left[name]
     for explained in (_too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
         for name, quantity in list(left.items()):
@@ -89,22 +95,7 @@ def explain(
                 del left[name]
     for quantity in left.values():
         found += _entries(truth, quantity)
-    return _merged(found)
-
-
-def _merged(found: Sequence[Diagnosis]) -> list[Diagnosis]:
-    """Return diagnoses, those that say the same of several quantities as one."""
-    same: dict[tuple[str | None, str], list[Diagnosis]] = {}
-    for diagnosis in found:
-        same.setdefault((diagnosis.mistake, diagnosis.sentence), []).append(diagnosis)
-    merged = []
-    for first, *others in same.values():
-        places = [place for one in (first, *others) for place in one.where.split(", ")]
-        entries = tuple(dict.fromkeys(entry for one in (first, *others) for entry in one.entries))
-        # What is no quantity, a link or a parameter, comes last.
-        ordered = sorted(dict.fromkeys(places), key=lambda place: not place[:1].isalpha() or " " in place)
-        merged.append(replace(first, where=", ".join(ordered), entries=entries) if others else first)
-    return merged
+    return merged(found)
 
 
 def _take(
@@ -116,40 +107,6 @@ def _take(
             left.pop(name, None)
 
 
-def _wrong_entries(quantity: JudgedQuantity) -> list[Index]:
-    return [index for index, finding in quantity.findings.items() if finding.verdict is Verdict.WRONG]
-
-
-def _names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...]:
-    return tuple(Entry(quantity.name, index, Verdict.WRONG).name for index in indices)
-
-
-def _diagnosis(
-    variants: Sequence[Variant], quantities: Sequence[JudgedQuantity], indices: Sequence[Index] = ()
-) -> Diagnosis:
-    """Return what is said of mistakes that all give the same answers, the likeliest first."""
-    first = variants[0]
-    entries = tuple(name for quantity in quantities for name in _names(quantity, indices or _wrong_entries(quantity)))
-    places = [quantity.name for quantity in quantities] if not indices else entries
-    where = ", ".join([*places, *([first.place] if first.place else [])])
-    distinct: dict[str, Variant] = {}
-    for variant in variants:
-        if variant.rarity == first.rarity:
-            distinct.setdefault(variant.identity, variant)
-    if 1 < len(distinct) <= MAX_ALTERNATIVES:
-        listed = "; or: ".join(_clause(variant) for variant in distinct.values())
-        sentence = f"One of these: {listed}."
-    else:
-        sentence = sentence_of(first.identity, first.place)
-    equivalent = tuple(dict.fromkeys(v.called for v in variants if v.called != first.called))
-    return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
-
-
-def _clause(variant: Variant) -> str:
-    sentence = LIBRARY[variant.identity].sentence
-    return f"{variant.place}: {sentence}" if variant.place else sentence
-
-
 # Degrees
 
 
@@ -158,9 +115,7 @@ def _degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[st
     found: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
         if name != "C" and any(_is_right_in(truth, quantity, factor) for factor in IN_DEGREES):
-            mistake = "degrees_for_radians"
-            entries = _names(quantity, _wrong_entries(quantity))
-            found[(name,)] = Diagnosis(mistake, sentence_of(mistake), name, entries, hint_of(mistake))
+            found[(name,)] = diagnosis_of_identity("degrees_for_radians", quantity, wrong_entries(quantity), name)
     return found
 
 
@@ -199,7 +154,7 @@ def _single(
             candidates[name] = _tables(truth, quantity).whole(name, differences)
     ranked = _greedily(candidates, lambda variant: _contradicted(truth, judged, variant))
     return {
-        names: _diagnosis(variants, [wrong[name] for name in names])
+        names: diagnosis_of(variants, [wrong[name] for name in names])
         for names, variants in ranked.items()
         if allowed(variants[0].rarity)
     }
@@ -256,7 +211,7 @@ def _nearly(truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int) -> d
         likely = _tables(truth, quantity).near(name, quantity.truth, _numbers(truth, quantity))
         variants = [variant for variant in likely if _gives(truth, variant, quantity, by)]
         if variants:
-            found[(name,)] = _diagnosis(variants, [quantity])
+            found[(name,)] = diagnosis_of(variants, [quantity])
     return found
 
 
@@ -283,15 +238,14 @@ def _too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity
     if name in ("C", "V", "L"):
         return []
     by = Comparison(truth.arm(name), Reading(truth.arm(name).ring, others=truth.others(name)), LEAST_DIGITS)
-    wrong = set(_wrong_entries(quantity))
+    wrong = set(wrong_entries(quantity))
     for entry in quantity.given:
         if entry.index in wrong:
             if entry.tree is None or not has_decimals(entry.tree, LEAST_DIGITS):
                 return []
             if not equal(entry.tree, quantity.truth[entry.index], by):
                 return []
-    mistake = "too_few_digits"
-    return [Diagnosis(mistake, sentence_of(mistake), name, _names(quantity, sorted(wrong)), hint_of(mistake))]
+    return [diagnosis_of_identity("too_few_digits", quantity, sorted(wrong), name)]
 
 
 # Slips in single terms
@@ -304,7 +258,7 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         slip = _slip_in_C(truth, quantity, index) if quantity.name == "C" else _slip(truth, quantity, index)
         if slip is None or _mirrored(quantity, index) or _factor(quantity, index):
             return []
-        found.append(_of_slip(quantity, index, slip))
+        found.append(diagnosis_of_slip(quantity, index, slip))
     if len({one.sentence for one in found}) > 1 and (rare := _rare(truth, judged, quantity)):
         return rare
     differences = quantity.differences
@@ -350,12 +304,6 @@ def _is_weight(truth: Truth, difference: Element) -> bool:
     return not places or all(any(monomial[k] for k in places) for monomial in difference.terms)
 
 
-def _of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Diagnosis:
-    (entry,) = _names(quantity, [index])
-    sentence = sentence_of(slip.identity, "", slip.detail)
-    return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
-
-
 # Rarer mistakes
 
 
@@ -380,7 +328,7 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
     if quantity.name not in ("tau", "L") or not differences:
         return []
     tables = _tables(truth, quantity)
-    split = _split(truth, quantity.name, differences)
+    split = split_in_parts(truth, quantity.name, differences)
     parts = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
     right = {part: whole for part, whole in split.items() if part not in parts}
 
@@ -392,7 +340,7 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         for part, whole in parts.items()
     }
     explained = _greedily(candidates, lambda variant: 0)
-    found = [_diagnosis(variants, [quantity]) for variants in explained.values()]
+    found = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
     left = [part for part in parts if not any(part in names for names in explained)]
     if not found and len(parts) == len(split):
         return []
@@ -408,41 +356,15 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
         if difference.is_zero:
             continue
         place = index[: len(quantity.truth.shape)]
-        (entry,) = _names(quantity, [place])
+        (entry,) = entry_names(quantity, [place])
         right = truth.of(part)[index]
         slip = slip_in(truth.arm(part), right + difference, right)
         if slip is not None:
-            found.append(_of_slip(quantity, place, slip))
+            found.append(diagnosis_of_slip(quantity, place, slip))
             continue
         excess = plain_text(readable(truth.arm(quantity.name), difference))
         found.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
     return found
-
-
-def _split(truth: Truth, name: str, differences: Differences) -> dict[str, Differences]:
-    """Split by what the terms are multiplied by; torques of accelerations give M's entries."""
-    ring = next(iter(differences.values())).ring
-    n = ring.n
-    accelerations = [ring.place("acceleration", i) for i in range(n)]
-    rates = [ring.place("rate", i) for i in range(n)]
-    parts: dict[str, dict[Index, Element]] = {"M": {}, "h": {}, "g": {}} if name == "tau" else {"K": {}, "V": {}}
-    for index, element in differences.items():
-        moving = {m: c for m, c in element.terms.items() if any(m[k] for k in rates)}
-        resting = {m: c for m, c in element.terms.items() if not any(m[k] for k in (*rates, *accelerations))}
-        if name == "L":
-            parts["K"][index], parts["V"][index] = ring.from_terms(moving), -ring.from_terms(resting)
-            continue
-        parts["h"][index], parts["g"][index] = ring.from_terms(moving), ring.from_terms(resting)
-        by_joint = [_coefficient(element, k) for k in accelerations]
-        for j in range(n):
-            parts["M"][*index, j] = ring.sum(by_joint[k] * int(truth.coordinates.B[k, j]) for k in range(n))
-    return parts  # type: ignore[return-value]
-
-
-def _coefficient(element: Element, place: int) -> Element:
-    """Return what an acceleration is multiplied by."""
-    terms = {(*m[:place], 0, *m[place + 1 :]): c for m, c in element.terms.items() if m[place] == 1}
-    return element.ring.from_terms(terms)
 
 
 def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
@@ -454,7 +376,7 @@ def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQu
     pair = _tables(truth, quantity).pair(quantity.name, differences)
     if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):
         return []
-    return [_diagnosis([variant], [quantity]) for variant in pair]
+    return [diagnosis_of([variant], [quantity]) for variant in pair]
 
 
 # Entry by entry
@@ -471,7 +393,7 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
         if plain is not None:
             found.append(plain)
         elif slip is not None:
-            found.append(_of_slip(quantity, index, slip))
+            found.append(diagnosis_of_slip(quantity, index, slip))
         elif difference is not None:
             candidates[index] = _tables(truth, quantity).entry(quantity.name, index, difference)
         else:
@@ -479,7 +401,7 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
     for indices, variants in _greedily(candidates, lambda variant: 0).items():
         if len(indices) == 1 and quantity.name not in DYNAMICS:
             continue  # of transforms' entries many look alike
-        diagnosis = _diagnosis(variants, [quantity], indices)
+        diagnosis = diagnosis_of(variants, [quantity], indices)
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
         found.append(replace(diagnosis, sentence=alone))
         candidates = {index: v for index, v in candidates.items() if index not in indices}
@@ -488,7 +410,7 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
 
 def _distinct(quantity: JudgedQuantity) -> list[Index]:
     """Return wrong entries, of C one a row."""
-    wrong = _wrong_entries(quantity)
+    wrong = wrong_entries(quantity)
     if quantity.name != "C":
         return wrong
     rows = {place_of("C", index): index for index in reversed(wrong)}
@@ -498,9 +420,8 @@ def _distinct(quantity: JudgedQuantity) -> list[Index]:
 def _mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
     if quantity.name != "M" or index[0] == index[1] or not quantity.findings[index[::-1]].verdict.passes:
         return None
-    name = "mass_matrix_not_symmetric"
-    (entry,) = _names(quantity, [index])
-    return Diagnosis(name, sentence_of(name), entry, (entry,), hint_of(name))
+    (entry,) = entry_names(quantity, [index])
+    return diagnosis_of_identity("mass_matrix_not_symmetric", quantity, [index], entry)
 
 
 def _factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
@@ -509,14 +430,14 @@ def _factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
         return None
     for name, factor in FACTORS.items():
         if difference == right * (factor - 1):
-            (entry,) = _names(quantity, [index])
-            return Diagnosis(name, sentence_of(name), entry, (entry,), hint_of(name))
+            (entry,) = entry_names(quantity, [index])
+            return diagnosis_of_identity(name, quantity, [index], entry)
     return None
 
 
 def _described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
     finding, right = quantity.findings[index], quantity.right(index)
-    (entry,) = _names(quantity, [index])
+    (entry,) = entry_names(quantity, [index])
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
         words = finding.statement

@@ -1,0 +1,149 @@
+"""Formulas in which parts are replaced: names, calls of functions, equal parts; what stays is shared."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.grading.judging.numeric import parts_of
+
+__all__ = [
+    "applied",
+    "equal_parts",
+    "exchanged",
+    "has_call",
+    "leaf_text",
+    "minus",
+    "operands",
+    "product_of",
+    "renamed",
+    "replaced_everywhere",
+    "square_of",
+    "times",
+    "with_calls_changed",
+    "with_operands",
+]
+
+
+def renamed(tree: Tree, change: Mapping[str, Tree]) -> Tree:
+    """Return a formula with names and numbers replaced, all at once; ``change`` is by :func:`leaf_text`."""
+    if isinstance(tree, Name | Number):
+        return change.get(leaf_text(tree), tree)
+    return with_operands(tree, [renamed(child, change) for child in operands(tree)])
+
+
+def leaf_text(leaf: Name | Number) -> str:
+    """Return what a name or a number is known by, however it was written."""
+    return leaf.text if isinstance(leaf, Name) else str(leaf.value)
+
+
+def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
+    """Return by the id of each part of some formulas the ids of all parts that are equal to it."""
+    places: dict[str, list[int]] = defaultdict(list)
+    for tree in trees:
+        for part, text in _texts(tree):
+            places[text].append(id(part))
+    return {place: frozenset(same) for same in places.values() for place in same}
+
+
+def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
+    """Return a formula with its parts of these ids replaced."""
+    if id(tree) in places:
+        return new
+    return with_operands(tree, [replaced_everywhere(child, places, new) for child in operands(tree)])
+
+
+def has_call(tree: Tree, functions: Sequence[str]) -> bool:
+    """Whether a formula calls one of some functions."""
+    return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
+
+
+def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
+    """Return a formula with all its calls of some functions changed; the formula itself where it has none."""
+    changed = with_operands(tree, [with_calls_changed(child, functions, change) for child in operands(tree)])
+    return change(changed) if isinstance(changed, Call) and changed.function in functions else changed
+
+
+def minus(tree: Tree) -> Tree:
+    """Return a formula with a minus in front."""
+    return Sum(((False, tree),))
+
+
+def operands(tree: Tree) -> tuple[Tree, ...]:
+    """Return what a formula's outermost operation is made of; nothing for a name or a number."""
+    match tree:
+        case Call(_, arguments):
+            return arguments
+        case Power(base, exponent):
+            return base, exponent
+        case Product(parts) | Sum(parts):
+            return tuple(part for _, part in parts)
+    return ()
+
+
+def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
+    """Return a formula's outermost operation of others; the formula itself where they are the same."""
+    if all(new is old for new, old in zip(children, operands(tree), strict=True)):
+        return tree
+    match tree:
+        case Call():
+            return replace(tree, arguments=tuple(children))
+        case Power():
+            return replace(tree, base=children[0], exponent=children[1])
+        case Product(parts):
+            return Product(tuple((up, child) for (up, _), child in zip(parts, children, strict=True)))
+        case Sum(parts):
+            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
+    return tree
+
+
+def exchanged(call: Call) -> Tree:
+    """Return a call with its arguments the other way round."""
+    return replace(call, arguments=call.arguments[::-1])
+
+
+def product_of(factors: Sequence[tuple[bool, Tree]]) -> Tree:
+    """Return a product; 1 without factors."""
+    return Product(tuple(factors)) if factors else Number(Fraction(1), "1", 0)
+
+
+def times(tree: Tree, factor: Tree) -> Tree:
+    """Return a formula times another."""
+    return Product(((True, tree), (True, factor)))
+
+
+def square_of(tree: Tree) -> Tree:
+    """Return a formula's square."""
+    return Power(tree, Number(Fraction(2), "2", 0), 0)
+
+
+def applied(function: str, argument: Tree) -> Tree:
+    """Return a function of a formula."""
+    return Call(function, (argument,), 0)
+
+
+def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
+    """Yield a formula's parts with texts that equal parts share, the whole last."""
+    inner = []
+    for child in operands(tree):
+        found = list(_texts(child))
+        yield from found
+        inner.append(found[-1][1])
+    match tree:
+        case Number(value=value):
+            yield tree, str(value)
+        case Name(text):
+            yield tree, text
+        case Call(function):
+            yield tree, f"{function}({', '.join(inner)})"
+        case Power():
+            yield tree, f"({inner[0]})^({inner[1]})"
+        case Product(parts):
+            factors = (("*" if up else "/") + text for (up, _), text in zip(parts, inner, strict=True))
+            yield tree, f"[{''.join(factors)}]"
+        case Sum(parts):
+            terms = (("+" if added else "-") + text for (added, _), text in zip(parts, inner, strict=True))
+            yield tree, f"({''.join(terms)})"

@@ -1,0 +1,83 @@
+"""Mistakes as diagnoses: their sentences, where they are made, and which entries they explain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from dhkit.grading.judging.quantities import JudgedQuantity
+from dhkit.grading.mistakes.diagnosis import Index
+from dhkit.grading.mistakes.library import LIBRARY, hint_of, sentence_of
+from dhkit.grading.mistakes.slips import Slip
+from dhkit.grading.mistakes.variants import Variant
+from dhkit.grading.report import Diagnosis, Entry, Verdict
+
+__all__ = ["diagnosis_of", "diagnosis_of_identity", "diagnosis_of_slip", "entry_names", "merged", "wrong_entries"]
+
+MAX_ALTERNATIVES = 3
+"""Mistakes that give the same answers and are named in one sentence."""
+
+
+def merged(found: Sequence[Diagnosis]) -> list[Diagnosis]:
+    """Return diagnoses, those that say the same of several quantities as one."""
+    same: dict[tuple[str | None, str], list[Diagnosis]] = {}
+    for diagnosis in found:
+        same.setdefault((diagnosis.mistake, diagnosis.sentence), []).append(diagnosis)
+    merged = []
+    for first, *others in same.values():
+        places = [place for one in (first, *others) for place in one.where.split(", ")]
+        entries = tuple(dict.fromkeys(entry for one in (first, *others) for entry in one.entries))
+        # What is no quantity, a link or a parameter, comes last.
+        ordered = sorted(dict.fromkeys(places), key=lambda place: not place[:1].isalpha() or " " in place)
+        merged.append(replace(first, where=", ".join(ordered), entries=entries) if others else first)
+    return merged
+
+
+def wrong_entries(quantity: JudgedQuantity) -> list[Index]:
+    """Return where a quantity is wrong."""
+    return [index for index, finding in quantity.findings.items() if finding.verdict is Verdict.WRONG]
+
+
+def entry_names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...]:
+    """Return entries as people write them: M12."""
+    return tuple(Entry(quantity.name, index, Verdict.WRONG).name for index in indices)
+
+
+def diagnosis_of(
+    variants: Sequence[Variant], quantities: Sequence[JudgedQuantity], indices: Sequence[Index] = ()
+) -> Diagnosis:
+    """Return what is said of mistakes that all give the same answers, the likeliest first."""
+    first = variants[0]
+    entries = tuple(
+        name for quantity in quantities for name in entry_names(quantity, indices or wrong_entries(quantity))
+    )
+    places = [quantity.name for quantity in quantities] if not indices else entries
+    where = ", ".join([*places, *([first.place] if first.place else [])])
+    distinct: dict[str, Variant] = {}
+    for variant in variants:
+        if variant.rarity == first.rarity:
+            distinct.setdefault(variant.identity, variant)
+    if 1 < len(distinct) <= MAX_ALTERNATIVES:
+        listed = "; or: ".join(_clause(variant) for variant in distinct.values())
+        sentence = f"One of these: {listed}."
+    else:
+        sentence = sentence_of(first.identity, first.place)
+    equivalent = tuple(dict.fromkeys(v.called for v in variants if v.called != first.called))
+    return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
+
+
+def _clause(variant: Variant) -> str:
+    sentence = LIBRARY[variant.identity].sentence
+    return f"{variant.place}: {sentence}" if variant.place else sentence
+
+
+def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Diagnosis:
+    """Return what is said of a slip in a term of one entry."""
+    (entry,) = entry_names(quantity, [index])
+    sentence = sentence_of(slip.identity, "", slip.detail)
+    return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
+
+
+def diagnosis_of_identity(identity: str, quantity: JudgedQuantity, indices: Sequence[Index], where: str) -> Diagnosis:
+    """Return what is said of a mistake that is made nowhere in particular."""
+    return Diagnosis(identity, sentence_of(identity), where, entry_names(quantity, indices), hint_of(identity))
