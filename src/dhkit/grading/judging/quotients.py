@@ -24,6 +24,8 @@ WEIGHED_BITS = 256
 MAX_TERMS = 60_000
 MAX_BITS = 8_192
 """Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
+MAX_DIVISORS = 16
+"""Divisors that are kept, to say where an entry is undefined."""
 CHECKED = 64
 """Terms of a sum after which its coefficients' size is measured."""
 TOO_LONG = "a number too long to be kept exactly"
@@ -91,6 +93,8 @@ class Reading:
         self.others = others or {}
         self.degrees = degrees
         self.moved: Mapping[int, Fraction] = {}
+        self.divisors: list[Element] = []
+        """What the last entry divides by, numbers left out: where one is zero, the entry is undefined."""
         self._work = 0
         self._shared: dict[int, Quotient] = {}
         self._angles: dict[Expression, tuple[Element, Element]] = {}
@@ -214,7 +218,9 @@ class Reading:
 
     def _divides_by(self, element: Element) -> None:
         """Note a divisor that is no number."""
-        if _rational(element) is None and not any(element == other for other in self.divisors):
+        if _rational(element) is not None or len(self.divisors) >= MAX_DIVISORS:
+            return
+        if not any(element.polynomial == other.polynomial for other in self.divisors):
             self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:

@@ -28,6 +28,7 @@ from dhkit.grading.mistakes.terms import describe
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.mistakes.wording import (
     diagnosis_of,
+    diagnosis_of_identity,
     diagnosis_of_slip,
     entry_names,
     merged,
