@@ -69,7 +69,9 @@ def test_fk_takes_configurations_expressions_and_degrees(dhkit):
 def test_info_lists_the_bodies_of_a_link_that_has_several(dhkit, tmp_path):
     path = tmp_path / "loaded.toml"
     write_robot(Arm.load("planar2r").with_payload(0.5, (0.1, 0, 0)).description, path)
-    assert "link 2: body 1 of 1.5 kg at (-0.2, 0, 0) m, payload of 0.5 kg at (0.1, 0, 0) m" in dhkit("info", str(path))[1]
+    assert (
+        "link 2: body 1 of 1.5 kg at (-0.2, 0, 0) m, payload of 0.5 kg at (0.1, 0, 0) m" in dhkit("info", str(path))[1]
+    )
     bodies = json.loads(dhkit("info", str(path), "--json")[1])["joints"][1]["bodies"]
     assert bodies[1] == {"name": "payload", "mass": 0.5, "com": [0.1, 0.0, 0.0]}
 

@@ -46,7 +46,9 @@ def show(arm: Arm, json: bool) -> None:
     print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "assumed"), rows)
     for i, joint in enumerate(description.joints, start=1):
         if len(joint.bodies) > 1:
-            listed = (f"{one['name']} of {one['mass']:.4g} kg at {_vector(one['com'])} m" for one in _bodies(joint, arm))
+            listed = (
+                f"{one['name']} of {one['mass']:.4g} kg at {_vector(one['com'])} m" for one in _bodies(joint, arm)
+            )
             say(f"link {i}: {', '.join(listed)}")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")

@@ -92,7 +92,6 @@ class Reading:
         self.ring = ring
         self.others = others or {}
         self.degrees = degrees
-        self.moved: Mapping[int, Fraction] = {}
         self.divisors: list[Element] = []
         """What the last entry divides by, numbers left out: where one is zero, the entry is undefined."""
         self._work = 0
