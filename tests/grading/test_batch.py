@@ -293,7 +293,9 @@ def test_files_are_taken_as_they_are_and_folders_searched(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("name", ["notes.txt", "answer.docx", "scan.PDF", "answer.mlx", "answer", "data.csv", "a.py.bak"])
+@pytest.mark.parametrize(
+    "name", ["notes.txt", "answer.docx", "scan.PDF", "answer.mlx", "answer", "data.csv", "a.py.bak"]
+)
 def test_what_is_not_read_is_said(tmp_path, name):
     (tmp_path / "ada").mkdir()
     (tmp_path / "bob").mkdir()
