@@ -247,6 +247,8 @@ def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocab
             notes.append(Note(NoteKind.NUMBERS, name, listed))
         contradictory = (Entry(name, index, Verdict.WRONG).name for index in quantity.contradictions)
         notes += [Note(NoteKind.SIDES_DIFFER, entry) for entry in contradictory]
+        unread = (Entry(name, given.index, Verdict.WRONG).name for given in quantity.given if given.is_partly_read)
+        notes += [Note(NoteKind.SIDES_UNREAD, entry) for entry in unread]
     if "C" in judged:
         notes += _about_C(truth, judged["C"])
     notes += [Note(NoteKind.TAKEN_FOR, values=(typed, meant)) for typed, meant in vocabulary.taken_for.items()]

@@ -146,6 +146,8 @@ class NoteKind(Enum):
     """A quantity holds parameters as numbers: ``values`` has a text such as ``l2 = 0.4`` for each."""
     SIDES_DIFFER = "sides_differ"
     """The sides of an entry's chain of equations differ; the last one is judged."""
+    SIDES_UNREAD = "sides_unread"
+    """A side of an entry's chain of equations before the last could not be read, and was not held against it."""
     CHRISTOFFEL = "christoffel"
     """C is the factorization of the Christoffel symbols."""
     SKEW = "skew"

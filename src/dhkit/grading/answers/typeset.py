@@ -28,7 +28,7 @@ def typeset(tree: Tree) -> tuple[str, str]:
     --------
     >>> from dhkit.expressions import read
     >>> typeset(read("m1/2*cos(q1)^2"))
-    ('m1/2*cos(q1)^2', '\\\\frac{m_{1}}{2} \\\\cos(q_{1})^{2}')
+    ('m1/2*cos(q1)^2', '\\frac{m_{1}}{2} \\cos(q_{1})^{2}')
     """
     if _size(tree, MAX_NODES) > MAX_NODES:
         return "", ""

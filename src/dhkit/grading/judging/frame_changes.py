@@ -61,8 +61,11 @@ class FrameChange:
         return self.change.value.format(number=self.number, vector=vector, first=next(iter(self.values), 0.0))
 
 
-def frame_changes(i: int, D: Array) -> Iterator[FrameChange]:
-    """Yield how frame i differs from the file's; D is its pose in the file's frame i, shape (4, 4)."""
+def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
+    """Yield how frame i differs from the file's; D is its pose in the file's frame i, shape (4, 4).
+
+    Lengths that differ by the tolerance, m, are the same.
+    """
     if abs(abs(D[2, 2]) - 1) > SAME:
         yield FrameChange(Change.Z_ELSEWHERE, i, _vector(D[:3, 2]))
     elif D[2, 2] < 0:
@@ -74,20 +77,23 @@ def frame_changes(i: int, D: Array) -> Iterator[FrameChange]:
         yield FrameChange(Change.X_ELSEWHERE, i, _vector(D[:3, 0]))
     elif not abs(angle) < SAME:
         yield FrameChange(Change.X_TURNED, i, (float(np.degrees(angle)),))
-    if np.max(np.abs(D[:2, 3])) > SAME:
+    if np.max(np.abs(D[:2, 3])) > tolerance:
         yield FrameChange(Change.ORIGIN_ELSEWHERE, i, _vector(D[:3, 3]))
-    elif abs(D[2, 3]) > SAME:
+    elif abs(D[2, 3]) > tolerance:
         yield FrameChange(Change.FRAME_SLID, i, (float(D[2, 3]),))
 
 
-def joint_changes(i: int, is_revolute: bool, sense: float, offset: float) -> Iterator[FrameChange]:
-    """Yield how joint i, from 1, counts: its sense, +1 or -1, and the file's value at its zero, rad or m."""
+def joint_changes(i: int, is_revolute: bool, sense: float, offset: float, tolerance: float) -> Iterator[FrameChange]:
+    """Yield how joint i, from 1, counts: its sense, +1 or -1, and the file's value at its zero, rad or m.
+
+    Lengths that differ by the tolerance, m, are the same.
+    """
     if sense < 0:
         yield FrameChange(Change.JOINT_REVERSED, i)
     offset = wrapped(offset) if is_revolute else offset
     if is_revolute and abs(abs(offset) - np.pi) < SAME:
         yield FrameChange(Change.JOINT_HALF_TURN, i)
-    elif abs(offset) > SAME:
+    elif abs(offset) > (SAME if is_revolute else tolerance):
         change = Change.JOINT_TURNED if is_revolute else Change.JOINT_SLID
         yield FrameChange(change, i, (float(np.degrees(offset)) if is_revolute else float(offset),))
 

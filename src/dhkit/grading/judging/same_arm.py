@@ -81,20 +81,27 @@ class Overlay:
         return len(self.changes), sum(found.change.concerns_joint for found in self.changes)
 
     @property
+    def scale(self) -> float:
+        """The sum of the arm's lengths, m; 1 where there are none."""
+        return _scale(self.truth)
+
+    @property
     def moves_zero(self) -> bool:
         """Whether a joint variable counts from another zero, or the other way round."""
         return any(
-            sense < 0 or abs(wrapped(offset) if kind == "R" else offset) > SAME
+            sense < 0 or (abs(wrapped(offset)) > SAME if kind == "R" else abs(offset) > SAME * self.scale)
             for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True)
         )
 
     @cached_property
     def changes(self) -> tuple[FrameChange, ...]:
         """Which frames and joint variables differ, and how."""
-        found = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D)]
+        # A wrong number is no choice of frames: lengths are told apart as finely as arms are.
+        tolerance = SAME * self.scale
+        found = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D, tolerance)]
         joints = zip(self.truth.kinds, self.senses, self.offsets, strict=True)
         for i, (kind, sense, offset) in enumerate(joints, start=1):
-            found += joint_changes(i, kind == "R", float(sense), float(offset))
+            found += joint_changes(i, kind == "R", float(sense), float(offset), tolerance)
         return tuple(found)
 
 
@@ -105,9 +112,13 @@ def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
     return free
 
 
+def _scale(arm: TableArm) -> float:
+    return float(np.sum(np.abs(arm.entries[:, 1:3]))) or 1.0
+
+
 def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
     """Return how two arms are one, with the fewest changes; None where they are not."""
-    scale = float(np.sum(np.abs(truth.entries[:, 1:3]))) or 1.0
+    scale = _scale(truth)
     matching = _Matching(answer, truth, scale)
     if not matching.links_agree:
         return None

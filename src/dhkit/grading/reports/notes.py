@@ -25,6 +25,7 @@ SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.DISAGREES: "{quantity} is not {agreement}",
     NoteKind.NUMBERS: "{quantity}: judged at the file's numbers: {values}",
     NoteKind.SIDES_DIFFER: "{quantity}: the sides of its chain of equations differ; the last one is judged",
+    NoteKind.SIDES_UNREAD: "{quantity}: a side of its chain of equations could not be read; the last one is judged",
     NoteKind.CHRISTOFFEL: "C: judged by C qd; it is the one of the Christoffel symbols, so dM/dt - 2 C is "
     "skew-symmetric",
     NoteKind.SKEW: "C: judged by C qd; it is another valid factorization than that of the Christoffel symbols, and "
