@@ -34,6 +34,8 @@ __all__ = [
 ]
 
 LEFT_EMPTY = "left empty"
+KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
+"""Other names of the kinetic energy; T is a quantity of its own too."""
 BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
 """How the one entry of a matrix begins that stands in brackets."""
 POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
@@ -157,7 +159,10 @@ def with_entries_gathered(answers: Mapping[str, Any], names: QuantityNames) -> d
         if len(targets) > 1:
             raise AnswerError(f"{name}: may be {' or '.join(map(str, targets))}; write M_1_12 or M_11_2")
         if targets and targets[0].index is not None:
-            entries.setdefault(targets[0].quantity, {})[targets[0].index] = value
+            own = entries.setdefault(targets[0].quantity, {})
+            if targets[0].index in own:
+                raise AnswerError(f"{name}: {targets[0]} is given twice; expected each entry once")
+            own[targets[0].index] = value
         else:
             gathered[name] = value
     for quantity, texts in entries.items():
@@ -211,12 +216,26 @@ def _stated(target: Target, text: str, names: QuantityNames) -> str | Chain:
         problem = statements[0].problem if len(statements) == 1 else f"{len(statements)} statements"
         raise AnswerError(f"{shown(text)}: {problem}; expected one formula")
     (statement,) = statements
+    if not statement.formulas:
+        return text
+    if not statement.targets:
+        raise AnswerError(f"{shown(text)}: begins with {shown(statement.formulas[0])}, which is no name of {target}")
     for name in statement.targets:
-        meant = [one for one in names.entries(name) if one.quantity == target.quantity]
-        other = names.quantity(name) not in ("", target.quantity) or names.is_parameter(name)
-        if other or (meant and target not in meant) or names.vocabulary.is_state(name):
+        if not _may_stand_for(name, target, names):
             raise AnswerError(f"{shown(text)}: states {name}, and stands where {target} is expected")
-    return _formulas(statement) if statement.formulas else text
+    return _formulas(statement)
+
+
+def _may_stand_for(name: str, target: Target, names: QuantityNames) -> bool:
+    """Whether a name may stand in front of an entry: its own, its quantity's, or one that means nothing else."""
+    if name in KINETIC:
+        return target.quantity == "K"
+    entries = names.entries(name)
+    if target in entries or names.quantity(name) == target.quantity:
+        return True
+    letters = name.rstrip("0123456789_")
+    is_taken = bool(entries or names.quantity(name) or names.quantity(letters)) or names.is_parameter(name)
+    return not (is_taken or names.vocabulary.knows(name))
 
 
 def _from_entries(

@@ -13,7 +13,18 @@ from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.numeric import TooLargeError, doubles, many_digits, names_of, parts_of, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
 from dhkit.grading.judging.rounding import Residuals, rounding_share
-from dhkit.grading.judging.sampling import DIGITS, SAMPLES, Sample, checked, differ, element_value, samples, show_state
+from dhkit.grading.judging.sampling import (
+    ANSWER_DIGITS,
+    DIGITS,
+    FEWER_DIGITS,
+    SAMPLES,
+    Sample,
+    checked,
+    differ,
+    element_value,
+    samples,
+    show_state,
+)
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import latex_text, plain_text
@@ -190,6 +201,8 @@ MAX_EVALUATIONS = 300_000
 LEAST_STATES = 15
 """An answer too long to be evaluated at so many states cannot be judged."""
 TRIED = 24
+CHECKED = 10
+"""States after which it is checked that an answer does not lose its digits."""
 GROUP = 100
 """States that share parameters where an energy's zero is free."""
 
@@ -251,20 +264,49 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
         for k, state in enumerate(states):
             right = element_value(truth, state)
             try:
-                value = checked(many_digits(tree, state.names))
+                value = _worked_out(tree, state, right, reason, check=k % CHECKED == 0)
             except TooLargeError as error:
                 raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
+            except LostDigitsError as error:
+                raise AnswerError(str(error)) from None
             except AnswerError as error:
                 return _different(state, used, None, right, f"{error} there")
             if by.up_to_constant and k % GROUP == 0:
                 shift = value - right  # energies count from any zero
             if differ(value - shift, right):
+                _worked_out(tree, state, right, reason, check=True)
                 return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
     return Finding(
         Verdict.UNDECIDED,
         f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {len(states)} "
-        "random states in 50 digits, to 25 of them",
+        f"random states in {ANSWER_DIGITS} digits, to 25 of them",
     )
+
+
+class LostDigitsError(AnswerError):
+    """An answer whose terms cancel so far that the digits do not tell it from another."""
+
+
+def _worked_out(tree: Tree, state: Sample, right: Any, reason: str, check: bool) -> Any:
+    """Return an answer's value at a state; with a check that fewer digits give the same.
+
+    Raises
+    ------
+    LostDigitsError
+        They do not.
+    """
+    import mpmath
+
+    with mpmath.workdps(ANSWER_DIGITS):
+        value = checked(many_digits(tree, state.names))
+    if check:
+        with mpmath.workdps(FEWER_DIGITS):
+            fewer = checked(many_digits(tree, state.names))
+        if differ(fewer, value):
+            raise LostDigitsError(
+                f"outside the exact ring ({reason}), and cancels so far that {FEWER_DIGITS} digits do not decide it"
+            )
+    return value
 
 
 def _different(state: Sample, used: set[str], value: Any, right: Any, why: str) -> Finding:

@@ -24,7 +24,7 @@ SAMPLES = 1_000
 TOLERANCE = 1e-9
 """Relative to a quantity's largest entry in a state: a student's doubles, with room for a long formula's rounding."""
 STATES = ("q", "qd", "qdd")
-LIMITS = Limits(seconds=30.0, memory=2 * 1024**3)
+LIMITS = Limits(seconds=15.0, memory=2 * 1024**3)
 """Of the process that calls a function at all states: one that hangs or exits ends itself alone."""
 FAILED = b"!"
 """How a worker's result begins that is a message and no array."""
@@ -108,7 +108,10 @@ def _arguments(name: str, function: Callable[..., Any]) -> int:
 
 def _called(name: str, function: Callable[..., Any], arguments: list[Array], shape: tuple[int, ...]) -> Array:
     try:
-        result = np.asarray(function(*arguments), dtype=float)
+        returned = np.asarray(function(*arguments))
+        if np.iscomplexobj(returned):
+            raise TypeError("complex numbers; expected real ones")
+        result = returned.astype(float)
     except Exception as error:
         raise AnswerError(f"{name}: the function fails: {type(error).__name__}: {str(error)[:200]}") from error
     if result.size != np.prod(shape, dtype=int):

@@ -17,10 +17,25 @@ from dhkit.symbolic.ring import Element
 if TYPE_CHECKING:
     from mpmath import mpf
 
-__all__ = ["DIGITS", "SAMPLES", "Sample", "checked", "differ", "element_value", "samples", "show_state"]
+__all__ = [
+    "ANSWER_DIGITS",
+    "DIGITS",
+    "FEWER_DIGITS",
+    "SAMPLES",
+    "Sample",
+    "checked",
+    "differ",
+    "element_value",
+    "samples",
+    "show_state",
+]
 
 SAMPLES = 1_000
 DIGITS = 50
+ANSWER_DIGITS = 200
+"""Digits in which answers are worked out: what cancels in them must leave as many as the truth has."""
+FEWER_DIGITS = 120
+"""Digits in which an answer is worked out again, to see whether it loses too many."""
 TOLERANCE = 1e-25
 NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
 """Sizes of the states that are tried within one turn; rad or m, and seconds."""

@@ -252,9 +252,13 @@ class _Pairs:
         return None
 
 
-@lru_cache(maxsize=32)
 def variants_of(truth: Truth, numbers: frozenset[str] = frozenset()) -> Variants:
     """Return a robot's variants; the same object each time, so that nothing is derived twice."""
+    return _variants_of(truth, numbers)
+
+
+@lru_cache(maxsize=32)
+def _variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:
     return Variants(truth, numbers)
 
 

@@ -37,6 +37,7 @@ from dhkit.grading.mistakes.wording import (
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
+from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES
 
 __all__ = ["explain"]
 
@@ -166,7 +167,7 @@ def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: V
     count = 0
     for name, quantity in judged.items():
         right = [index for index, finding in quantity.findings.items() if finding.verdict.passes]
-        same_kind = (name in DYNAMICS) == (variant in variants_of(truth).dynamic)
+        same_kind = (name in DYNAMICS) == (variant.identity not in KINEMATIC_MISTAKES)
         if quantity.wrong or not right or not same_kind:
             continue
         count += not _tables(truth, quantity).changes_none(variant, name, right)
