@@ -187,14 +187,14 @@ def test_the_watch_lets_honest_answers_pass():
 # Entries
 
 
-TRIED = ("large power", "power of nine", "negative power", "cosine of many", "cosine of too many", "LaTeX catcode")
+TRIED = ("large power", "power of nine", "negative power", "cosine of many", "cosine of too many")
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_no_answer_is_refused(name):
     report = judged(lambda: grade_answers(PLANAR, {"V": made(REFUSED[name])}))
     check(report)
-    # What is too long for the exact ring is tried at random states: one that differs is wrong. So is x = 11 of V.
+    # What is too long for the exact ring is tried at random states: one that differs is wrong.
     assert report.verdict is (Verdict.WRONG if name in TRIED else Verdict.UNREADABLE)
 
 

@@ -318,3 +318,217 @@ def test_a_system_gives_several_statements():
     assert [(s.targets, s.formulas) for s in found] == [(("tau1",), ("a",)), (("tau2",), ("b",))]
     found = statements_of("g1 = a\ng2 = b;\n")
     assert [(s.line, s.targets, s.formulas) for s in found] == [(1, ("g1",), ("a",)), (2, ("g2",), ("b",))]
+
+
+# Found by adversaries: what stands behind comments, words, macros and & counts, or refuses
+
+M22 = r"\tfrac13 m_2 l_2^2"
+LESS = r"\tfrac14 m_2 l_2^2"
+M11 = r"\tfrac13 m_1 l_1^2 + m_2 (l_1^2 + \tfrac13 l_2^2 + l_1 l_2 c_2)"
+M12 = r"m_2 (\tfrac13 l_2^2 + \tfrac12 l_1 l_2 c_2)"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "V = a   # potential energy\n  + b",
+        "V = a % x\n + b",
+        "V = a   # = c; d\n  + b",
+        "V = a\n# the second link (of two\n + b",
+        "V = a + % first\n b",
+        "V = a % energy [J]\n + b;",
+        "V = a # it = 3\n\t+ b # end",
+    ],
+)
+def test_a_comment_hides_nothing_behind_its_line(text):
+    (statement,) = statements_of(text, ".txt")
+    assert [squeezed(formula) for formula in statement.formulas] == ["a+b"]
+
+
+def test_numbers_of_maxima_are_no_comments():
+    (statement,) = statements_of("V = %pi*a + %e\n + %i", ".txt")
+    assert squeezed(statement.formulas[0]) == "%pi*a+%e+%i"
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        r"\begin{align} M_{22} = &A \\ = &B \end{align}",
+        r"\begin{align} M_{22} =& A \\ =& B \end{align}",
+        r"\begin{align*} M_{22} &= A \\ = &B \end{align*}",
+        r"\begin{eqnarray} M_{22} & = & A \\ & = & B \end{eqnarray}",
+        r"\begin{align} M_{22} & = & A \\ & = & B \end{align}",
+        r"\begin{gather} M_{22} \\ = A \\ = B \end{gather}",
+        r"\begin{align} M_{22} \equiv &A \\ \triangleq &B \end{align}",
+        r"\begin{align} M_{22} = {} &A \\ {} = {} &B \end{align}",
+        r"\begin{multline} M_{22} = A \\ = B \end{multline}",
+    ],
+)
+def test_a_row_that_begins_with_a_relation_goes_on(read, graded, rows):
+    (answer,) = read(rows.replace("A", "m_1 g").replace("B", "m_2 g")).answers["M"].texts.values()
+    assert [squeezed(formula) for formula in answer.formulas] == ["m_1g", "m_2g"]
+
+
+@pytest.mark.parametrize(("first", "second", "verdict"), [(M22, LESS, "wrong"), (LESS, M22, "correct")])
+def test_the_last_side_is_judged(graded, first, second, verdict):
+    text = rf"\begin{{align}} M_{{22}} = &{first} \\ = &{second} \end{{align}}"
+    assert verdict in [entry.verdict.value for entry in graded(text).entries]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\begin{align} M_{11} &= A & M_{22} &= B \\ &= C \end{align}",
+        r"\begin{align} M_{11} &= A & M_{22} &= B \\ &+ C & &+ D \end{align}",
+    ],
+)
+def test_a_row_that_may_go_on_with_two_equations(read, text):
+    answer = read(text).answers["M"].texts
+    assert all(isinstance(entry, Refusal) for entry in answer.values())
+
+
+@pytest.mark.parametrize(
+    "behind",
+    [
+        *(r"\text{ + 3} l_1", r"\text{ times } 2", r"\text{ minus } \theta_1", r"\mbox{$+ \theta_1$}"),
+        *(r"\text{$+\theta_1$}", r"\quad\text{if } m_1>3", r"\text{ plus three}", r"\textrm{ and also } + l_1"),
+        *(r"\text{, that is } = 3", r"\Rightarrow 3", r"\text{ (when folded)}", r"\text{ plus}", r"\text{ - 2}"),
+        *(r"\quad \text{(2 of 3)}", r"\text{ for } q_2 > 0", r"\text{ words } \\ l_1", r", \\ 2 l_1"),
+    ],
+)
+def test_words_that_may_change_a_formula_refuse_it(read, behind):
+    text = rf"\begin{{gather}} V = {V} {behind} \end{{gather}}"
+    answer = read("\n" + text).answers["V"]
+    assert isinstance(answer, Refusal)
+    assert "line 2" in answer.reason
+
+
+def test_words_in_front_of_a_formula_part_no_product(read):
+    assert isinstance(read(rf"\[ 2 \text{{ of these: }} V = {V} \]").answers["V"], Refusal)
+
+
+@pytest.mark.parametrize(
+    "behind",
+    [
+        *(r"\text{ (potential energy)}", r"\quad\text{where } x = 3", r", \quad \text{with } m_1 > 0", r"\text{.}"),
+        *(
+            r"\text{ and } a = 2",
+            r"\quad \text{(left-hand side).}",
+            r", \text{ for } i = 1, 2",
+            r"~\text{as required},",
+        ),
+    ],
+)
+def test_words_that_change_nothing(graded, behind):
+    (entry,) = graded(rf"\[ V = {V} {behind} \]").entries
+    assert entry.verdict.value == "correct"
+
+
+def test_a_value_of_a_joint_behind_a_formula_is_listed(read):
+    sheet = read(r"\[ V = m_1 g, \theta_1 = 3 \]")
+    assert sheet.answers == {"V": "m_1 g"}
+    assert sheet.left_out == (r"line 1: \theta_1 = 3",)
+
+
+GRAVITY_ROWS = r"\begin{bmatrix} A \\ B \end{bmatrix}".replace("A", f"{GRAVITY[0]} + {GRAVITY[1]}").replace(
+    "B", r"\tfrac12 m_2 g l_2 c_{12}"
+)
+
+
+@pytest.mark.parametrize(
+    "side",
+    [
+        r"\frac{\partial V}{\partial q}",
+        r"\left(\frac{\partial V}{\partial q}\right)^T",
+        r"\nabla_q V",
+        r"-\sum_i J_i^T m_i g",
+        r"\begin{bmatrix} \frac{\partial V}{\partial q_1} & \frac{\partial V}{\partial q_2} \end{bmatrix}^T",
+        r"\frac{1}{2} \begin{bmatrix} 1 \\ 2 \end{bmatrix} x",
+    ],
+)
+def test_a_chain_before_a_matrix(read, graded, side):
+    text = rf"\[ \bm g(q) = {side} = {GRAVITY_ROWS} \]"
+    assert [entry.verdict.value for entry in graded(text).entries] == ["correct"] * 2
+    assert any("line 1: a side of g's equation is not read" in note for note in read(text).notes)
+    wrong = text.replace("c_{12}", "s_{12}")
+    assert "wrong" in [entry.verdict.value for entry in graded(wrong).entries]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\def\theta{\phi} \[ V = m_1 g \sin\theta_1 \]",
+        r"\let\theta\phi \[ V = m_1 g \sin\theta_1 \]",
+        r"\renewcommand{\frac}[2]{#2/#1} \[ V = \frac{m_1}{g} \]",
+        r"\edef\cos{\sin} \[ V = \cos q_1 \]",
+        r"\DeclareDocumentCommand{\tfrac}{mm}{#1} \[ V = \tfrac12 m_1 \]",
+        r"\def\label#1{3} \[ V = m_1 \label{x} \]",
+        r"\renewcommand{\quad}{+} \[ V = m_1 \quad g \]",
+    ],
+)
+def test_a_macro_with_a_new_meaning_refuses_the_answers_that_use_it(read, text):
+    answer = read(text).answers["V"]
+    assert isinstance(answer, Refusal)
+    assert "macro" in answer.reason
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\expandafter\def\csname cos\endcsname{\sin}",
+        r"\catcode`\+=13",
+        r"\def\,{+}",
+        r"\let~=+",
+        r"\renewenvironment{bmatrix}{(}{)}",
+        r"\lowercase{\def\x{y}}",
+    ],
+)
+def test_what_may_change_any_sign_refuses_the_file(read, text):
+    with pytest.raises(AnswerError, match=r"line 2: .*may change"):
+        read(f"\n{text} \\[ V = {V} \\]")
+
+
+@pytest.mark.parametrize("text", [r"\renewcommand{\phi}{\varphi}", r"\newcommand{\R}{\mathbb{R}}", r"\makeatletter"])
+def test_harmless_definitions(graded, text):
+    assert graded(rf"{text} \[ V = {V} \]").entries[0].verdict.value == "correct"
+
+
+def test_approx_is_noted(read):
+    assert r"line 1: \approx is read as =" in read(rf"\[ V \approx {V} \]").notes
+    assert r"line 1: \approx is read as =" in read(rf"\[ M_{{11}} = a \approx {M11} \]").notes
+
+
+@pytest.mark.parametrize(
+    "mark",
+    [
+        *(
+            "*",
+            r"\ast",
+            r"\cdot",
+            r"\text{sym}",
+            r"\text{sym.}",
+            r"\star",
+            r"\mathrm{sym.}",
+            r"\mbox{symm.}",
+            r"{*}",
+            "",
+        ),
+    ],
+)
+def test_a_mark_for_the_other_half(graded, mark):
+    for rows in (f"{M11} & {M12} \\\\ {mark} & {M22}", f"{M11} & {mark} \\\\ {M12} & {M22}"):
+        report = graded(rf"\[ M(q) = \begin{{bmatrix}} {rows} \end{{bmatrix}} \]")
+        assert [entry.verdict.value for entry in report.entries] == ["correct"] * 4
+    wrong = f"{M11} & {M22} \\\\ {mark} & {M22}"
+    report = graded(rf"\[ M(q) = \begin{{bmatrix}} {wrong} \end{{bmatrix}} \]")
+    assert [entry.verdict.value for entry in report.entries] == ["correct", "wrong", "wrong", "correct"]
+
+
+@pytest.mark.parametrize("rows", [r"* & * \\ * & 1", r"1 & * \\ * & 2", r"* & 1 \\ 1 & 2"])
+def test_marks_that_refer_to_nothing(graded, rows):
+    text = rf"\[ M = \begin{{bmatrix}} {rows} \end{{bmatrix}} \]"
+    try:
+        verdicts = [entry.verdict.value for entry in graded(text).entries]
+    except AnswerError:
+        return
+    assert "unreadable" in verdicts

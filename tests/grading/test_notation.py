@@ -126,7 +126,7 @@ REFUSED = {
     "__import__('os').system('x')": "unknown name '__import__'|attribute",
     "m1.__class__": "attribute",
     "lambda x: x": "unknown name 'lambda'",
-    "f'{m1}'": "unknown name|unexpected",
+    "f'{m1}'": "a prime",
     "m1 if q1 > 0 else m2": "unexpected '>'|unknown name 'if'",
     "ql": "did you mean 'q",
     "l3": "unknown name 'l3'",

@@ -567,7 +567,7 @@ def test_an_ambiguous_entry_of_a_long_arm_is_refused_with_both_readings():
         f"    M[1, 0] = M[0, 1]\n    M[1, 1] = {M[2]}\n    return M",
         f"def mass(q):\n    b = {M[1]}\n    M = [[{M[0]}, b], [b, {M[2]}]]\n    return M\n"
         "def other(q):\n    b = 7\n    return b",
-        f"def M(q1, q2, m1=1.0, l1=2):\n    return Matrix(2, 2, [{M[0]}, {M[1]}, {M[1]}, {M[2]}])",
+        f"def M(q1, q2, m1=2.0, l1=1/2):\n    return Matrix(2, 2, [{M[0]}, {M[1]}, {M[1]}, {M[2]}])",
         f"th1, th2 = q1, q2\nM = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]]).applyfunc(simplify)".replace(
             "q1, q2\n", "q1, q2\n"
         ),
@@ -697,6 +697,189 @@ def test_names_of_functions_do_not_leak(read):
     meaning = dict(sheet.names.parameters)
     used = {name: re.match(r"\w+", str(sheet.answers[name]))[0] for name in ("V", "K")}
     assert (meaning[used["V"]], meaning[used["K"]]) == ("m1", "m2")
+
+
+# Answers that are bound again, made something else of, or shared
+
+TRUE = "(m1/2+m2)*g*l1*cos(q1)+m2*g*l2*cos(q1+q2)/2, m2*g*l2*cos(q1+q2)/2"
+G_DEF = f"def G(q):\n  q1, q2 = q\n  return [{TRUE}]\n"
+G_LIST = f"G = [{TRUE}]\n"
+G_MATLAB = f"function G=grav(q)\nG=[{TRUE}];\nend\n"
+AGAIN = [
+    *("G = 0", "G = -G(q)", "G = neg(G)", "G += 1", "G, H = 0, 0", "(G := 0)", "if 1: G=0", "for G in [1]: pass"),
+    *("del G", "class G: pass", "from x import G", "import G", "try: pass\nexcept E as G: pass", "[G, H] = f()"),
+    *("def foo(): global G; G=0", "def G(q): return 0", "def G(q): pass", "G = lambda q: print(q)", "G = H = abs"),
+    *("with f() as G: pass", "while G := f(): pass", "async def G(): pass", "G: int = 3", "import numpy as G"),
+    *("from math import cos as G", "match f():\n  case G: pass", "G.q = 3", "G = symbols('G')", "(G, *H) = f()"),
+    "if 1:\n  def G(q): return 0",
+]
+
+
+@pytest.mark.parametrize("again", AGAIN)
+@pytest.mark.parametrize("start", [G_DEF, f"G = lambda q: [{TRUE}]\n"])
+def test_a_function_that_is_bound_again_is_no_answer(tmp_path, start, again):
+    assert passing(report_of(tmp_path / "a.py", start), "g")
+    for text in (f"{start}{again}\n", f"{again}\n{start}"):
+        assert not passing(report_of(tmp_path / "a.py", text), "g"), text
+
+
+@pytest.mark.parametrize(
+    "again",
+    ["G=0;", "G = @(q) 0;", "G(1) = 2;", "clear x; G = [0 0];", "if 1, G=0; end", "for G=1:2, end", "[G, H] = f(1);"],
+)
+def test_a_handle_that_is_bound_again_is_no_answer(tmp_path, again):
+    start = f"G = @(q1,q2) [{TRUE}];\n"
+    assert passing(report_of(tmp_path / "a.m", start), "g")
+    assert not passing(report_of(tmp_path / "a.m", f"{start}{again}\n"), "g")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            f"def G(q):\n  q1, q2 = q\n  {G_LIST}  return {x}"
+            for x in ("-G", "", "neg(G)", "[-G[0], G[1]]", "2*G", "H")
+        ),
+        *(f"def dyn(q):\n  {G_LIST}  return {x}" for x in ("-G", "neg(G)", "G*s", "[-x for x in G]", "-np.array(G)")),
+        *(f"def dyn(q):\n  {G_LIST}  return G\nG = {x}" for x in ("-dyn(q)", "0", "dyn(-q)", "neg(dyn(q))", "f()")),
+        f"def dyn(q):\n  {G_LIST}  y = -G\n  return y",
+        f"def dyn(q1, q2):\n  {G_LIST}  return G\nG = dyn(q2, q1)",
+        f"def dyn(q):\n  {G_LIST}  return G\nq = [-q1, q2]\nG = dyn(q)",
+        f"def dyn(q):\n  {G_LIST}  return G\ndyn = abs",
+        f"def dyn(q):\n  {G_LIST}  return G\ndef G(q):\n  return -dyn(q)",
+        f"def G(q):\n  {G_LIST}  print(G)",
+        f"G1 = {TRUE.split(', ')[0]}\nG2 = {TRUE.split(', ')[1]}\nG = -Matrix([G1, G2])",
+    ],
+)
+def test_what_is_made_of_an_answer_goes_before_it(tmp_path, text):
+    assert not passing(report_of(tmp_path / "a.py", text), "g")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"def dyn(q):\n  {G_LIST}  return G",
+        f"import numpy as np\ndef dyn(q):\n  {G_LIST}  return np.array(G)\nG = dyn(q)",
+        f"def dyn(q):\n  {G_LIST}  return {{'G': G}}",
+        f"import numpy as np\ndef dyn(q):\n  {G_LIST}  return np.array(G)\nq = np.array([0.1, 0.2])\nG = dyn(q)",
+        f"def dyn(q, ddq):\n  {G_LIST}  return M*ddq + G",
+        f"def G(q, g=9.81, m1=2.0, dt=0.1, p=None):\n  return [{TRUE}]",
+        f"m1 = 2.0\ndef G(q, m1=m1):\n  return [{TRUE}]",
+        f"P = {{'m1': 2.0}}\ndef G(q, p=P):\n  m1 = p['m1']\n  return [{TRUE}]",
+        f"def G(q, p):\n  m1 = p.m1\n  return [{TRUE}]",
+        f"{G_LIST}y = len(G)",
+        f"{G_LIST}H = np.array(G)\nH[0] = 3".replace("H =", "import numpy as np\nH ="),
+    ],
+)
+def test_what_leaves_an_answer_as_it_is(tmp_path, text):
+    assert passing(report_of(tmp_path / "a.py", text), "g")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"G=-grav(q1,q2);\nfunction G=grav(q1,q2)\nG = [{TRUE}];\nend",
+        f"G=grav(q2,q1);\nfunction G=grav(q1,q2)\nG = [{TRUE}];\nend",
+        f"G=grav(q1,q2)*2;\nfunction G=grav(q1,q2)\nG = [{TRUE}];\nend",
+        f"function y=grav(q1,q2)\nG = [{TRUE}];\ny = -G;\nend",
+        f"function G=grav(q1,q2)\nG = [{TRUE}];\nG = -G;\nend",
+        *(
+            f"{before}{G_MATLAB}{after}"
+            for own in (
+                *("function y=cos(x)\ny=sin(x);\nend\n", "function m1=m1()\nm1=3;\nend\n"),
+                *("function y=g()\ny=-9.81;\nend\n", "function m1\ndisp(1)\nend\n"),
+                *("function y=l2(varargin)\ny=3;\nend\n", "function y=q1\ny=3;\nend\n"),
+                *("function y=plus(a,b)\ny=a;\nend\n", "function [y,z]=q2(a)\ny=a;z=a;\nend\n"),
+            )
+            for before, after in ((own, ""), ("", own))
+        ),
+        f"function p=m2(x)\np=x;\nend\nfunction G=grav(q)\nG=simplify([{TRUE}]);\nend",
+        f"function y=simplify(x)\ny=-x;\nend\nfunction G=grav(q)\nG=simplify([{TRUE}]);\nend",
+        f"function g=g(q)\ng=[{TRUE}];\nend",
+        f"function G=grav(q, p)\nm1 = p.m2;\nG=[{TRUE}];\nend",
+        f"p.m1 = 5; m1 = p.m1;\nG=[{TRUE}];",
+    ],
+)
+def test_functions_of_matlab_go_before_what_has_their_names(tmp_path, text):
+    assert not passing(report_of(tmp_path / "a.m", text), "g")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"G=grav(q1,q2);\nfunction G=grav(q1,q2)\nG = [{TRUE}];\nend",
+        f"{G_MATLAB}function y=other(x)\ny=x;\nend",
+        f"function G=grav(q, p)\nm1 = p.m1; g = p.g;\nG=[{TRUE}];\nend",
+        f"function G=grav(q, params)\nl1 = params.l1;\nG=[{TRUE}];\nend",
+        f"p.m1 = 2; m1 = p.m1;\nG=[{TRUE}];",
+    ],
+)
+def test_functions_of_matlab_that_change_no_name(tmp_path, text):
+    assert passing(report_of(tmp_path / "a.m", text), "g")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(f"def G(q, {x}):\n  return [{TRUE}]" for x in ("g=-9.81", "m1=5", "*, l1=3", "q1=0", "m1=None", "g=9.8")),
+        *(f"G = lambda q, {x}: [{TRUE}]" for x in ("m1=3", "g=-9.81", "*, l2=1", "q2=q1", "m2=m1")),
+        *(f"def G(q, p={x}):\n  m1 = p.m1\n  return [{TRUE}]" for x in ("dict(m1=5)", "{'m1': 5}", "f()", "None", "P")),
+        f"class P:\n  m1 = 5\nX = P()\ndef G(q, p=X):\n  m1 = p.m1\n  return [{TRUE}]",
+        f"def G(q, c1=1):\n  return [{TRUE}]".replace("cos(q1)+", "c1+"),
+    ],
+)
+def test_defaults_other_than_the_file_s_numbers_are_refused(tmp_path, text):
+    assert not passing(report_of(tmp_path / "a.py", text), "g")
+
+
+@pytest.mark.parametrize(
+    "half",
+    [
+        *("Integer(1/2)", "sp.Integer(0.5)", "int(0.5)", "Rational(1/2)", "Rational(1.0/2)", "Integer(1)//2", "1 % 2"),
+        *(
+            "I2(1/2)",
+            "R(1/2)",
+            "Integer(m1)/m1/2",
+            "Rational(m1, m1)/2",
+            "round(0.5)",
+            "Rational(0.5, 1)",
+            "floor(0.5)",
+        ),
+    ],
+)
+def test_numbers_that_sympy_makes_others_of_are_refused(read, half):
+    head = "import sympy as sp\nfrom sympy import *\nfrom sympy import Integer as I2\nR = sp.Rational\n"
+    assert isinstance(read(f"{head}V = m1*g*l1*({half})").answers["V"], Refusal)
+
+
+@pytest.mark.parametrize("half", ["Integer(1)/2", "Rational(1, 2)", "sp.Rational(1, 2)", "Rational(0.5)", "S(1)/2"])
+def test_numbers_that_sympy_leaves_as_they_are(read, half):
+    assert not isinstance(read(f"import sympy as sp\nV = m1*g*l1*({half})").answers["V"], Refusal)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *("a.b=G\na.b[0]=1", "def w(): return G\nw()[0]=1", "y=max(G,[0]); y[0]=1", "def w(): return G\ny=w(); y[0]=1"),
+        *("a['k']=G\na['k'][0]=1", "y=min(G, G); y[0]=1", "a.b.c=G\nf(a)"),
+        *("def u(): w()[0]=1\ndef w(): return G\nu()", "def w(x): return x\ny=w(G); y[0]=1", "y=f(G)\ny[0]+=1"),
+        *(
+            "a = G\na[0], y = 1, 2",
+            "a, b = f(G)\na[0]=1",
+            "y=next(iter([G])); y[0]=1",
+            "def w(): yield G\nfor y in w(): y[0]=1",
+        ),
+        *("def w():\n  A = G\n  return A\nw()[0]=1", "def w(): return G\nw().append(1)", "w = lambda: G\nw()[0] = 1"),
+        *("def cos(x): return x\ny = cos(G); y[0]=1", "y=sum([], start=G); y[0]=1", "def w(): return G\ndel w()[0]"),
+    ],
+)
+def test_a_list_that_is_changed_by_another_way_is_no_answer(tmp_path, change):
+    assert not passing(report_of(tmp_path / "a.py", G_LIST + change), "g")
+
+
+def test_a_function_of_a_parameter_s_name_says_how_to_name_it(read):
+    reason = read(f"def g(q):\n  return [{TRUE}]").answers["g"].reason
+    assert reason == "g is the robot's parameter; name the function G"
 
 
 # MATLAB

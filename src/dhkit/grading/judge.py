@@ -71,7 +71,7 @@ def judge(
     start = time.perf_counter()
     seed = secrets.randbits(53) if seed is None else seed
     truth = truth_of(description, sheet.names.absolute, sheet.task.friction)
-    vocabulary = vocabulary_of(description, sheet.names, truth.coordinates.sums)
+    vocabulary = vocabulary_of(description, sheet, truth.coordinates.sums)
     judged, refused = _judged(description, sheet, vocabulary, truth, digits, seed)
     others, refused_others = _kinematic(description, sheet, vocabulary, seed, explained)
     refused |= refused_others
@@ -197,7 +197,7 @@ def _kinematic(
         return table_entries(description, given_rows(rows, n, vocabulary), convention, sheet.task, seed)
 
     def inverse() -> KinematicJudgement:
-        own = vocabulary_of(description, sheet.names, inverse=True)
+        own = vocabulary_of(description, sheet, inverse=True)
         return inverse_entries(description, given_branches(sheet.branches, n, own), seed, explained=explained)
 
     found, refused = [], dict[str, DhkitError]()

@@ -26,7 +26,7 @@ def time_derivative(tree: Tree) -> Tree:
     derivative = _derivative(tree)
     if _size(derivative) > MAX_NODES:
         raise AnswerError(f"a time derivative of more than {MAX_NODES} terms and factors")
-    return Sum(()) if derivative is None else derivative
+    return Number(Fraction(0), "0", 0) if derivative is None else derivative
 
 
 def _size(tree: Tree | None) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,11 +14,12 @@ from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.documents.statements import Statement, has_relation, statements_of
+from dhkit.grading.answers.indices import first_index
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of, read_matrix
-from dhkit.grading.answers.sheet import Chain, Entries, Names, Refusal
+from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
@@ -76,7 +77,7 @@ class Given:
 
 
 def vocabulary_of(
-    description: Description, names: Names, sums: Sequence[Sequence[int]] = (), inverse: bool = False
+    description: Description, sheet: AnswerSheet, sums: Sequence[Sequence[int]] = (), inverse: bool = False
 ) -> Vocabulary:
     """Return what names mean on a sheet.
 
@@ -86,7 +87,12 @@ def vocabulary_of(
         A name that stands for two things, or one made of names that the robot does not have.
     """
     further = POSE_NAMES if inverse else ()
+    names = sheet.names
     vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
+    written = _texts([sheet.answers, sheet.table, sheet.branches, names.parameters])
+    vocabulary.first_index = first_index(written, vocabulary)
+    if vocabulary.first_index is None and sheet.file.endswith((".py", ".ipynb")):
+        vocabulary.first_index = 0
     for name, text in names.parameters.items():
         if isinstance(text, Refusal):
             vocabulary.refuse(name, f"its own assignment is not read: {text.reason}")
@@ -99,6 +105,22 @@ def vocabulary_of(
                 raise AnswerError(f"names.parameters: {shown(name)}: {error}") from None
             vocabulary.refuse(name, f"its own assignment is not read: {error}")
     return vocabulary
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Yield every text in nested answers."""
+    match value:
+        case str():
+            yield value
+        case Chain():
+            yield from value.formulas
+        case Entries():
+            yield from _texts(value.texts)
+        case Mapping():
+            yield from _texts(list(value.values()))
+        case list() | tuple():
+            for inner in value:
+                yield from _texts(inner)
 
 
 def given_quantity(

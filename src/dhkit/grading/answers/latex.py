@@ -60,6 +60,13 @@ def latex_tokens(text: str, knows: Callable[[str], bool]) -> list[Token]:
     return _Latex(text, knows).whole()
 
 
+OPERAND_ENDS = re.compile(
+    r"(?:\s|~|\$|\\[,;:! ]|\\q?quad\b)*(?:$|[-+)\]},;&=.|]|\\\\|\\(?:right|cr|end)\b|\\[bB]igg?r?\s*[)\]]"
+    r"|\{?\s*(?:\\left)?\s*\(\s*t\s*(?:\\right)?\s*\))"
+)
+r"""What ends the operand of \frac{d}{dt}: a sign of a sum, the end, or (t)."""
+
+
 class _Latex:
     """One pass over a LaTeX formula."""
 
@@ -286,8 +293,10 @@ class _Latex:
                 found += self._one_item() or fail(self.text, at, "a bracket that does not close")
             return found
         if found and found[0].kind == "name" and found[0].text in FUNCTION_NAMES:
-            return found + self._function_argument()
-        if len(found) != 1 or found[0].kind != "name" or self._next_is("^"):
+            found += self._function_argument()
+        elif len(found) != 1 or found[0].kind != "name":
+            found = []
+        if not found or not OPERAND_ENDS.match(self.text, self.at):
             fail(self.text, at, "a derivative that may reach further than the name behind it; put brackets around what")
         return found
 
@@ -306,7 +315,8 @@ class _Latex:
             first = next(
                 (k for k, token in enumerate(found) if token.text == "(" and found[max(k - 1, 0)].text != "^"), -1
             )
-            if found[-1].kind == "name" or (first >= 0 and closing_bracket(found, first) == len(found) - 1):
+            is_closed = closing_bracket(found, first) == len(found) - 1 if first >= 0 else found[-1].kind == "name"
+            if is_closed:
                 break
         return found
 

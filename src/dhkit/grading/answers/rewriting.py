@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.indices import without_indices
 from dhkit.grading.answers.tokens import closing_bracket, fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
@@ -15,6 +16,8 @@ CALLED = frozenset(FUNCTION_NAMES.values())
 MODULES = frozenset(("np", "numpy", "math", "sp", "sympy", "sym", "ca", "cs", "casadi", "cmath", "mpmath", "mp", "cas"))
 ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
+MATLAB = re.compile(r"\.[*/^']")
+"""Signs that are MATLAB's alone."""
 MAX_DEPTH = 50
 MAX_TOKENS = 300_000
 
@@ -29,7 +32,7 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
     """
     _check_depth(tokens, text)
     found = _without_modules(_methods(tokens), text)
-    found = _without_time(_indexed(_without_primes(found, vocabulary), vocabulary, text), vocabulary)
+    found = _without_time(without_indices(_without_primes(found, vocabulary, text), vocabulary, text), vocabulary)
     # Square brackets that are left stand for round ones.
     found = [Token("sign", {"[": "(", "]": ")"}.get(x.text, x.text), x.at) if x.kind == "sign" else x for x in found]
     found = _derivatives(found, text)
@@ -78,10 +81,13 @@ def _without_modules(tokens: Sequence[Token], text: str) -> list[Token]:
     return found
 
 
-def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Token]:
-    """Read Lagrange's prime behind a joint's variable as a rate, and drop MATLAB's ' behind anything else.
+def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
+    """Read Lagrange's prime behind a joint's variable as a rate, and drop MATLAB's transpose.
 
-    A scalar is its own transpose, and nobody transposes theta1.
+    Raises
+    ------
+    AnswerError
+        A prime behind anything but a matrix where nothing else is MATLAB's: it may be a derivative.
     """
     found: list[Token] = []
     for token in tokens:
@@ -93,62 +99,9 @@ def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Tok
             found[-1] = Token("name", f"{name}dot", found[-1].at)
         elif token.text == "'" and vocabulary.is_position(name.removesuffix("dot")):
             found[-1] = Token("name", f"{name.removesuffix('dot')}ddot", found[-1].at)
+        elif token.text == "'" and found[-1].text != "]" and not MATLAB.search(text):
+            fail(text, token.at, "a prime that belongs to no joint variable,")
     return found
-
-
-def _indexed(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read q[0] as Python's first joint, q(1) as MATLAB's, theta[1](t) as Maple's."""
-    found: list[Token] = []
-    first = _first_index(tokens)
-    k = 0
-    while k < len(tokens):
-        name, *behind = tokens[k : k + 4]
-        pattern = [x.text if x.kind == "sign" else x.kind for x in behind]
-        if (
-            name.kind == "name"
-            and pattern in (["[", "number", "]"], ["(", "number", ")"])
-            and behind[1].text.isdecimal()
-        ):
-            whole = _indexed_name(name, int(behind[1].text[:4]), pattern[0] == "[", first, vocabulary)
-            if whole:
-                found.append(Token("name", whole, name.at))
-                k += 4
-                continue
-            if pattern[0] == "[":
-                fail(text, name.at, f"unknown name {name.text}[{behind[1].text}]")
-        found.append(name)
-        k += 1
-    return found
-
-
-def _first_index(tokens: Sequence[Token]) -> int | None:
-    """Return from where indices in square brackets count: 0 where a 0 occurs, 1 in Maple's theta[1](t), or unknown."""
-    one = False
-    for k in range(len(tokens) - 2):
-        if tokens[k].text == "[" and tokens[k + 1].text.isdecimal() and tokens[k + 2].text == "]":
-            if int(tokens[k + 1].text) == 0:
-                return 0
-            one = one or [x.text for x in tokens[k + 3 : k + 6]] == ["(", "t", ")"]
-    return 1 if one else None
-
-
-def _indexed_name(name: Token, index: int, is_square: bool, first: int | None, vocabulary: Vocabulary) -> str:
-    """Return the name that an index makes, empty where it makes none."""
-    plain = plain_name(name.text)
-    if not is_square:
-        whole = plain + str(index)
-        alone = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
-        is_index = alone or (name.text not in FUNCTION_NAMES and not vocabulary.knows(name.text))
-        return whole if is_index and vocabulary.knows(whole) else ""
-    from_zero, from_one = f"{plain}{index + 1}", f"{plain}{index}"
-    if first is not None:
-        whole = from_zero if first == 0 else from_one
-        return whole if vocabulary.knows(whole) else ""
-    if vocabulary.knows(from_zero):
-        if vocabulary.knows(from_one) and index:
-            vocabulary.taken_for[f"{name.text}[{index}]"] = f"{from_zero}, counted from 0 as in Python"
-        return from_zero
-    return from_one if vocabulary.knows(from_one) else ""
 
 
 def _without_time(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Token]:
@@ -237,7 +190,11 @@ def _fraction_by_time(
         order, at = 2, at + 4
     if token.text == "d" and (end := _over_time(tokens, at, order)):
         stop = _operand(tokens, end, text)  # d/dt(...)
-        if stop == end or (stop < len(tokens) and tokens[stop].text == "^"):
+        is_enclosed = end < len(tokens) and (tokens[end].text == "(" or _is_by_time(text, tokens[end].at))
+        following = tokens[stop] if stop < len(tokens) else None
+        goes_on = following is not None and (following.kind != "sign" or following.text in ("(", "*", "/"))
+        is_raised = following is not None and following.text == "^"
+        if stop == end or is_raised or (goes_on and not is_enclosed):
             fail(
                 text, token.at, "a derivative that may reach further than the name behind it; put brackets around what"
             )
@@ -250,6 +207,14 @@ def _fraction_by_time(
     if end and vocabulary.is_state(name):
         return _by_time([Token("name", name, token.at)], 1, token.at), end
     return None
+
+
+BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
+
+
+def _is_by_time(text: str, at: int) -> bool:
+    """Whether (t) stands behind the name that begins at a place of a text."""
+    return BY_TIME.match(text, at) is not None
 
 
 def _over_time(tokens: Sequence[Token], k: int, order: int) -> int:
@@ -289,11 +254,11 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
     return found
 
 
-AMBIGUOUS = re.compile(r"(sin|cos|tan)(\d+)([A-Za-z]\w*)?", re.ASCII)
+AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
 
 
 def _refuse_ambiguous(tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str) -> None:
-    """Refuse sin2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
+    """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
     match = AMBIGUOUS.fullmatch(tokens[k].text)
     if match is None or tokens[k].text in vocabulary.own:
         return

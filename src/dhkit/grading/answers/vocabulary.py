@@ -109,6 +109,8 @@ class Vocabulary:
         """What was not exactly a known name, and what it was taken for."""
         self.refused: dict[str, str] = {}
         """Names that could not be defined, and why."""
+        self.first_index: int | None = None
+        """From where indices in square brackets count on the whole sheet; None where that is not known."""
 
     def _name_joints(self, given: Sequence[str], kind: str) -> None:
         if given and len(given) != len(self.kinds):

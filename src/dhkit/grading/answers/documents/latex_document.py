@@ -18,12 +18,12 @@ from dhkit.grading.answers.documents.statements import (
     latex_statements,
     left_hand_name,
 )
-from dhkit.grading.answers.latex import latex_tokens
+from dhkit.grading.answers.latex import DOTS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, TIMES, UPRIGHT, latex_tokens
 from dhkit.grading.answers.programs.standing import NameTable
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refusal, quantity_names
 from dhkit.grading.answers.tokens import folded
-from dhkit.grading.answers.vocabulary import plain_name
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
 __all__ = ["latex_answers"]
 
@@ -32,9 +32,24 @@ MAX_DEFINITIONS = 2_000
 MAX_LEFT_OUT = 20
 MAX_MACROS = 300
 MACRO = re.compile(
-    r"\\(?:(?:re|provide)?newcommand|DeclareMathOperator|DeclareRobustCommand|NewDocumentCommand|RenewDocumentCommand)\*?"
-    r"\s*\{?\s*\\([A-Za-z]+)\s*\}?|\\(?:[gex]?def|let)\s*\\([A-Za-z]+)"
+    r"\\(?:(?:re)?newcommand|providecommand|DeclareMathOperator|DeclareRobustCommand"
+    r"|(?:New|Renew|Declare|Provide)DocumentCommand|DeclareMathSymbol|DeclareMathAccent"
+    r"|(?:New|Renew|Declare)CommandCopy)(?![A-Za-z])\*?"
+    r"\s*\{?\s*\\([A-Za-z]+)\s*\}?|\\(?:[gex]?def|let|futurelet|mathchardef|chardef)\s*\\([A-Za-z]+)"
 )
+DEFINES = re.compile(r"\\(?:[gex]?def|let|renewcommand|futurelet|mathchardef|chardef)(?![A-Za-z])")
+CHANGES = re.compile(
+    r"\\(?:catcode|mathcode|lccode|uccode|csname|endcsname|expandafter|scantokens|lowercase|uppercase|aftergroup)"
+    r"(?![A-Za-z])|\\renewenvironment\s*\{(?:"
+    + "|".join(sorted(ROWS))
+    + r"|[bpvBV]?matrix|smallmatrix|array|document)\*?\}"
+)
+"""What may change the meaning of anything behind it."""
+READ_MACROS = frozenset(
+    {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *TIMES, *DOTS, *UPRIGHT, *SIZES, *SPACE_NAMES.split()}
+    | {"sqrt", "over", "partial", "top", "begin", "end", "label", "tag", "equiv", "approx", "pm", "mp", "mbox"}
+)
+"""Macros that have a meaning, which no document should change."""
 ATOM = re.compile(
     r"(?:\\[A-Za-z]+|[A-Za-z])(?:\s*\{\s*\\?[A-Za-z]+(?:_(?:\w|\{\w+\}))?\s*\})?(?:_(?:[A-Za-z0-9]|\{[A-Za-z0-9,]+\}))?",
     re.ASCII,
@@ -100,6 +115,7 @@ def _statements(text: str) -> Iterator[Statement]:
     text = re.sub(r"(?<!\\)((?:\\\\)*)%[^\n]*", r"\1", text)
     text = _without_hidden(text)
     preamble, begins, body = text.partition("\\begin{document}")
+    _refuse_changes(text)
     macros = _macros(text)
     if begins:
         text = _without_macros(re.sub(r"[^\n]", "", preamble) + body.partition("\\end{document}")[0])
@@ -109,6 +125,9 @@ def _statements(text: str) -> Iterator[Statement]:
     for line, inside, is_inline in _displays(text):
         expanded = _expanded(inside, macros)
         rows = list(latex_statements(expanded[0], line))
+        unseen = [why for name, why in expanded[1].items() if not any(f"\\{name}" in row.text for row in rows)]
+        if unseen:
+            rows = [replace(row, problem=row.problem or unseen[0]) for row in rows]
         for k, statement in enumerate(rows):
             statement = _with_macro_problem(statement, expanded[1])
             is_rest = STARTS_WITH_RELATION.match(statement.text) or not has_relation(statement.text)
@@ -156,6 +175,15 @@ def _displays(text: str) -> Iterator[tuple[int, str, bool]]:
         line += part.count("\n")
 
 
+def _refuse_changes(text: str) -> None:
+    """Refuse what may change the meaning of signs, or of macros that cannot be told."""
+    named = {match.start() for match in MACRO.finditer(text)}
+    for match in re.finditer(rf"{CHANGES.pattern}|{DEFINES.pattern}", text):
+        if match.start() not in named:
+            line = text.count("\n", 0, match.start()) + 1
+            raise AnswerError(f"line {line}: {match[0]} may change what formulas mean, and is not read")
+
+
 def _macros(text: str) -> dict[str, tuple[int, str | None]]:
     """Return macros that a document defines: the line, and one symbol where that is what it stands for."""
     found: dict[str, tuple[int, str | None]] = {}
@@ -168,6 +196,8 @@ def _macros(text: str) -> dict[str, tuple[int, str | None]]:
         simple = body[1].strip() if body else ""
         is_command = text.startswith(("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start())
         is_atom = ATOM.fullmatch(simple) is not None and is_command
+        if name in READ_MACROS and simple not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
+            is_atom = False
         if len(found) > MAX_MACROS:
             raise AnswerError(f"more than {MAX_MACROS} macros")
         found[name] = (line, simple if is_atom and name not in found else None)
@@ -268,6 +298,9 @@ class _Document:
                 line = next(iter(self._entry_statements(quantity)))[1]
                 if self._stands_apart(quantity):
                     answers[quantity] = Refusal(f"{quantity} is given as a whole and entry by entry, in {line}")
+        for name in self.by_name:
+            if self.names.vocabulary.is_state(name):
+                self._defining(name)
         if not answers:
             known = ", ".join(quantity_names(self.quantities.n)[:8])
             left = f"; left out: {self.left_out[0]}" if self.left_out else ""
@@ -312,18 +345,51 @@ class _Document:
         other = next((s for s in statements if s.formulas != first.formulas), None)
         if other is not None:
             return Refusal(f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}")
-        if quantity not in ("K", "V", "L") and len(first.formulas) == 1:
-            entries = self._by_names(quantity, first)
+        self._note_relations(first)
+        formulas = first.formulas
+        if quantity not in ("K", "V", "L"):
+            formulas = self._matrices(quantity, first)
+        if quantity not in ("K", "V", "L") and len(formulas) == 1:
+            entries = self._by_names(quantity, formulas[0])
             if entries is not None:
                 return entries
-        reason = next((why for f in first.formulas if (why := self._define_names_in(f, {name}))), "")
+        reason = next((why for f in formulas if (why := self._define_names_in(f, {name}))), "")
         if reason:
             return Refusal(reason)
-        return first.formulas[0] if len(first.formulas) == 1 else Chain(first.formulas)
+        return formulas[0] if len(formulas) == 1 else Chain(formulas)
 
-    def _by_names(self, quantity: str, statement: Statement) -> Entries | None:
-        """Return a matrix of names, M_11 & M_12, by the formulas of its names; nothing of any other matrix."""
-        rows = _matrix_rows(statement.formulas[0])
+    def _note_relations(self, statement: Statement) -> None:
+        r"""Note a \approx that is read as =."""
+        for sign in dict.fromkeys(re.findall(r"\\(?:approx|simeq|cong|doteq)(?![A-Za-z])", statement.text)):
+            note = f"{self._line(statement)}: {sign} is read as ="
+            self.notes += [] if note in self.notes else [note]
+
+    def _matrices(self, quantity: str, statement: Statement) -> tuple[str, ...]:
+        """Return the sides of a chain that are matrices of the quantity's shape, the last in any case."""
+        *earlier, last = statement.formulas
+        read = [side for side in earlier if self._fits(quantity, side)]
+        if _has_marks(last):
+            read = []
+        if len(read) < len(earlier):
+            self.notes.append(
+                f"{self._line(statement)}: a side of {quantity}'s equation is not read; the last is judged"
+            )
+        return (*read, last)
+
+    def _fits(self, quantity: str, side: str) -> bool:
+        rows, shape = _matrix_rows(side), self.quantities.shape(quantity)
+        if rows is None or _has_marks(side):
+            return False
+        if len(shape) == 1:
+            return sum(map(len, rows)) == shape[0]
+        return [len(row) for row in rows] == [shape[1]] * shape[0]
+
+    def _by_names(self, quantity: str, formula: str) -> Entries | None:
+        """Return a matrix of names, M_11 & M_12, by the formulas of its names; nothing of any other matrix.
+
+        An entry of M for which a sign stands, * or sym., is left out, and is taken from the other half.
+        """
+        rows = _matrix_rows(formula)
         if rows is None:
             return None
         shape = self.quantities.shape(quantity)
@@ -334,11 +400,14 @@ class _Document:
         if not is_vector and [len(row) for row in rows] != [shape[1]] * shape[0]:
             return None
         named = [self._entry_name(entry) for entry in flat]
-        if not any(named):
+        marks = _marked(rows) if quantity == "M" else set()
+        if not any(named) and not marks:
             return None
         found: dict[tuple[int, ...], str | Chain | Refusal] = {}
         for k, (entry, name) in enumerate(zip(flat, named, strict=True)):
             index = (k,) if is_vector else divmod(k, shape[1])
+            if index in marks:
+                continue
             if name:
                 found[index] = self._entry(name, self.by_name[name])
             else:
@@ -407,6 +476,7 @@ class _Document:
             return Refusal(f"{self._line(broken)}: {broken.problem}")
         formulas: tuple[str, ...] = ()
         for statement in statements:
+            self._note_relations(statement)
             only_names = len(statement.formulas) == 1 and self._entry_name(statement.formulas[0])
             if formulas and formulas != statement.formulas and not only_names:
                 return Refusal(f"{name} is assigned twice, in {self._line(statement)}")
@@ -536,6 +606,34 @@ class _Document:
     def _definition(self, name: str) -> str | None:
         defining = [s for s in self._defining(name) if not self._is_itself(name, s)]
         return defining[0].formulas[-1] if defining else None
+
+
+MARK = re.compile(
+    r"(?:\*|\\(?:ast|star|cdot|bullet)(?![A-Za-z])"
+    r"|\\(?:text|textrm|mbox|mathrm|textit|rm)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}|[Ss]ymm?\.?)"
+)
+"""What stands for an entry of a symmetric matrix that is that of the other half."""
+
+
+def _marked(rows: list[list[str]]) -> set[tuple[int, ...]]:
+    """Return the places of a matrix where a sign refers to the other half; nothing where both halves have one."""
+    places = {
+        (i, j) for i, row in enumerate(rows) for j, entry in enumerate(row) if not entry or MARK.fullmatch(_core(entry))
+    }
+    halves = {i > j for i, j in places}
+    return set(places) if len(halves) == 1 and all(i != j for i, j in places) else set()
+
+
+def _has_marks(side: str) -> bool:
+    rows = _matrix_rows(side)
+    return rows is not None and any(MARK.fullmatch(_core(entry)) for row in rows for entry in row)
+
+
+def _core(entry: str) -> str:
+    """Return an entry without the braces around it."""
+    while entry.startswith("{") and entry.endswith("}"):
+        entry = entry[1:-1].strip()
+    return entry
 
 
 def _matrix_rows(formula: str) -> list[list[str]] | None:

@@ -68,12 +68,18 @@ class Row:
         What stands in front of its first &; empty where that is nothing.
     after_mark
         Whether it begins behind an &.
+    column
+        Which pair of columns it begins in, from 0.
+    is_first
+        Whether it is the first equation of a row.
     """
 
     line: int
     text: str
     before: str = ""
     after_mark: bool = False
+    column: int = 0
+    is_first: bool = True
 
 
 def rows_of(text: str, line: int) -> Iterator[Row]:
@@ -141,11 +147,12 @@ def _of_columns(columns: list[str], line: int, is_joined: bool) -> Iterator[Row]
         yield Row(line, " ".join(columns), before, len(columns) > 1 and not before)
         return
     pairs = [columns[k : k + 2] for k in range(0, len(columns), 2)]
-    filled = [pair for pair in pairs if "".join(pair).strip()]
-    first = Row(line, " ".join(filled[0]) if filled else "", before, not before)
+    filled = [(k, pair) for k, pair in enumerate(pairs) if "".join(pair).strip()]
+    column, pair = filled[0] if filled else (0, [""])
+    first = Row(line, " ".join(pair), before, not before, column)
     yield first
-    for pair in filled[1:]:
-        yield replace(first, text=" ".join(pair), before=pair[0].strip() or " ")
+    for column, pair in filled[1:]:
+        yield replace(first, text=" ".join(pair), before=pair[0].strip() or " ", column=column, is_first=False)
 
 
 def _systems(text: str) -> str:

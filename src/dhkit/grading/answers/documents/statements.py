@@ -62,11 +62,14 @@ def statements_of(text: str, suffix: str = ".tex") -> list[Statement]:
     list
         One without targets where the text is a formula alone.
     """
-    if is_latex(text):
-        return list(latex_statements(text, 1))
-    if suffix == ".tex" and "&" in text:
-        return list(latex_statements(text, 1))
+    if is_latex(text) or (suffix == ".tex" and "&" in text):
+        return list(latex_statements(LATEX_COMMENT.sub("", text), 1))
     return list(_plain_statements(text))
+
+
+LATEX_COMMENT = re.compile(r"(?<!\\)%(?!(?:pi|e|i)(?![A-Za-z0-9_]))[^\n]*")
+PLAIN_COMMENT = re.compile(r"#.*|%(?!(?:pi|e|i|gamma|phi)(?![A-Za-z0-9_])).*")
+"""Comments of Python, MATLAB and LaTeX; %pi, %e and %i are Maxima's numbers."""
 
 
 # LaTeX
@@ -110,10 +113,10 @@ TRAILING = (
 )
 """What stands behind a formula and is no part of it."""
 STARTS = re.compile(
-    rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_=']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast|equiv|approx|coloneqq|simeq)(?![A-Za-z])"
-    r"|\\bigr|\\Bigr|\\biggr|\\Biggr|:=)"
+    rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast)(?![A-Za-z])"
+    rf"|\\bigr|\\Bigr|\\biggr|\\Biggr|{EQUAL.pattern})"
 )
-STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:=|:=|\\(?:equiv|approx|coloneqq|simeq)(?![A-Za-z]))")
+STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:{EQUAL.pattern})")
 ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
 PIECE = re.compile(
     r"\\begin\s*\{(\w+)\*?\}|\\end\s*\{(\w+)\*?\}|\\(left|right)(?![A-Za-z])\s*(?:\\?.)?|\\[{}]|\\.|[(){}\[\]]",
@@ -133,8 +136,10 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
         Its first line.
     """
     held: list[Row] = []
-    problem, depth = "", 0
+    same: list[Statement] = []  # begun in the row in which what is held begins
+    problem, depth, is_new_row = "", 0, True
     for row in rows_of(text, line):
+        is_new_row = is_new_row or row.is_first
         plain = re.sub(r"\s+", " ", _without_words(row.text))
         if not _bare(plain):
             continue
@@ -142,28 +147,110 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
         goes_on = bool(held) and _goes_on(held[-1].text, depth, row)
         if goes_on and _is_ambiguous(row):
             problem = "a row that begins with a sign and has an = of its own"
+        if goes_on and held[0].column > row.column:
+            problem = "a row that may go on with either of two equations"
+            same = [replace(statement, problem=statement.problem or problem) for statement in same]
         if held and not goes_on:
-            if not has_relation(plain) and not _ends_statement(held[-1].text):
+            is_aside = _ends_statement(held[-1].text) and bool(_places(plain, OTHER_RELATIONS))
+            if not has_relation(plain) and not is_aside:
                 problem = problem or "a row that neither begins with an operator nor has an ="
             else:
-                yield from _statements_in(held, problem)
+                if is_new_row:
+                    yield from same
+                    same = []
+                same += _statements_in(held, problem)
+                if is_new_row:
+                    yield from same
+                    same = []
                 held, problem, depth = [], "", 0
         held.append(row)
         depth += _depth(plain)
+        is_new_row = False
     if held:
+        yield from same
         yield from _statements_in(held, problem)
 
 
 def _without_words(text: str) -> str:
     """Take labels and words away; words between formulas part them."""
     text = DROPPED.sub(" ", text)
+    if WORDS.search(text) is None:
+        return text
+    outside = {start for start, _ in _places(text, WORDS)}
 
     def worded(match: re.Match[str]) -> str:
-        inside = match[1].strip()
-        joins = re.fullmatch(r"[A-Za-z]{1,3}\d*", inside) and inside.lower() not in ("and", "or", "for", "if", "as")
-        return match[0] if joins else r" \quad\therefore "
+        is_outside = match.start() in outside
+        is_kept = _is_part(match, text) or (_is_doubtful(match, text) if is_outside else SYMMETRIC.match(match[0]))
+        return match[0] if is_kept else r" \quad\therefore "
 
     return WORDS.sub(worded, text)
+
+
+SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
+UNIT = re.compile(r"(?:[/ .*]*(?:kg|m|s|N|J|W|rad|cm|mm|g|deg|Nm)(?:\^?-?\d)?)+", re.ASCII)
+PROSE_WORDS = frozenset(
+    [
+        "and",
+        "or",
+        "for",
+        "if",
+        "as",
+        "so",
+        "let",
+        "we",
+        "now",
+        "is",
+        "at",
+        "on",
+        "in",
+        "by",
+        "of",
+        "to",
+        "the",
+        "not",
+        "all",
+        "are",
+    ]
+)
+DOUBTFUL = re.compile(
+    r"if|iff|when|whenever|unless|otherwise|else|provided|assuming|assume|except|only|not|near|at|small|large"
+    r"|plus|minus|times|divided|over|multiplied|squared|cubed|square|cube|root|twice|thrice|half|double"
+    r"|negative|without|add|added|subtract|subtracted|reduced|increased|sine?|cosine?|cos"
+    r"|one|two|three|four|five|six|seven|eight|nine|ten|third|quarter|wrong|incorrect|false|modulo|mod|pi|theta",
+    re.IGNORECASE,
+)
+"""Words that may change what a formula in front of them states."""
+PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
+
+
+def _is_part(match: re.Match[str], text: str) -> bool:
+    """Whether text is part of a formula: a name, or a unit behind a number."""
+    inside = match[1].strip()
+    if re.fullmatch(r"[A-Za-z]{1,3}\d*", inside, re.ASCII):
+        return inside.lower() not in PROSE_WORDS
+    behind_number = re.search(r"\d(?:[~\s]|\\[,;: ])*$", text[max(0, match.start() - 20) : match.start()])
+    return UNIT.fullmatch(inside) is not None and behind_number is not None
+
+
+def _is_doubtful(match: re.Match[str], text: str) -> bool:
+    """Whether text may be more than words between formulas: signs, numbers, formulas, conditions."""
+    inside = match[1]
+    if "$" in inside or "\\(" in inside:
+        return True
+    if "intertext" in match[0][:20]:
+        return False
+    words = re.findall("[A-Za-z]+", inside)
+    if PROSE.fullmatch(inside) is None or any(DOUBTFUL.fullmatch(word) for word in words):
+        return True
+    if words and words[-1].lower() in ("for", "with", "where", "as"):
+        return words[-1].lower() in ("for", "as") and _is_bounded(text[match.end() :])
+    return False
+
+
+def _is_bounded(behind: str) -> bool:
+    """Whether a text begins with a condition, q_1 > 0, rather than with an equation."""
+    behind = re.split(r"\\therefore|\\text|,", behind, maxsplit=1)[0]
+    return not has_relation(behind) and bool(_places(behind, OTHER_RELATIONS))
 
 
 def _bare(text: str) -> str:
@@ -181,7 +268,10 @@ def _bare(text: str) -> str:
 
 
 def _goes_on(last: str, depth: int, row: Row) -> bool:
-    if STARTS.match(row.text) and not (row.before and has_relation(row.text)):
+    is_statement = re.search(r"[A-Za-z\d]", row.before) is not None or row.before.isspace()
+    if STARTS_WITH_RELATION.match(row.text):
+        return True
+    if STARTS.match(row.text) and not (is_statement and has_relation(row.text)):
         return True
     return depth > 0 or ENDS.search(last[-200:]) is not None
 
@@ -192,6 +282,7 @@ def _is_ambiguous(row: Row) -> bool:
         STARTS.match(row.text) is not None
         and not STARTS_WITH_RELATION.match(row.text)
         and not row.after_mark
+        and (not row.before or re.search(r"[A-Za-z\d]", row.before) is not None)
         and has_relation(row.text)
     )
 
@@ -240,26 +331,37 @@ def has_relation(text: str) -> bool:
 def _statements_in(held: Sequence[Row], problem: str) -> Iterator[Statement]:
     """Yield the statements of rows that belong together: parted by words, arrows, and commas between equations."""
     line, text = held[0].line, re.sub(r"\s+", " ", " ".join(row.text for row in held))
-    for piece in _parted(text):
-        bare = _bare(piece)
-        if bare:
-            yield _statement(bare, line, problem)
+    found: list[Statement] = []
+    words = "words, or an arrow, and something of a formula that is no equation: "
+    marked = 0
+    is_open = ""  # what stands alone in front of words
+    for part in _split(text, _places(text, THEREFORE)):
+        if not _bare(part):
+            continue
+        is_whole = has_relation(part) and not STARTS_WITH_RELATION.match(_bare(part))
+        if not is_whole and found and not _places(part, OTHER_RELATIONS):
+            for at in range(marked, len(found)):
+                found[at] = replace(found[at], problem=found[at].problem or words + _bare(part)[:60])
+            marked = len(found)
+        own = problem or (words + is_open if is_open else "")
+        found += [_statement(bare, line, own) for piece in _parted(part) if (bare := _bare(piece))]
+        is_open = "" if is_whole else _bare(part)[:60]
+    yield from found
 
 
-def _parted(text: str) -> Iterator[str]:
-    pieces = _split(text, _places(text, THEREFORE))
-    for piece in pieces:
-        commas = _places(piece, re.compile(r"(?<!\\)[,;]"))
-        parts = _split(piece, commas)
-        joined = [parts[0]]
-        for part in parts[1:]:
-            if has_relation(part) and has_relation(joined[-1]) and not STARTS_WITH_RELATION.match(part):
-                joined.append(part)
-            elif not _bare(part):
-                continue
-            else:
-                joined[-1] += "," + part
-        yield from joined
+def _parted(piece: str) -> Iterator[str]:
+    """Yield the equations that commas part."""
+    commas = _places(piece, re.compile(r"(?<!\\)[,;]"))
+    parts = _split(piece, commas)
+    joined = [parts[0]]
+    for part in parts[1:]:
+        if has_relation(part) and has_relation(joined[-1]) and not STARTS_WITH_RELATION.match(part):
+            joined.append(part)
+        elif not _bare(part):
+            continue
+        else:
+            joined[-1] += "," + part
+    yield from joined
 
 
 def _split(text: str, places: Sequence[tuple[int, int]]) -> list[str]:
@@ -274,6 +376,9 @@ def _statement(text: str, line: int, problem: str) -> Statement:
     sides = [_bare(side) for side in _split(text, _places(text, EQUAL))]
     if _depth(text) != 0:
         problem = problem or "brackets that do not close"
+    doubtful = [match for match in WORDS.finditer(text) if _is_doubtful(match, text) and not _is_part(match, text)]
+    if doubtful:
+        problem = problem or f"text that may change what is stated: {doubtful[0][0][:60]}"
     if len(sides) > 1 and _places(text, OTHER_RELATIONS):
         problem = problem or "another relation than ="
     if len(sides) == 1:
@@ -384,7 +489,10 @@ def _plain_statements(text: str) -> Iterator[Statement]:
     """Yield the statements of plain text: one a line, or between semicolons; lines that go on belong together."""
     held: list[str] = []
     start, depth = 1, 0
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, typed in enumerate(text.splitlines(), start=1):
+        line = PLAIN_COMMENT.sub("", typed)
+        if typed.strip() and not line.strip():
+            continue
         if not line.strip():
             goes_on = depth > 0
         else:

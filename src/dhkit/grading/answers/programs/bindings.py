@@ -10,6 +10,7 @@ from typing import TypeAlias
 __all__ = [
     "STRUCTURE",
     "Binding",
+    "Default",
     "Formula",
     "FunctionNamed",
     "ModuleNamed",
@@ -151,10 +152,26 @@ class NotUnderstood:
     only_matrices: bool = False
 
 
+@dataclass(frozen=True)
+class Default:
+    """The default of a function's argument, which stands where a call leaves the argument out.
+
+    Attributes
+    ----------
+    formula
+        The default.
+    has_fields
+        Whether it is a structure whose fields are bound one by one.
+    """
+
+    formula: Formula
+    has_fields: bool = False
+
+
 STRUCTURE = "structure"
 """Module that stands for a structure, whose fields are assigned one by one: p.m1 = 2."""
 
-Value: TypeAlias = Formula | Symbol | FunctionNamed | ModuleNamed | NotUnderstood
+Value: TypeAlias = Formula | Symbol | FunctionNamed | ModuleNamed | NotUnderstood | Default
 
 
 @dataclass(frozen=True)
@@ -194,11 +211,14 @@ class Returned:
         The local name that it returns; ``return`` where it returns a formula.
     is_only
         Whether it returns nothing else.
+    names
+        Names in a formula that it returns.
     """
 
     function: str
     local: str
     is_only: bool = True
+    names: tuple[str, ...] = ()
 
 
 @dataclass

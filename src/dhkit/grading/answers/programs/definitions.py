@@ -219,7 +219,7 @@ class Definitions:
         if read.use in (Use.CALL, Use.MODULE):
             return self._called_name(read, standing, bound=owner is not None)
         if standing.library is not None and not (read.member and standing.library == ModuleNamed(STRUCTURE)):
-            raise _NotReadError(f"{read.name} is a function or a module")
+            raise _NotReadError(self._is_function(read.name))
         if read.use is Use.TIME:
             if standing.defined is not None or standing.entries:
                 raise _NotReadError(f"{read.name} is not the time")
@@ -240,6 +240,12 @@ class Definitions:
             assert owner is not None  # noqa: S101
             return self._entry(owner, scope, read, place, standing)
         return self._itself(scope, owner, read)
+
+    def _is_function(self, name: str) -> str:
+        if not self.names.quantities.is_parameter(name):
+            return f"{name} is a function or a module"
+        quantity = self.names.quantities.quantity(name)
+        return f"{name} is the robot's parameter; name the function {name.upper() if quantity else 'otherwise'}"
 
     def _called_name(self, read: Read, standing: Standing, bound: bool) -> str | None:
         if read.use is Use.MODULE:
@@ -321,6 +327,10 @@ class Definitions:
     def _itself(self, scope: Scope, owner: Scope | None, read: Read) -> str | None:
         """Return what stands for a name that the notation has to know."""
         names, plain = self.names, plain_name(read.name)
+        outside = owner.outer.bindings.get(read.name, []) if owner is not None and owner.outer is not None else []
+        is_symbol = owner is not None and any(isinstance(b.value, Symbol) for b in owner.bindings[read.name])
+        if not is_symbol and any(b.value == FunctionNamed("") for b in outside):
+            raise _NotReadError(self._is_function(read.name))
         if read.index is not None:
             position = names.position(read.index)
             if position is None or not names.vocabulary.knows(f"{plain}{position + 1}"):

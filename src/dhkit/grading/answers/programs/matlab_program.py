@@ -137,6 +137,14 @@ HARMLESS = frozenset(
     )
 )
 """Commands, and functions without a value, that assign nothing."""
+SYNTAX = frozenset(
+    (
+        *("syms", "sym", "vpa", "str2sym", "symfun", "plus", "minus", "times", "mtimes", "rdivide", "mrdivide"),
+        *("power", "mpower", "uminus", "uplus", "ctranspose", "transpose", "horzcat", "vertcat", "subsref"),
+        *("subsasgn", "colon", "subsindex", "end", "nargin"),
+    )
+)
+"""Functions that signs and brackets of formulas stand for, and those that make symbols."""
 ASSIGNING = frozenset(("+=", "-=", "*=", "/=", "^=", "|=", "&="))
 
 
@@ -191,6 +199,8 @@ class _Reader:
         self.function: _Function | None = None
         self.owns: set[str] = set()
         self.single: set[tuple[int, str]] = set()
+        self.functions: set[str] = set()
+        """Names of the file's functions, which go before those of MATLAB's everywhere in the file."""
 
     def read(self, found: list[Statement]) -> Program:
         for statement in found:
@@ -208,6 +218,13 @@ class _Reader:
             self._statement(found[k], has_ends)
             k += 1
         self._finish()
+        own = {
+            name: [b for b in bindings if b.value == FunctionNamed("") and name in self.functions]
+            for name, bindings in self.program.main.bindings.items()
+        }
+        everywhere = Scope({name: bindings for name, bindings in own.items() if bindings})
+        for scope in self.program.functions:
+            scope.outer = scope.outer or everywhere
         return self.program
 
     @property
@@ -316,6 +333,9 @@ class _Reader:
         right = tokens[equals + 1 :] if equals is not None else tokens
         if not right or right[0].kind != "name":
             raise self._refuse(statement, "found a function without a name")
+        if right[0].text in SYNTAX:
+            raise self._refuse(statement, f"found a function {right[0].text!r}, which changes what formulas mean")
+        self.functions.add(right[0].text)
         scope = Scope()
         self.program.functions.append(scope)
         line = self._line(statement)

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.bindings import Binding, Formula, NotUnderstood, Program, Scope, Use
+from dhkit.grading.answers.programs.bindings import (
+    Binding,
+    Formula,
+    FunctionNamed,
+    NotUnderstood,
+    Program,
+    Scope,
+    Symbol,
+    Use,
+)
 from dhkit.grading.answers.programs.definitions import Definitions, Node
 from dhkit.grading.answers.programs.standing import NameTable, Standing
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
@@ -30,7 +39,7 @@ WRITTEN_BY_DHKIT = {
 RETURNED = "return"
 """Local name of a formula that a function returns; no program has a variable of this name."""
 MAX_LEFT_OUT = 20
-CALL = re.compile(r"\w+\s*\([\w\s,.]*\)", re.ASCII)
+CALL = re.compile(r"(\w+)\s*\(([\w\s,.]*)\)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,9 @@ class _Given:
     is_alias: bool = False
     is_named_entry: bool = False
     name: str = ""
+    called: str = ""
+    function: str = ""
+    """The function that gives it; empty of the program itself."""
 
 
 def answers_of(program: Program, description: Description, file: str) -> AnswerSheet:
@@ -69,7 +81,8 @@ class _Answers:
         self.zeros: set[str] = set()
 
     def sheet(self) -> AnswerSheet:
-        given = self._without_aliases(self._with_locals([*self._main(), *self._returned()]))
+        given = self._with_locals([*self._main(), *self._returned()])
+        given = self._without_aliases(self._without_rebound(given))
         answers: dict[str, Any] = {}
         for quantity in dict.fromkeys(one.target.quantity for one in given):
             own = [one for one in given if one.target.quantity == quantity]
@@ -101,7 +114,8 @@ class _Answers:
                 is_named = self.quantities.quantity(own) or self.quantities.entries(own)
                 name = own if returned.is_only and is_named else returned.local
                 if returned.local in scope.bindings:
-                    yield from self._of_name(scope, returned.local, name)
+                    for one in self._of_name(scope, returned.local, name):
+                        yield replace(one, called=name, function=returned.function)
 
     def _with_locals(self, given: list[_Given]) -> list[_Given]:
         """Add what functions assign and do not return, where nothing else gives the quantity."""
@@ -110,14 +124,134 @@ class _Answers:
         for scope in self.program.functions:
             returned = {one.local for one in scope.returned}
             for name in scope.bindings:
-                if name not in returned:
-                    found += [one for one in self._of_name(scope, name, name) if one.target.quantity not in known]
+                if name in returned or name == RETURNED:
+                    continue
+                for one in self._of_name(scope, name, name):
+                    if one.target.quantity in known:
+                        continue
+                    function = scope.returned[0].function if scope.returned else ""
+                    if not one.reason and self._is_changed_on_return(scope, name, one.target.quantity):
+                        reason = f"{function} returns something else that it makes of {name}, which {one.line} assigns"
+                        one = replace(one, node=None, reason=reason)
+                    found.append(replace(one, called=name, function=f"{function} "))
         told: set[str] = set()
         for one in found:
             if one.target.quantity not in told and not one.reason:
                 told.add(one.target.quantity)
                 self.notes.append(f"{one.line}: {one.name} is a local name of a function, which does not return it")
         return [*given, *found]
+
+    def _is_changed_on_return(self, scope: Scope, name: str, quantity: str) -> bool:
+        """Whether what a function returns is made of a local name and of no other quantity: -G, G*sign."""
+        waiting = [x for r in scope.returned for x in (r.names or (r.local,))]
+        seen: set[str] = set()
+        is_made_of = False
+        while waiting:
+            used = waiting.pop()
+            if used in seen:
+                continue
+            seen.add(used)
+            if used == name:
+                is_made_of = True
+                continue
+            other = self.quantities.quantity(used) or next((t.quantity for t in self.quantities.entries(used)), "")
+            is_known = self.names.is_vector(used) or self.names.find(used) is not None
+            is_other = (bool(other) and other != quantity) or is_known
+            if is_other and not self.quantities.is_parameter(used) and used != "t":
+                return False
+            for binding in scope.bindings.get(used, ()):
+                if isinstance(binding.value, Formula):
+                    waiting += re.findall(r"[A-Za-z_]\w*", binding.value.text)
+        return is_made_of
+
+    def _without_rebound(self, given: list[_Given]) -> list[_Given]:
+        """Refuse what functions give where the program binds the function, or the quantity, to something else."""
+        main = self.program.main
+        understood = {one.name for one in given if not one.function}
+        for one in given:
+            if one.called in (one.function, WRITTEN_BY_DHKIT.get(one.function)):
+                understood.add(one.function)
+        kept = []
+        for one in given:
+            function = one.function.strip()
+            reason = ""
+            if one.function and not one.reason:
+                standing = self.names.standing(main, function) if function in main.bindings else Standing()
+                names = [name for name in main.bindings if self._is_rival(name, one)]
+                rival = next((x for x in names if x not in understood and not self._is_plain_call(x, function)), "")
+                if standing.wrong:
+                    reason = standing.wrong
+                elif rival:
+                    line = main.bindings[rival][-1].line
+                    reason = f"{rival} is bound in {line} to what is not read"
+            if one.is_named_entry and not one.function and not one.reason:
+                whole = next((x for x in main.bindings if x not in understood and self._is_made_of(x, one)), "")
+                if whole:
+                    reason = (
+                        f"{whole} is made of {one.name} in {main.bindings[whole][-1].line}, in a way that is not read"
+                    )
+            kept.append(replace(one, node=None, reason=reason) if reason else one)
+        return kept
+
+    def _is_rival(self, name: str, one: _Given) -> bool:
+        """Whether a name of the program is that of a quantity that a function gives."""
+        bindings = self.program.main.bindings[name]
+        if all(isinstance(b.value, NotUnderstood) and b.value.only_matrices for b in bindings):
+            return False
+        quantity = self.quantities.quantity(name)
+        is_same = quantity == one.target.quantity and not self.quantities.is_alias(name)
+        if name not in (one.called, one.name) and not is_same:
+            return False
+        if self.quantities.is_parameter(name):
+            standing = self.names.standing(self.program.main, name)
+            return bool(standing.wrong) or not standing.is_itself
+        return True
+
+    def _is_made_of(self, name: str, one: _Given) -> bool:
+        """Whether a name of the program is that of a whole quantity that is made of an entry of it: G = -[G1, G2]."""
+        if self.quantities.quantity(name) != one.target.quantity or self.quantities.is_parameter(name):
+            return False
+        texts = [b.value.text for b in self.program.main.bindings[name] if isinstance(b.value, Formula)]
+        return any(one.name in re.findall(r"[A-Za-z_]\w*", text) for text in texts)
+
+    def _is_plain_call(self, name: str, function: str) -> bool:
+        """Whether a name is bound to a call of the function that gives the quantity, with its own arguments."""
+        main = self.program.main
+        scope = next((s for s in self.program.functions if any(r.function == function for r in s.returned)), None)
+        bindings = _whole_bindings(main, name)
+        if scope is None or len(bindings) != 1 or not isinstance(bindings[0].value, Formula):
+            return False
+        match = CALL.fullmatch(bindings[0].value.text)
+        if match is None or match[1] != function:
+            return False
+        formal = [
+            x
+            for x, bound in scope.bindings.items()
+            if isinstance(bound[0].value, Symbol) and bound[0].value.is_argument
+        ]
+        actual = [x.strip() for x in match[2].split(",")] if match[2].strip() else []
+        if any(b.value != FunctionNamed("") for b in _whole_bindings(main, function)) or len(actual) > len(formal):
+            return False
+        for argument, own in zip(actual, formal, strict=False):
+            is_number = re.fullmatch(r"[\d.]+", argument) is not None
+            if is_number and not self.quantities.is_parameter(own):
+                continue
+            if argument != own:
+                return False
+            if _whole_bindings(main, argument) and not self._is_state_or_numbers(argument):
+                return False
+        return True
+
+    def _is_state_or_numbers(self, name: str) -> bool:
+        """Whether a name of the program is what the notation says, or numbers for joint variables."""
+        standing = self.names.standing(self.program.main, name)
+        if standing.is_itself and not standing.wrong and standing.defined is None:
+            return True
+        values = [b.value for b in _whole_bindings(self.program.main, name)]
+        if self.quantities.is_parameter(name) or len(values) != 1 or not isinstance(values[0], Formula):
+            return False
+        entries = (values[0].entries or {(): values[0]}).values()
+        return all(entry.number is not None for entry in entries)
 
     def _of_name(self, scope: Scope, name: str, called: str) -> Iterable[_Given]:
         """Return what a name gives that is called as a quantity or an entry is."""
@@ -329,3 +463,10 @@ class _Answers:
         for length in self.quantities.shape(quantity):
             places = [(*place, k) for place in places for k in range(length)]
         return places
+
+
+def _whole_bindings(scope: Scope, name: str) -> list[Binding]:
+    """Return what binds a name, without calls that may change a matrix that it stands for."""
+    return [
+        b for b in scope.bindings.get(name, ()) if not (isinstance(b.value, NotUnderstood) and b.value.only_matrices)
+    ]

@@ -113,6 +113,15 @@ HARMLESS = frozenset(
     )
 )
 """Functions that change nothing that they are given."""
+SHARING = frozenset(
+    (
+        *("asarray", "matrix", "list", "tuple", "dict", "sorted", "zip", "max", "min", "Max", "Min", "fmin", "fmax"),
+        *("sum", "S", "sympify", "set", "enumerate", "super", "N", "collect", "simplify", "expand", "diag", "all"),
+        *("any", "abs", "round", "nsimplify", "together", "cancel", "factor", "trigsimp", "powsimp", "radsimp"),
+    )
+)
+"""Harmless functions whose value may be what they are given, or share entries with it."""
+COPIES = HARMLESS - SHARING
 PURE_METHODS = frozenset(
     (
         "subs",
@@ -351,20 +360,14 @@ class Effects:
                 return {x.id for x in ast.walk(value) if isinstance(x, ast.Name)}
             case ast.Call(function):
                 name = function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
-                copies = name in HARMLESS and name not in (
-                    "asarray",
-                    "matrix",
-                    "list",
-                    "tuple",
-                    "dict",
-                    "sorted",
-                    "zip",
-                )
-                if copies or name in ("asarray_chkfinite",):
+                is_own = name in self.own and name not in self.imported and not isinstance(function, ast.Attribute)
+                keywords = {keyword.arg for keyword in value.keywords}
+                if name in COPIES and not is_own and not keywords & CHANGING_ARGUMENTS:
                     return set()
                 names = {name for argument in self._arguments(value) for name in self.parts(argument)}
-                is_method = isinstance(function, ast.Attribute)
-                return names | (self.parts(function.value) - self.modules if is_method else set())  # type: ignore[attr-defined]
+                if isinstance(function, ast.Attribute):
+                    return names | (self.parts(function.value) - self.modules)
+                return names | ({name} if name and is_own else set())
         return set()
 
 

@@ -17,7 +17,7 @@ from dhkit.grading.answers.rewriting import MODULES
 from dhkit.grading.answers.tokens import folded
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-__all__ = ["MATRIX_CALLS", "PythonFormulas", "constant_index", "joined", "spelled"]
+__all__ = ["EXACT", "MATRIX_CALLS", "PythonFormulas", "constant_index", "joined", "spelled"]
 
 NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 UNCHANGED = frozenset(
@@ -38,6 +38,8 @@ MATRIX_CALLS = frozenset(
         "SX",
     )
 )
+EXACT = frozenset(("Integer", "Rational", "int", "round", "floor", "ceil", "trunc"))
+"""Functions that make another number of a quotient of floating-point numbers: Integer(1/3) is 0."""
 ZEROS = frozenset(("zeros", "zeros_like"))
 VECTORS = ("asarray", "array", "ravel", "squeeze", "flatten", "list", "tuple", "Matrix", "atleast_1d", "asanyarray")
 """Functions that turn a vector into the same vector."""
@@ -349,6 +351,8 @@ class PythonFormulas:
             reads += [Read(use.name, start, start, use=use.use) for use in uses]
             changes.append((start, end, f"diff({spelled(name)}, t{', 2' if order == 2 else ''})"))
             return ""
+        if problem := _exact_problem(node):
+            return problem
         if isinstance(function, ast.Name):
             of_time = len(node.args) == 1 and isinstance(node.args[0], ast.Name) and node.args[0].id == "t"
             if of_time and function.id not in FUNCTION_NAMES:
@@ -433,6 +437,20 @@ def _called(node: ast.expr) -> str:
         case ast.Call(ast.Name(name)) | ast.Call(ast.Attribute(ast.Name(), name)):
             return str(name)
     return ""
+
+
+def _exact_problem(node: ast.Call) -> str:
+    """Return why Integer(...) or Rational(...) is not read: its arguments have to be numbers as they stand."""
+    called = _called(node)
+    if called not in EXACT:
+        return ""
+    numbers = [x.operand if isinstance(x, ast.UnaryOp) and isinstance(x.op, ast.USub) else x for x in node.args]
+    types = [type(x.value) if isinstance(x, ast.Constant) else None for x in numbers]
+    if called in ("Integer", "int") and types == [int]:
+        return ""
+    if called == "Rational" and types in ([int], [float], [int, int]):
+        return ""
+    return f"{called}(...) of anything but whole numbers is not read"
 
 
 def _is_module_call(function: ast.Attribute, names: frozenset[str]) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.programs.bindings import (
+    Default,
     Formula,
     FunctionNamed,
     ModuleNamed,
@@ -21,8 +22,8 @@ from dhkit.grading.answers.programs.bindings import (
     Use,
     Value,
 )
-from dhkit.grading.answers.programs.python_effects import Effects, bound_names
-from dhkit.grading.answers.programs.python_formulas import VECTORS, PythonFormulas, constant_index, spelled
+from dhkit.grading.answers.programs.python_effects import Effects, bound_names, part_names
+from dhkit.grading.answers.programs.python_formulas import EXACT, VECTORS, PythonFormulas, constant_index, spelled
 from dhkit.grading.answers.tokens import dotted
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
@@ -105,9 +106,15 @@ class _Reader:
         self.program = Program()
         self.effects = Effects()
         self.statements = 0
+        self.fields: dict[str, dict[str, ast.expr]] = {}
 
     def read(self, tree: ast.Module) -> Program:
         self.effects.own |= {spelled(name) for name in bound_names(tree.body)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                given = [x.value for x in ast.walk(node) if isinstance(x, ast.Return | ast.Yield | ast.YieldFrom)]
+                for value in given:
+                    self.effects.alias(node.name, self.effects.parts(value) if value is not None else ())
         self._block(tree.body, self.program.main)
         for scope in self.program.functions:
             self._changes_outside(scope)
@@ -184,6 +191,8 @@ class _Reader:
                     statement.name, statement.args, statement.body, statement, bool(statement.decorator_list)
                 )
             case ast.ClassDef():
+                if scope is self.program.main:
+                    self.fields[statement.name] = _class_fields(statement)
                 self._not_understood(scope, [statement.name], statement, "a class of this name")
                 self._not_understood(scope, _globals(statement.body), statement, "'global'")
                 self._block_changes(statement, scope)
@@ -223,12 +232,28 @@ class _Reader:
             case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
                 self._assign_entry(name, [first, second], value, statement, scope)
             case _:
-                self._not_understood(scope, bound_names([statement]), statement, "an assignment to a part of it")
+                names = bound_names([statement])
+                self._parts_changed(statement, scope)
+                shared_with = sorted(self.effects.parts(value))
+                for name in names:
+                    self.effects.alias(name, shared_with)
+                self._not_understood(scope, names, statement, "an assignment to a part of it")
+                for other in shared_with:
+                    reason = f"{spelled(other)[:40]} is stored in a part of {names[0] if names else 'another'}"
+                    reason += f" in {self._line(statement)}, and may be changed there"
+                    self._bind(scope, other, statement, NotUnderstood(reason, only_matrices=True))
+
+    def _parts_changed(self, statement: ast.stmt, scope: Scope) -> None:
+        """Note that other names of the matrices change whose parts a statement assigns."""
+        for name in part_names(statement):
+            self._alias_changed(name, statement, scope)
 
     def _assign_name(self, name: str, value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
         if self._is_same(name, value):
             return
         self.effects.alias(name, self.effects.parts(value))
+        if scope is self.program.main and (fields := self._fields(value)):
+            self.fields[name] = {} if name in self.fields else fields
         if isinstance(value, ast.Lambda) and scope is self.program.main:
             self._function(name, value.args, value.body, statement, False)
             return
@@ -254,7 +279,7 @@ class _Reader:
                 function = name
             case _:
                 return ""
-        return str(function) if function in FUNCTION_NAMES and len(function) > 1 else ""
+        return str(function) if function in FUNCTION_NAMES and len(function) > 1 and function not in EXACT else ""
 
     def _is_same(self, name: str, value: ast.expr) -> bool:
         """Whether a value is the name itself, simplified, or as an array."""
@@ -290,6 +315,10 @@ class _Reader:
     def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
         everything = bound_names([statement])
+        shared_with = self.effects.parts(value)
+        self._parts_changed(statement, scope)
+        for name in everything:
+            self.effects.alias(name, shared_with)
         if len(names) != len(targets):
             self._not_understood(scope, everything, statement, "an unpacking that is not read")
             return
@@ -427,7 +456,10 @@ class _Reader:
                 self._bind(scope, name, statement, Symbol(alias.name))
             elif module in MODULES or module in ("sympy.functions", "sympy.core"):
                 self.effects.imported.add(name)
-                if alias.name == "pi":
+                if alias.name in EXACT and alias.name != name:
+                    reason = f"{name[:40]} is {alias.name} in {self._line(statement)}, which is read by its own name"
+                    self._bind(scope, name, statement, NotUnderstood(reason))
+                elif alias.name == "pi":
                     self._bind(scope, name, statement, Symbol("pi"))
                 else:
                     self._bind(scope, name, statement, FunctionNamed(alias.name))
@@ -448,7 +480,7 @@ class _Reader:
         main = self.program.main
         for name, bindings in list(main.bindings.items()):
             is_exported = name in LATER if len(name) == 1 else not any(c.isdigit() for c in name)
-            is_value = any(isinstance(b.value, Formula | Symbol) for b in bindings)
+            is_value = any(isinstance(b.value, Formula | Symbol) or b.value == FunctionNamed("") for b in bindings)
             if is_exported and is_value and name not in ("tau", "KE", "PE", "Tau", "Jac"):
                 self._not_understood(main, [name], statement, f"'from {module} import *'")
 
@@ -480,6 +512,7 @@ class _Reader:
         for argument, default in with_defaults:
             if default is not None:
                 self.effects.alias(argument.arg, self.effects.parts(default))
+                self._default(argument.arg, default, statement, scope)
         for rest in (arguments.vararg, arguments.kwarg):
             if rest is not None:
                 self._not_understood(scope, [rest.arg], statement, "'*'")
@@ -504,15 +537,39 @@ class _Reader:
             return
         self._returned(name, last.value, last, scope)
 
+    def _default(self, name: str, default: ast.expr, statement: ast.stmt, scope: Scope) -> None:
+        """Note the default of an argument; of a structure its fields."""
+        fields = self._fields(default)
+        for field_name, value in fields.items():
+            self._bind(scope, f"{spelled(name)}.{spelled(field_name)}", statement, self.formulas.formula(value))
+        self._bind(scope, name, statement, Default(self.formulas.formula(default), bool(fields)))
+
+    def _fields(self, value: ast.expr) -> dict[str, ast.expr]:
+        """Return the fields of a structure: a dictionary, an object of a class of the file, or a name of one."""
+        match value:
+            case ast.Name(name):
+                return self.fields.get(name, {})
+            case ast.Dict(keys, values) if all(isinstance(k, ast.Constant) for k in keys):
+                return {str(k.value): v for k, v in zip(keys, values, strict=True) if isinstance(k, ast.Constant)}
+            case ast.Call(ast.Name(name), [], keywords) if name in self.fields or name in ("dict", "SimpleNamespace"):
+                if all(keyword.arg for keyword in keywords):
+                    given = {keyword.arg: keyword.value for keyword in keywords if keyword.arg}
+                    return {**self.fields.get(name, {}), **given}
+        return {}
+
     def _returned(self, name: str, value: ast.expr, statement: ast.stmt, scope: Scope) -> None:
         """Note what a function returns: local names, or a formula."""
-        values = value.elts if isinstance(value, ast.Tuple) else [value]
+        is_several = isinstance(value, ast.Tuple | ast.Dict)
+        values = (
+            value.elts if isinstance(value, ast.Tuple) else value.values if isinstance(value, ast.Dict) else [value]
+        )
         locals_ = [self._local(x, scope) for x in values]
         if all(locals_):
-            scope.returned += [Returned(name, local, is_only=len(values) == 1) for local in locals_]
+            scope.returned += [Returned(name, local, is_only=not is_several) for local in locals_]
             return
         self.program.bind(scope, "return", self._line(statement), self.formulas.formula(value))
-        scope.returned.append(Returned(name, "return"))
+        names = dict.fromkeys(spelled(x.id) for x in ast.walk(value) if isinstance(x, ast.Name))
+        scope.returned.append(Returned(name, "return", names=tuple(names)))
 
     def _local(self, value: ast.expr, scope: Scope) -> str:
         """Return the local name that a value is, as it is or as an array; nothing for another value."""
@@ -528,12 +585,32 @@ class _Reader:
                     module in self.effects.modules and function in (*VECTORS, "simplify")
                 ):
                     value = inner
+                case ast.Call(ast.Attribute(inner, "flatten" | "ravel" | "squeeze" | "copy" | "simplify"), []) if (
+                    not isinstance(inner, ast.Name) or inner.id not in self.effects.modules
+                ):
+                    value = inner
                 case ast.Call(ast.Name("simplify"), [inner]) if (
                     "simplify" not in self.effects.own - self.effects.imported
                 ):
                     value = inner
                 case _:
                     return ""
+
+
+def _class_fields(statement: ast.ClassDef) -> dict[str, ast.expr]:
+    """Return what the body of a class assigns, as the fields of its objects; nothing where it has methods."""
+    found: dict[str, ast.expr] = {}
+    for inner in statement.body:
+        match inner:
+            case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign([ast.Name(name)], value):
+                if name in found:
+                    return {}
+                found[name] = value
+            case ast.Expr(ast.Constant()) | ast.Pass():
+                pass
+            case _:
+                return {}
+    return found
 
 
 def _globals(statements: Sequence[ast.stmt]) -> list[str]:

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 from dhkit.description import Description
 from dhkit.grading.answers.programs.bindings import (
+    STRUCTURE,
     Binding,
+    Default,
     Formula,
     FunctionNamed,
     ModuleNamed,
@@ -116,6 +118,11 @@ class NameTable:
                     return Standing(wrong=reason)
                 case NotUnderstood():
                     pass
+                case Default(formula, has_fields):
+                    wrong, said = self._default(name, formula, has_fields, binding)
+                    if wrong:
+                        return Standing(wrong=wrong)
+                    note = said or note
                 case Symbol(symbol):
                     if self._is_same(name, symbol):
                         itself.append(binding)
@@ -161,7 +168,9 @@ class NameTable:
             return Standing(wrong=f"{name} is assigned twice, in {other.line}")
         if library:
             known = library[0].value
-            other = next((b for b in [*itself, *defined, *parts, *library] if b.value != known), None)
+            own = known == FunctionNamed("")  # each function of the file is another one
+            others = [*itself, *defined, *parts, *library]
+            other = next((b for b in others if b.value != known or (own and b is not library[0])), None)
             if other is not None:
                 return Standing(wrong=f"{name} is assigned twice, in {other.line}")
             return Standing(library=known if isinstance(known, FunctionNamed | ModuleNamed) else None)
@@ -205,6 +214,41 @@ class NameTable:
 
     # Names that stand for themselves
 
+    def _default(self, name: str, formula: Formula, has_fields: bool, binding: Binding) -> tuple[str, str]:
+        """Return why the default of an argument changes what is computed, and a note where it does not."""
+        if formula.text == name and not formula.problem:
+            return "", ""
+        shown = f"{name} = {formula.text[:40]}"
+        if self.quantities.is_parameter(name) and formula.number is not None:
+            value = self.values.get(self.quantities.parameters[plain_name(name)])
+            if value is not None and abs(value - formula.number) <= TOLERANCE * abs(value):
+                return "", f"{binding.line}: {shown} is the file's own number"
+            return f"{name} has the default {formula.text[:40]} in {binding.line}; the robot's file has {value}", ""
+        if has_fields:
+            return "", ""
+        return f"an argument has the default {shown} in {binding.line}", ""
+
+    def _is_field(self, scope: Scope, name: str, formula: Formula) -> bool:
+        """Whether a formula is the field of this name of a structure: m1 = p.m1."""
+        (read, *rest) = formula.reads or (None,)
+        if read is None or rest or (read.start, read.end) != (0, len(formula.text)) or not read.member:
+            return False
+        owner = scope.owner(read.name)
+        if owner is None or plain_name(read.member) != plain_name(name) or not self.quantities.is_parameter(name):
+            return False
+        standing = self.standing(owner, read.name)
+        is_argument = any(isinstance(b.value, Symbol) and b.value.is_argument for b in owner.bindings[read.name])
+        is_structure = standing.library == ModuleNamed(STRUCTURE) or (standing.library is None and is_argument)
+        if standing.wrong or standing.defined is not None or standing.entries or not is_structure:
+            return False
+        holder = scope.owner(f"{read.name}.{read.member}")
+        value = self.values.get(self.quantities.parameters[plain_name(name)])
+        fields = holder.bindings[f"{read.name}.{read.member}"] if holder is not None else []
+        numbers = [b.value.number if isinstance(b.value, Formula) else None for b in fields]
+        return all(
+            x is not None and value is not None and abs(value - x) <= TOLERANCE * abs(value) for x in numbers
+        ) and (bool(numbers) or is_argument)
+
     def _is_same(self, name: str, symbol: str) -> bool:
         own, other = plain_name(name), plain_name(symbol)
         meaning = self.find(symbol)
@@ -223,7 +267,7 @@ class NameTable:
             return ""
         if formula.problem:
             return f"{name} is set in {binding.line} to what is not read"
-        if self._is_same_state(scope, name, formula, binding.place):
+        if self._is_same_state(scope, name, formula, binding.place) or self._is_field(scope, name, formula):
             return None
         return f"{name} is set to {formula.text[:40]!r} in {binding.line}, and is the robot's own name"
 
