@@ -9,6 +9,7 @@ import pytest
 
 from dhkit import Arm
 from dhkit.description import library_robot, read_robot
+from dhkit.errors import AnswerError
 from dhkit.grading import Verdict, grade
 from dhkit.grading.judging import functions
 
@@ -589,3 +590,114 @@ def test_sheets_that_name_their_own_robot_say_so(tmp_path):
     (tmp_path / "a.toml").write_text(f'format = 1\nrobot = "planar2r"\n[answer]\nV = "{V}"\n')
     assert grade(tmp_path / "a.toml").own_robot
     assert not grade(tmp_path / "a.toml", library_robot("planar2r")).own_robot
+
+
+# Found by the second reviews
+
+
+@pytest.mark.parametrize(
+    ("sheet", "read"),
+    [
+        (("theta[1]", "theta[1] + theta[2]"), ("q1", "q1 + q2")),
+        (("q[1]", "q[0] + q[1]"), ("q2", "q1 + q2")),
+        (("cos(q[1])", "l1**2"), ("cos(q2)", "l1^2")),
+        (("theta[1]", "theta[1](t)"), ("q1", "q1")),
+    ],
+)
+def test_indices_of_a_sheet_count_from_one_base(sheet, read):
+    report = ARM.grade({"g": list(sheet)}, explain=False)
+    assert tuple(entry.read for entry in report.entries) == read
+
+
+@pytest.mark.parametrize("texts", [("theta[1]", "l1"), ("cos(qd[1])", "l1^2"), ("l[1]", "q1")])
+def test_an_index_that_may_count_from_0_and_from_1_is_asked_about(texts):
+    first, _ = ARM.grade({"g": list(texts)}, explain=False).entries
+    assert first.verdict is Verdict.UNREADABLE and "counted from 0" in first.statement
+
+
+def test_indices_in_a_program_count_from_0(tmp_path):
+    (tmp_path / "a.py").write_text("V = m1*g*l1*sin(q[1])\n")
+    (entry,) = grade(tmp_path / "a.py", library_robot("planar2r"), explain=False).entries
+    assert entry.read == "m1*g*l1*sin(q2)"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "d/dt m2 q1",
+        "d/dt q1 * q2",
+        r"\frac{d}{dt} q_1 q_2",
+        r"\frac{d}{dt}\cos q_1 \sin q_1",
+        r"\frac{d}{dt}\cos(q_1)\sin(q_1)",
+        "s2q1",
+        "c1q2",
+        "S2theta1",
+        "(q1 + q2)'",
+        "m1'",
+        "q1'''",
+        r"(q_1)' + \frac{1}{2}",
+        "m1\nl1",
+        "  2\nm1",
+        "  2   \nl1 *m1\n------\n  3   ",
+        "g*m1   m2\n---- + --\n 2     3 ",
+        "m1 + l1\nm2 + l2",
+    ],
+)
+def test_what_may_mean_two_things_is_asked_about(text):
+    assert verdict(V=text) is Verdict.UNREADABLE
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("d/dt q1", "qd1"),
+        ("d/dt q1(t) q2", "qd1*q2"),
+        ("d/dt (m2 q1)", "m2*qd1"),
+        ("d/dt m2", "0"),
+        ("d/dt q1 + q2", "qd1 + q2"),
+        (r"\frac{d}{dt}\cos(q_1 + q_2)", "(-sin(q1 + q2))*(qd1 + qd2)"),
+        (r"\left(\frac{d}{dt} q_1\right)^2", "qd1^2"),
+        ("s2 q1", "sin(q2)*q1"),
+        ("q1''", "qdd1"),
+        ("m2.*cos(q(2))'", "m2*cos(q2)"),
+        ("m1*l1\n+ m2*l2", "m1*l1 + m2*l2"),
+        ("m1*l1 +\n\n  m2*l2\n", "m1*l1 + m2*l2"),
+        ("m1*(l1\n+ l2)", "m1*(l1 + l2)"),
+    ],
+)
+def test_what_means_one_thing_is_read(text, read):
+    assert reading(text) == read
+
+
+@pytest.mark.parametrize("form", ["expand", "factor", "together"])
+def test_what_sympy_prints_in_ascii_over_several_lines_is_never_misread(form):
+    import sympy
+
+    for name in ("planar2r", "cart_pendulum", "polar_rp"):
+        arm = Arm.load(name)
+        for entry in arm.lagrangian.sympy()["M"]:
+            written = sympy.pretty(getattr(sympy, form)(entry), use_unicode=False, wrap_line=False)
+            right = arm.grade({"M11": written}, explain=False).entries[0].verdict
+            assert "\n" not in written or right is Verdict.UNREADABLE
+
+
+@pytest.mark.parametrize("head", ["M11 = ", "g1 = ", "tau = "])
+def test_the_name_in_front_of_an_entry_is_the_entry(head):
+    first, *_ = ARM.grade({"g": ["0", head + G[1]]}, explain=False).entries[1:]
+    assert first.verdict is not Verdict.CORRECT
+
+
+@pytest.mark.parametrize("large", ["10^400", "exp(900)", "10^30*exp(q1)", "10^100*exp(q1)", "10^190*exp(q1)"])
+def test_digits_that_cancel_are_neither_right_nor_wrong(large):
+    assert verdict(V=f"({V} + {large}) - {large}") is Verdict.UNREADABLE
+    assert verdict(V=f"({V} + m1*10^-40 + {large}) - {large}") in (Verdict.UNREADABLE, Verdict.WRONG)
+
+
+def test_an_entry_that_is_given_twice_is_refused():
+    with pytest.raises(AnswerError, match="given twice"):
+        ARM.grade({"g1": G[0], "g_1": G[0]})
+
+
+def test_complex_numbers_from_a_function_are_refused():
+    with pytest.raises(AnswerError, match="complex"):
+        ARM.grade({"V": lambda q: complex(0, 1) * q[0]}, explain=False)

@@ -14,7 +14,7 @@ from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
 from dhkit.grading.answers.pretty import in_one_line
 from dhkit.grading.answers.rewriting import rewritten
-from dhkit.grading.answers.tokens import fail, folded, tokens
+from dhkit.grading.answers.tokens import fail, folded, shown, tokens
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
 __all__ = ["meaning_of", "read_answer", "read_matrix"]
@@ -52,6 +52,7 @@ def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
         No expression, an unknown name, or more than the limits allow; with the place.
     """
     text = in_one_line(text)
+    _refuse_lines_apart(text)
     return _tree(_tokens(text, vocabulary), vocabulary, text)
 
 
@@ -98,6 +99,31 @@ def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
     if len(plain) > MAX_MEANING:
         raise AnswerError(f"written out, {len(plain)} signs; expected at most {MAX_MEANING}")
     return ("(", *(token.text for token in plain), ")")
+
+
+BAR = re.compile(r"-{2,}")
+JOINED = re.compile(r"(?:[-+*/^(,;=\[{&]|\.\.\.|\\)\s*\n|\n\s*(?:[-+*/^),;=\]}&.]|\Z)")
+"""A line's end that an operator, or a bracket, joins to the next line."""
+
+
+def _refuse_lines_apart(text: str) -> None:
+    """Refuse a formula whose lines do not follow one another: a power or a denominator may stand above or below.
+
+    Raises
+    ------
+    AnswerError
+        A bar of dashes, or two lines that no operator joins, outside brackets.
+    """
+    text = text.strip()
+    if "\n" not in text or is_latex(text) or is_mathematica(text):
+        return
+    plain = re.sub(r"\s*\n\s*", "\n", COMMENT.sub("", text).strip())
+    depth, ends = 0, {found.start() + found[0].index("\n") for found in JOINED.finditer(plain)}
+    for at, character in enumerate(plain):
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(character, 0)
+        apart = character == "\n" and depth <= 0 and at not in ends
+        if apart or BAR.match(plain, at):
+            raise AnswerError(f"{shown(text)}: lines that no operator joins; print the formula in one line, with str()")
 
 
 def _tokens(text: str, vocabulary: Vocabulary) -> list[Token]:

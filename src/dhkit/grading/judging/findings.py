@@ -10,7 +10,15 @@ import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.judging.numeric import TooLargeError, doubles, many_digits, names_of, parts_of, state_arrays
+from dhkit.grading.judging.numeric import (
+    LostDigitsError,
+    TooLargeError,
+    doubles,
+    many_digits,
+    names_of,
+    parts_of,
+    state_arrays,
+)
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
 from dhkit.grading.judging.rounding import Residuals, rounding_share
 from dhkit.grading.judging.sampling import (
@@ -259,35 +267,40 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
     with mpmath.workdps(DIGITS):
         count = max(LEAST_STATES, min(SAMPLES, MAX_EVALUATIONS // nodes))
         states = samples(by.arm, by.numbers, by.seed, every=GROUP if by.up_to_constant else 1, count=count)
-        used = names_of(tree) | names_in(truth)
-        shift: Any = 0
-        for k, state in enumerate(states):
-            right = element_value(truth, state)
-            try:
-                value = _worked_out(tree, state, right, reason, check=k % CHECKED == 0)
-            except TooLargeError as error:
-                raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
-            except LostDigitsError as error:
-                raise AnswerError(str(error)) from None
-            except AnswerError as error:
-                return _different(state, used, None, right, f"{error} there")
-            if by.up_to_constant and k % GROUP == 0:
-                shift = value - right  # energies count from any zero
-            if differ(value - shift, right):
-                _worked_out(tree, state, right, reason, check=True)
-                return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
-    return Finding(
+        try:
+            different = _first_difference(tree, truth, by, reason, states)
+        except (TooLargeError, LostDigitsError) as error:
+            raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
+    return different or Finding(
         Verdict.UNDECIDED,
         f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {len(states)} "
         f"random states in {ANSWER_DIGITS} digits, to 25 of them",
     )
 
 
-class LostDigitsError(AnswerError):
-    """An answer whose terms cancel so far that the digits do not tell it from another."""
+def _first_difference(
+    tree: Tree, truth: Element, by: Comparison, reason: str, states: Sequence[Sample]
+) -> Finding | None:
+    """Return what the first state shows at which an answer differs from the truth; None where none does."""
+    used = names_of(tree) | names_in(truth)
+    shift: Any = 0
+    for k, state in enumerate(states):
+        right = element_value(truth, state)
+        try:
+            value = _worked_out(tree, state, check=k % CHECKED == 0)
+        except (TooLargeError, LostDigitsError):
+            raise
+        except AnswerError as error:
+            return _different(state, used, None, right, f"{error} there")
+        if by.up_to_constant and k % GROUP == 0:
+            shift = value - right  # energies count from any zero
+        if differ(value - shift, right):
+            _worked_out(tree, state, check=True)
+            return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
+    return None
 
 
-def _worked_out(tree: Tree, state: Sample, right: Any, reason: str, check: bool) -> Any:
+def _worked_out(tree: Tree, state: Sample, check: bool) -> Any:
     """Return an answer's value at a state; with a check that fewer digits give the same.
 
     Raises
@@ -303,9 +316,7 @@ def _worked_out(tree: Tree, state: Sample, right: Any, reason: str, check: bool)
         with mpmath.workdps(FEWER_DIGITS):
             fewer = checked(many_digits(tree, state.names))
         if differ(fewer, value):
-            raise LostDigitsError(
-                f"outside the exact ring ({reason}), and cancels so far that {FEWER_DIGITS} digits do not decide it"
-            )
+            raise LostDigitsError(f"cancels so far that {FEWER_DIGITS} digits do not decide it")
     return value
 
 

@@ -17,6 +17,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 __all__ = [
     "FUNCTIONS",
     "EditedDoubles",
+    "LostDigitsError",
     "TooLargeError",
     "doubles",
     "general_state",
@@ -32,11 +33,18 @@ FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs"
 LARGEST, LARGEST_POWER = 2_000, 100_000
 """Bits: of a function's argument in many digits, and of a power."""
 
+LARGEST_LOSS = 365
+"""Bits that a sum in many digits may lose by cancellation: 110 digits of the 200 in which answers are worked out."""
+
 Table = Mapping[str, Callable[..., Any]]
 
 
 class TooLargeError(AnswerError):
     """A number that would fill the memory if it were worked out."""
+
+
+class LostDigitsError(AnswerError):
+    """An answer whose terms cancel so far that the digits do not tell it from another."""
 
 
 _NUMPY: Table = {
@@ -215,6 +223,8 @@ class _Evaluation:
         self.kind = kind
         self.power = operator.pow if table is _NUMPY else _bounded_power
         self.shared: dict[int, Any] = {}
+        self.has_absorbed = False
+        """Whether a sum had terms of which the largest leaves the smallest too few digits."""
 
     def of(self, tree: Tree) -> Any:
         # CasADi's graphs share what is used twice.
@@ -240,6 +250,8 @@ class _Evaluation:
                 total: Any = self.kind(0)
                 for added, term in terms:
                     total = total + self.of(term) if added else total - self.of(term)
+                if self.table is not _NUMPY:
+                    self._check_loss(total, [self.of(term) for _, term in terms])
                 return total
             case Product(factors):
                 product: Any = self.kind(1)
@@ -247,3 +259,18 @@ class _Evaluation:
                     value = self.of(factor)
                     product = product * value if multiplied else product / value
                 return product
+
+    def _check_loss(self, total: Any, terms: list[Any]) -> None:
+        """Refuse a sum in which terms cancel that had absorbed smaller ones.
+
+        Two precisions cannot show this alone: what is lost in both is zero in both. Terms that cancel and had absorbed
+        nothing, as in x - x, are zero.
+        """
+        import mpmath
+
+        sizes = [mpmath.mag(term) for term in terms if term and mpmath.isfinite(term)]
+        if len(sizes) < 2 or not mpmath.isfinite(total):
+            return
+        self.has_absorbed = self.has_absorbed or max(sizes) - min(sizes) > LARGEST_LOSS
+        if self.has_absorbed and (not total or max(sizes) - mpmath.mag(total) > LARGEST_LOSS):
+            raise LostDigitsError("cancels so far that its digits do not decide it")
