@@ -147,7 +147,7 @@ def given_quantity(
         Another shape, or no text.
     """
     if isinstance(value, Refusal):
-        raise AnswerError(f"{name}: {value.reason}; a program is read, not run: write it in one assignment")
+        raise AnswerError(f"{name}: {value.reason}; files are read, not run: state it in one formula")
     if isinstance(value, str) and shape:
         value = _system(name, value, names)
     if isinstance(value, Chain):
@@ -276,7 +276,7 @@ def _from_entries(
 def _entry(target: Target, value: Any, vocabulary: Vocabulary, names: QuantityNames) -> Given:
     index = target.index or ()
     if isinstance(value, Refusal):
-        return Given(index, "", error=f"{value.reason}; a program is read, not run: write it in one assignment")
+        return Given(index, "", error=f"{value.reason}; files are read, not run: state it in one formula")
     if isinstance(value, str):
         try:
             value = _stated(target, value, names)

@@ -48,9 +48,9 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return what is said of mistakes that all give the same answers, the likeliest first."""
     first = variants[0]
-    entries = tuple(
-        name for quantity in quantities for name in entry_names(quantity, indices or wrong_entries(quantity))
-    )
+    quantities = list(dict.fromkeys(quantities))
+    names = (name for quantity in quantities for name in entry_names(quantity, indices or wrong_entries(quantity)))
+    entries = tuple(dict.fromkeys(names))
     places = [quantity.name for quantity in quantities] if not indices else entries
     where = ", ".join([*places, *([first.place] if first.place else [])])
     distinct: dict[str, Variant] = {}
