@@ -189,7 +189,8 @@ def divided(node, rng):
 
 
 def tangent(node, rng):
-    if is_call(node, "sin"):
+    # The tangent of a constant angle may be undefined: pi/2.
+    if is_call(node, "sin") and any(VARIABLE.fullmatch(name) for name in names_in(node)):
         return ("*", function("tan", node[2]), function("cos", node[2]))
     return None
 

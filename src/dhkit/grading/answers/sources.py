@@ -8,12 +8,6 @@ from typing import TypeAlias
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.documents.latex_document import latex_answers
-from dhkit.grading.answers.programs.bindings import Program
-from dhkit.grading.answers.programs.matlab_program import matlab_program
-from dhkit.grading.answers.programs.notebook import notebook_code
-from dhkit.grading.answers.programs.program_answers import answers_of
-from dhkit.grading.answers.programs.python_program import python_program
 from dhkit.grading.answers.sheet import AnswerSheet, read_text
 
 __all__ = ["LANGUAGES", "MAX_CHARACTERS", "read_source"]
@@ -50,6 +44,8 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
     suffix, line_name = path.suffix.lower(), _line_name
     notes: tuple[str, ...] = ()
     if suffix == ".ipynb":
+        from dhkit.grading.answers.programs.notebook import notebook_code
+
         notebook = notebook_code(text, str(path))
         text, suffix, line_name, notes = notebook.code, notebook.suffix, notebook.line_name, notebook.notes
     if len(text) > MAX_CHARACTERS:
@@ -66,14 +62,28 @@ def _line_name(line: int) -> str:
     return f"line {line}"
 
 
+# The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.
+
+
 def _python(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+    from dhkit.grading.answers.programs.program_answers import answers_of
+    from dhkit.grading.answers.programs.python_program import python_program
+
     return answers_of(python_program(text, file, line_name, description.n), description, file)
 
 
 def _matlab(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
-    program: Program = matlab_program(text, file, line_name, description.n)
-    return answers_of(program, description, file)
+    from dhkit.grading.answers.programs.matlab_program import matlab_program
+    from dhkit.grading.answers.programs.program_answers import answers_of
+
+    return answers_of(matlab_program(text, file, line_name, description.n), description, file)
 
 
-LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": latex_answers}
+def _latex(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+    from dhkit.grading.answers.documents.latex_document import latex_answers
+
+    return latex_answers(text, file, line_name, description)
+
+
+LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}
 """How files are read, by suffix."""
