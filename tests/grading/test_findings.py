@@ -636,6 +636,8 @@ def test_indices_in_a_program_count_from_0(tmp_path):
         "m1'",
         "q1'''",
         r"(q_1)' + \frac{1}{2}",
+        r"m_1 \text{ + 3} l_1",
+        r"m_1 \mathrm{- 3 l_1}",
         "m1\nl1",
         "  2\nm1",
         "  2   \nl1 *m1\n------\n  3   ",

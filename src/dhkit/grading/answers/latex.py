@@ -343,7 +343,9 @@ class _Latex:
     def _upright(self, at: int, bare: bool) -> list[Token]:
         inner = self._argument(at)
         if not all(token.kind in ("name", "number") for token in inner):
-            return [Token("sign", "(", at), *inner, Token("sign", ")", at)]
+            if any(token.text in ("+", "-", "=", "<", ">", ",") for token in inner):
+                fail(self.text, at, "a sign inside text,")
+            return _in_brackets(inner, at)
         name = "".join(token.text for token in inner)
         if not name:
             return []
