@@ -3,8 +3,10 @@
 import contextlib
 import csv
 import html.parser
+import importlib
 import json
 import os
+import pkgutil
 import re
 import shutil
 import signal
@@ -20,6 +22,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 import acceptance
+import dhkit.grading
+import dhkit.symbolic
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.grading import grade
@@ -101,11 +105,11 @@ def prepared():
     table = {"rows": [["q1", "0", "l1", "0"], ["q2 + 1", "0", "2*l2", "0"]]}
     for answers in ({"V": V}, {"V": "m1"}, {"V": f"sqrt(m1^2) + {RIGHT_V}"}, {"ik": inverse}, {"dh": table}):
         grade_answers(PLANAR, answers)
-    import casadi  # noqa: F401
-    import sympy.printing  # noqa: F401
-
-    import dhkit.symbolic.programs.graph  # noqa: F401
-
+    for package in (dhkit.grading, dhkit.symbolic):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            importlib.import_module(module.name)
+    for library in ("casadi", "sympy.printing"):
+        importlib.import_module(library)
     SECRET.write_text('format = 1\nname = "secret"\n')
     yield
     SECRET.unlink()

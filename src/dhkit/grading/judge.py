@@ -28,11 +28,9 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.functions import judge_function
-from dhkit.grading.judging.inverse import inverse_entries
 from dhkit.grading.judging.kinematic_judgement import KinematicJudgement
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
-from dhkit.grading.judging.tables import table_entries
 from dhkit.grading.judging.truth import Truth, truth_of
 from dhkit.grading.mistakes.explaining import explain
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict
@@ -192,11 +190,16 @@ def _kinematic(
     """Judge a sheet's table and formulas of inverse kinematics, as :func:`_judged` does its quantities."""
     n = description.n
 
+    # Imported where they are used: few sheets have them, and they bring all of kinematics along.
     def table() -> KinematicJudgement:
+        from dhkit.grading.judging.tables import table_entries
+
         convention, rows = sheet.table or ("", ())
         return table_entries(description, given_rows(rows, n, vocabulary), convention, sheet.task, seed)
 
     def inverse() -> KinematicJudgement:
+        from dhkit.grading.judging.inverse import inverse_entries
+
         own = vocabulary_of(description, sheet, inverse=True)
         return inverse_entries(description, given_branches(sheet.branches, n, own), seed, explained=explained)
 

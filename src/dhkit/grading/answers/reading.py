@@ -14,7 +14,7 @@ from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
 from dhkit.grading.answers.pretty import in_one_line
 from dhkit.grading.answers.rewriting import rewritten
-from dhkit.grading.answers.tokens import fail, folded, shown, tokens
+from dhkit.grading.answers.tokens import fail, folded, nesting, shown, tokens
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
 __all__ = ["meaning_of", "read_answer", "read_matrix"]
@@ -120,7 +120,7 @@ def _refuse_lines_apart(text: str) -> None:
     plain = re.sub(r"\s*\n\s*", "\n", COMMENT.sub("", text).strip())
     depth, ends = 0, {found.start() + found[0].index("\n") for found in JOINED.finditer(plain)}
     for at, character in enumerate(plain):
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(character, 0)
+        depth += nesting(character)
         apart = character == "\n" and depth <= 0 and at not in ends
         if apart or BAR.match(plain, at):
             raise AnswerError(f"{shown(text)}: lines that no operator joins; print the formula in one line, with str()")
@@ -179,7 +179,7 @@ def _in_one_bracket(found: list[Token]) -> list[Token]:
     """Return Maxima's rows [a, b], [c, d] of matrix(...) as a list of rows."""
     depth = 0
     for token in found:
-        depth += {"[": 1, "]": -1, "(": 1, ")": -1}.get(token.text, 0)
+        depth += nesting(token.text)
         if depth == 0 and token.text == "," and found[0].text == "[" and found[-1].text == "]":
             return [Token("sign", "[", found[0].at), *found, Token("sign", "]", found[-1].at)]
     return found
@@ -233,7 +233,7 @@ def _rows(found: Sequence[Token], text: str) -> list[list[list[Token]]]:
 def _has(row: Sequence[Token], signs: str) -> bool:
     depth = 0
     for token in row:
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(token.text, 0)
+        depth += nesting(token.text)
         if depth == 0 and token.kind == "sign" and token.text in signs:
             return True
     return False
@@ -244,7 +244,7 @@ def _separated(found: Sequence[Token], signs: Sequence[str], text: str) -> list[
     pieces: list[list[Token]] = [[]]
     depth = 0
     for token in found:
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(token.text, 0)
+        depth += nesting(token.text)
         if depth < 0:
             fail(text, token.at, f"{token.text!r} without an opening bracket")
         if depth == 0 and token.kind == "sign" and token.text in signs:

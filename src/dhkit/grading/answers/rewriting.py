@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.indices import without_indices
-from dhkit.grading.answers.tokens import closing_bracket, fail
+from dhkit.grading.answers.tokens import closing_bracket, fail, nesting
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
 __all__ = ["rewritten"]
@@ -45,7 +45,7 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
 def _check_depth(tokens: Sequence[Token], text: str) -> None:
     depth = 0
     for token in tokens:
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(token.text, 0)
+        depth += nesting(token.text)
         if depth > MAX_DEPTH:
             fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 

@@ -10,7 +10,7 @@ from typing import NoReturn
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
 
-__all__ = ["MAX_LENGTH", "closing_bracket", "dotted", "fail", "folded", "shown", "tokens"]
+__all__ = ["MAX_LENGTH", "closing_bracket", "dotted", "fail", "folded", "nesting", "shown", "tokens"]
 
 MAX_LENGTH = 200_000
 """Characters of one entry: a PUMA's first, multiplied out in numbers, has 30,000."""
@@ -125,6 +125,11 @@ def tokens(text: str, places: list[int], original: str, allowed: str = "") -> li
         found.append(Token(("number", "name", "sign")[which - 1], SAME.get(word, word), places[match.start(which)]))
         at = match.end()
     return found
+
+
+def nesting(text: str) -> int:
+    """Return by how much a token changes the depth of round and square brackets: 1, -1 or 0."""
+    return {"(": 1, "[": 1, ")": -1, "]": -1}.get(text, 0)
 
 
 def closing_bracket(found: Sequence[Token], k: int) -> int:

@@ -224,7 +224,7 @@ class _Evaluation:
         self.power = operator.pow if table is _NUMPY else _bounded_power
         self.shared: dict[int, Any] = {}
         self.has_absorbed = False
-        """Whether a sum had terms of which the largest leaves the smallest too few digits."""
+        """Whether a sum is so much larger than one of its terms that it keeps too few of the term's digits."""
 
     def of(self, tree: Tree) -> Any:
         # CasADi's graphs share what is used twice.
@@ -247,11 +247,11 @@ class _Evaluation:
             case Power(base, exponent):
                 return self.power(self.of(base), self.of(exponent))
             case Sum(terms):
+                if self.table is not _NUMPY:
+                    return self._exact_sum([self.of(term) if added else -self.of(term) for added, term in terms])
                 total: Any = self.kind(0)
                 for added, term in terms:
                     total = total + self.of(term) if added else total - self.of(term)
-                if self.table is not _NUMPY:
-                    self._check_loss(total, [self.of(term) for _, term in terms])
                 return total
             case Product(factors):
                 product: Any = self.kind(1)
@@ -260,17 +260,19 @@ class _Evaluation:
                     product = product * value if multiplied else product / value
                 return product
 
-    def _check_loss(self, total: Any, terms: list[Any]) -> None:
-        """Refuse a sum in which terms cancel that had absorbed smaller ones.
+    def _exact_sum(self, terms: list[Any]) -> Any:
+        """Return a sum that is rounded once; refuse one that cancels where a sum before it had absorbed terms.
 
         Two precisions cannot show this alone: what is lost in both is zero in both. Terms that cancel and had absorbed
-        nothing, as in x - x, are zero.
+        nothing, as in x - x + y, leave y.
         """
         import mpmath
 
+        total = mpmath.fsum(terms)
         sizes = [mpmath.mag(term) for term in terms if term and mpmath.isfinite(term)]
         if len(sizes) < 2 or not mpmath.isfinite(total):
-            return
-        self.has_absorbed = self.has_absorbed or max(sizes) - min(sizes) > LARGEST_LOSS
+            return total
         if self.has_absorbed and (not total or max(sizes) - mpmath.mag(total) > LARGEST_LOSS):
             raise LostDigitsError("cancels so far that its digits do not decide it")
+        self.has_absorbed = self.has_absorbed or bool(total and mpmath.mag(total) - min(sizes) > LARGEST_LOSS)
+        return total

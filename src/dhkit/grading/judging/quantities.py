@@ -55,11 +55,6 @@ class JudgedQuantity:
     contradictions: tuple[Index, ...] = ()
 
     @property
-    def is_complete(self) -> bool:
-        """Whether every entry was handed in."""
-        return not any(entry.is_missing for entry in self.given)
-
-    @property
     def wrong(self) -> int:
         """How many entries are wrong."""
         return sum(finding.verdict is Verdict.WRONG for finding in self.findings.values())

@@ -295,12 +295,15 @@ def _depth(text: str) -> int:
     """Return how many brackets are open at the end of a text."""
     depth = 0
     for match in PIECE.finditer(text):
-        piece = match[0]
-        if match[1] or match[3] == "left" or piece in OPENS or piece == r"\{":
-            depth += 1
-        elif match[2] or match[3] == "right" or piece in CLOSES or piece == r"\}":
-            depth -= 1
+        depth += _nesting(match)
     return depth
+
+
+def _nesting(piece: re.Match[str]) -> int:
+    """Return by how much a piece changes the depth of brackets and environments: 1, -1 or 0."""
+    if piece[1] or piece[3] == "left" or piece[0] in OPENS or piece[0] == r"\{":
+        return 1
+    return -bool(piece[2] or piece[3] == "right" or piece[0] in CLOSES or piece[0] == r"\}")
 
 
 def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
@@ -313,10 +316,7 @@ def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
     piece = next(pieces, None)
     for match in pattern.finditer(text):
         while piece is not None and piece.start() < match.start():
-            if piece[1] or piece[3] == "left" or piece[0] in OPENS or piece[0] == r"\{":
-                depth += 1
-            elif piece[2] or piece[3] == "right" or piece[0] in CLOSES or piece[0] == r"\}":
-                depth -= 1
+            depth += _nesting(piece)
             piece = next(pieces, None)
         if depth == 0:
             found.append(match.span())

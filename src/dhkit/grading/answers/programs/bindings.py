@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TypeAlias
@@ -286,7 +286,3 @@ class Program:
         """Add a binding at the next place."""
         self.place += 1
         scope.bind(name, Binding(line, self.place, value, index, is_added))
-
-
-Lines: TypeAlias = Callable[[int], str]
-"""How messages name a line."""

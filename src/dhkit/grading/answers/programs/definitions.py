@@ -62,11 +62,10 @@ class Node:
 
 @dataclass
 class _Written:
-    """A node's text, or why it has none, and the nodes that the text needs."""
+    """A node's text, or why it has none."""
 
     text: str = ""
     reason: str = ""
-    needs: frozenset[tuple[int, str, tuple[int, ...] | None, int]] = frozenset()
 
 
 class _NotReadError(Exception):

@@ -31,8 +31,7 @@ def closing(tokens: Tokens, k: int) -> int:
     """Return where the bracket at k closes; the tokenizer has checked that it does."""
     depth = 0
     for end in range(k, len(tokens)):
-        if tokens[end].kind == "sign":
-            depth += (tokens[end].text in "([{") - (tokens[end].text in ")]}")
+        depth += tokens[end].nesting
         if depth == 0:
             return end
     return len(tokens) - 1
@@ -62,8 +61,7 @@ def split_rows(tokens: Tokens) -> list[list[Tokens]]:
             before = entry[-1]
             if before.kind in ("name", "number", "string") or before.text in (")", "]", "}", "'", ".'"):
                 close_entry()
-        if is_sign:
-            depth += (token.text in "([{") - (token.text in ")]}")
+        depth += token.nesting
         entry.append(token)
     close_entry()
     return [row for row in rows if row]
@@ -168,8 +166,7 @@ class MatlabFormulas:
                 groups.append((at, end))
                 at = end + 1
                 continue
-            if token.kind == "sign":
-                depth += (token.text in "([{") - (token.text in ")]}")
+            depth += token.nesting
             at += 1
         if len(groups) != 1:
             return None if not groups else Formula(_text(tokens), problem="a sum or a product of matrices is not read")
@@ -224,8 +221,7 @@ class MatlabFormulas:
         for tokens, inner in ((before, before[1:]), (after, after)):
             depth = 0
             for k, token in enumerate(inner):
-                if token.kind == "sign":
-                    depth += (token.text in "([{") - (token.text in ")]}")
+                depth += token.nesting
                 previous = inner[k - 1].text if k else ""
                 if depth == 0 and token.text in ("+", "-") and token.kind == "sign" and previous not in OPERATORS:
                     return False
@@ -387,10 +383,9 @@ def _number(tokens: Tokens) -> float | None:
 def _first_argument(tokens: Tokens) -> Tokens:
     depth = 0
     for k, token in enumerate(tokens):
-        if token.kind == "sign":
-            if token.text == "," and depth == 0:
-                return tokens[:k]
-            depth += (token.text in "([{") - (token.text in ")]}")
+        if token.kind == "sign" and token.text == "," and depth == 0:
+            return tokens[:k]
+        depth += token.nesting
     return tokens
 
 

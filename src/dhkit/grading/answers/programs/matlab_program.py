@@ -559,11 +559,9 @@ def _outside(tokens: Sequence[MatlabToken]) -> list[bool]:
     """Return of each token whether it stands in no brackets."""
     depth, found = 0, []
     for token in tokens:
-        if token.kind == "sign" and token.text in ")]}":
-            depth -= 1
+        depth += min(token.nesting, 0)
         found.append(depth == 0)
-        if token.kind == "sign" and token.text in "([{":
-            depth += 1
+        depth += max(token.nesting, 0)
     return found
 
 
@@ -596,7 +594,7 @@ def _assigned_before(tokens: Sequence[MatlabToken], k: int) -> set[str]:
     if tokens[k].text == "]" and tokens[k].kind == "sign":
         depth, start = 0, k
         for at in range(k, -1, -1):
-            depth += (tokens[at].text in ")]}") - (tokens[at].text in "([{") if tokens[at].kind == "sign" else 0
+            depth -= tokens[at].nesting
             start = at
             if depth == 0:
                 break
@@ -605,8 +603,7 @@ def _assigned_before(tokens: Sequence[MatlabToken], k: int) -> set[str]:
     depth = 0
     for at in range(k, -1, -1):
         token = tokens[at]
-        if token.kind == "sign":
-            depth += (token.text in ")]}") - (token.text in "([{")
+        depth -= token.nesting
         if depth < 0:
             return set()
         is_head = token.kind == "name" and depth == 0 and (at == 0 or tokens[at - 1].text != ".")

@@ -20,7 +20,6 @@ TOKEN = re.compile(
 SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
 MAX_TOKENS = 200_000
 OPENING, CLOSING = "([{", ")]}"
-NOTHING_BEFORE = frozenset(("", "\n", ";", ","))
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,11 @@ class MatlabToken:
     text: str
     line: int
     spaced: bool
+
+    @property
+    def nesting(self) -> int:
+        """By how much it changes the depth of brackets: 1, -1 or 0."""
+        return (self.text in OPENING) - (self.text in CLOSING) if self.kind == "sign" else 0
 
 
 @dataclass(frozen=True)
