@@ -6,7 +6,7 @@ from dhkit import Arm
 from dhkit.grading import LIBRARY
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
-from dhkit.grading.mistakes.library import INVERSE, TABLE, hint_of, sentence_of
+from dhkit.grading.mistakes.library import INVERSE, JACOBIAN, TABLE, hint_of, sentence_of
 from dhkit.symbolic import Mistake, Subject
 from dhkit.symbolic.mistakes import catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES
@@ -70,7 +70,7 @@ def test_every_mistake_can_be_provoked():
     made = {variant.identity for robot in ROBOTS for variant in variants_of(truth_of(corpus_robot(robot))).dynamic}
     friction = {"friction_forgotten", "friction_sign", "friction_gear"}  # tests/grading/test_findings.py
     absolute = {"relative_for_absolute", "motor_torques"}
-    tests = {*KINEMATIC_MISTAKES, *TABLE, *INVERSE, *SLIPS, *friction, *absolute}
+    tests = {*KINEMATIC_MISTAKES, *JACOBIAN, *TABLE, *INVERSE, *SLIPS, *friction, *absolute}
     bodies = {"payload_forgotten", "payload_at_com", "gear_inverted", "sphere_for_rod", "parameter_sin_cos"}
     assert set(LIBRARY) - made - tests - bodies == set()
 

@@ -96,6 +96,7 @@ JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
     _mistakes(
         Subject.JACOBIAN,
         AXES,
+        jacobian_x_y_exchanged="the rows of the velocities along x and y are exchanged",
         jacobian_halves_exchanged="angular rows stand above linear ones: here the linear velocity comes first",
         point_frame_n="the linear velocity is that of frame n's origin in place of the tool's",
         point_frame_0="the linear velocity is that of the point at frame 0's origin in place of the tool's",
@@ -113,6 +114,7 @@ JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
         "reverse)",
         axis_neighbour="the axis is that of the neighbouring frame: z_i in place of z_(i-1) (modified: the reverse)",
         axis_unturned="every axis is taken as (0, 0, 1): the joints before do not turn it",
+        angular_axes_unturned="every axis in the angular half is taken as (0, 0, 1): the joints before do not turn it",
         cross_product_order="the cross product is lever x axis in place of axis x lever: the linear rows change sign",
         prismatic_as_revolute="a sliding joint's column is that of a turning one: it should be (axis; 0)",
         prismatic_angular="a sliding joint turns the tool: the lower half of its column should be 0",
@@ -174,6 +176,11 @@ class TextbookKinematics:
             linear, angular = (self._pose[:3, :3].T @ rows for rows in (linear, angular))
         if self._has("axes_of_frame_0"):
             linear, angular = (self.base[:3, :3].T @ rows for rows in (linear, angular))
+        if self._has("angular_axes_unturned"):
+            turning = [kind == "R" for kind in self.arm.ring.kinds]
+            angular = _identity(self.arm.ring)[:3, 2:3] * np.array(turning, dtype=int)
+        if self._has("jacobian_x_y_exchanged"):
+            linear = linear[[1, 0, 2]]
         halves = (angular, linear) if self._has("jacobian_halves_exchanged") else (linear, angular)
         return np.concatenate(halves)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations, islice
+from itertools import chain, combinations, islice, permutations
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
@@ -56,6 +56,7 @@ ORDER = (
     "square_forgotten",
     "square_too_much",
     "arc_function_forgotten",
+    "triangle_angle_forgotten",
     "axis_exchanged",
     "lengths_exchanged",
     "offset_forgotten",
@@ -138,8 +139,9 @@ def edits(
     lengths
         The robot's.
     """
+    whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
     found = [
-        *(Edit(mistake, new, tree, new) for mistake, new in _of_the_whole(tree, is_revolute, others, offsets)),
+        *(Edit(mistake, new, tree, new) for mistake, new in whole),
         *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MOST_EDITS),
         *(
             Edit(mistake, new, tree, new)
@@ -213,6 +215,24 @@ def _of_the_whole(
         new = with_calls_changed(tree, functions, change)
         if new is not tree:
             yield mistake, new
+
+
+def _with_triangle(
+    tree: Tree, is_revolute: bool, others: Sequence[str], lengths: Lengths
+) -> Iterator[tuple[str, Tree]]:
+    """Yield a formula less the angle between a link and the line to the end of the next: beta of two links a and b.
+
+    beta = atan2(b sin q, a + b cos q) where q is the joint between them.
+    """
+    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *ARCS) for part in parts_of(tree))
+    if not is_revolute or arcs != 1:
+        return
+    for name in others:
+        c, s = applied("cos", Name(name, 0)), applied("sin", Name(name, 0))
+        for a, b in permutations(lengths.trees[:MOST_LENGTHS], 2):
+            beta = Call("atan2", (times(b, s), Sum(((True, a), (True, times(b, c))))), 0)
+            for added in (False, True):
+                yield "triangle_angle_forgotten", Sum(((True, tree), (added, beta)))
 
 
 # Changes of one part

@@ -8,7 +8,7 @@ bounded by counted changes, never by time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
@@ -16,8 +16,15 @@ from itertools import chain
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.expressions.syntax import Name, Number
-from dhkit.grading.judging.changed_formulas import equal_parts, has_call, renamed, replaced_everywhere
+from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
+from dhkit.grading.judging.changed_formulas import (
+    equal_parts,
+    has_call,
+    minus,
+    renamed,
+    replaced_everywhere,
+    with_calls_changed,
+)
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
@@ -39,6 +46,14 @@ FREQUENT = frozenset(
     ("atan2_arguments", "quadrant", "elbow_sign", "degrees_for_radians", "millimetres_for_metres", "joint_sign")
 )
 """Mistakes that are named where they explain a good part of the poses alone."""
+
+
+ARCS: Mapping[str, tuple[str, Callable[[Call], Tree]]] = {
+    "acos": ("sign_lost", minus),
+    "asin": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (False, call)))),
+    "atan": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (True, call)))),
+}
+"""What functions that know half a turn lose, and their value in the other half."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,6 +223,12 @@ def _offsets(branch: Branch, joint: int) -> list[float]:
     return [float(x) for x in np.unique((branch.poses.truths[s, alive, joint] - branch.q[s, joint]).round(12))]
 
 
+def _with_part_repaired(branch: Branch, joint: int, wrong: Mask, changed: Tree) -> Branch:
+    """Return the branch whose joint has the values of a changed formula on some poses, shape (S,)."""
+    values = branch.repaired(joint, branch.editable(joint).of(changed))
+    return branch.with_repair(joint, lambda x: np.where(wrong, values, x))
+
+
 def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Branch]]:
     """Return what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
 
@@ -226,5 +247,10 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
         found.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
     if own or has_call(tree, ("acos",)):
         found.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
+    arcs = [function for function in ARCS if has_call(tree, (function,))]
+    if own and len(arcs) == 1 and not isinstance(tree, Call):
+        mistake, change = ARCS[arcs[0]]
+        changed = with_calls_changed(tree, arcs, change)
+        found.append((mistake, _with_part_repaired(branch, joint, wrong, changed)))
     # Both may give a solution: what the formula's own function does not know is meant.
     return found[::-1] if has_call(tree, ("acos",)) and not has_call(tree, ("atan", "asin")) else found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import combinations
 from typing import Any, TypeAlias
 
@@ -16,11 +16,19 @@ from dhkit.grading.judging.truth import DYNAMICS, Truth, exact_number, kinematic
 from dhkit.grading.mistakes.energy_variants import energy_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.parameter_variants import parameter_variants
+from dhkit.grading.mistakes.sums_of_angles import derivatives_of_cosines, sums_of_angles
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.symbolic.mistakes import MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import derive
-from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, LINK_MISTAKES, TextbookKinematics, derive_kinematics
+from dhkit.symbolic.textbook_kinematics import (
+    JACOBIAN_MISTAKES,
+    KINEMATIC_MISTAKES,
+    LINK_MISTAKES,
+    POSE_MISTAKES,
+    TextbookKinematics,
+    derive_kinematics,
+)
 
 __all__ = ["Differences", "Index", "Variants", "variants_of"]
 
@@ -68,11 +76,18 @@ class Variants:
     @cached_property
     def kinematic(self) -> list[Variant]:
         """The mistakes that there are in the robot's transforms and Jacobian."""
-        n = self.truth.description.n
-        made = [(MadeAt(name), "") for name in KINEMATIC_MISTAKES]
+        n, truth = self.truth.description.n, self.truth
+        # Those of the Jacobian first: of it alone they are likelier than one in the transforms behind it.
+        names = [*JACOBIAN_MISTAKES, *LINK_MISTAKES, *POSE_MISTAKES]
+        made = [(MadeAt(name), "") for name in names]
         if n > 1:
             made += [(MadeAt(name, i), f"link {i}") for name in LINK_MISTAKES for i in range(1, n + 1)]
-        return [Variant(mistake, _KinematicChange(self.truth, mistake), place) for mistake, place in made]
+        right = partial(kinematic_quantity, truth.kinematics)
+        return [
+            derivatives_of_cosines(truth),
+            *(Variant(at, _KinematicChange(truth, at), place, is_kinematic=True) for at, place in made),
+            *sums_of_angles(truth.kinematics.arm, right, is_kinematic=True),
+        ]
 
     def change(self, variant: Variant, quantity: str) -> Elements:
         """Return what a mistake adds to a quantity, with numbers in place of parameters."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.truth import DYNAMICS, Truth
+from dhkit.grading.mistakes.sums_of_angles import sums_of_angles
 from dhkit.grading.mistakes.variants import Make, Variant, changed_only, nothing, right, translated_array
-from dhkit.symbolic import ExactArm, Lagrangian
-from dhkit.symbolic.exact.compact import parallel_runs
+from dhkit.symbolic import Lagrangian
 from dhkit.symbolic.mistakes import MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt
-from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
+from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import TextbookDerivation, derive, scaled, velocity_torques
 
 __all__ = ["equation_variants", "lagrangian_sum"]
@@ -27,7 +27,7 @@ def equation_variants(truth: Truth) -> Iterator[Variant]:
     yield from _steps(truth)
     yield from _gravity_torques(truth)
     yield from _matrices(truth)
-    yield from _sums_of_angles(truth)
+    yield from sums_of_angles(truth.lagrangian.arm, partial(right, truth.lagrangian))
     yield from _other_coordinates(truth)
     yield from _zero_poses(truth)
     yield from _friction(truth) if truth.friction else ()
@@ -179,61 +179,6 @@ def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
         return ring.from_terms(terms)
 
     return changed_only(lag, "h", lambda: element_array([exchanged(x) for x in lag.h]) - lag.h)
-
-
-# Sums of angles
-
-
-def _sums_of_angles(truth: Truth) -> Iterator[Variant]:
-    """Yield wrong formulas for the sines and cosines of sums, wherever such a sum stands."""
-    lag = truth.lagrangian
-    runs = [run for run in parallel_runs(lag.arm) if len(run) > 1]
-    if not runs:
-        return
-    for identity, formula in (
-        ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
-        ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x + c * y)),
-        ("sum_formula_sign", lambda c, s, x, y: (c * x - s * y, s * x - c * y)),
-        ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x - c * y)),
-        ("angle_difference", lambda c, s, x, y: (c * x + s * y, c * y - s * x)),
-    ):
-        yield Variant(MadeAt(identity), partial(_with_sums, lag, formula), rarity=1)
-
-
-def _with_sums(
-    lag: Lagrangian, formula: Callable[[Element, Element, Element, Element], tuple[Element, Element]], quantity: str
-) -> Elements:
-    """Return what changes where sines and cosines of sums are worked out by another formula."""
-    ring = lag.arm.ring
-    value = right(lag, quantity)
-    written = _in_sums(lag.arm, value)
-    changed = np.empty(value.shape, dtype=object)
-    for place, element in np.ndenumerate(written):
-        wrong: dict[int, Element] = {}
-        for sine, cosine, joints in element.ring.turning:
-            c, s = ring.cosine(joints[0]), ring.sine(joints[0])
-            for joint in joints[1:]:
-                c, s = formula(c, s, ring.cosine(joint), ring.sine(joint))
-            wrong |= {sine: s, cosine: c}
-        changed[place] = translated(element, ring, wrong) - value[place]
-    return changed
-
-
-def _in_sums(arm: ExactArm, array: Elements) -> Elements:
-    """Return elements with a sine and a cosine of their own for the angles of parallel axes, counted from the first."""
-    angles = {joint: run[: k + 1] for run in parallel_runs(arm) for k, joint in enumerate(run)}
-    ring = Ring(arm.ring.kinds, arm.ring.given, angles)
-    turned: dict[int, Element] = {}
-    for run in parallel_runs(arm):
-        for before, joint in pairwise(run):
-            c, s = ring.cosine(joint), ring.sine(joint)
-            x, y = ring.cosine(before), ring.sine(before)
-            turned[arm.ring.place("cosine", joint)] = c * x + s * y
-            turned[arm.ring.place("sine", joint)] = s * x - c * y
-    written = np.empty(array.shape, dtype=object)
-    for place, element in np.ndenumerate(array):
-        written[place] = translated(element, ring, turned)
-    return written
 
 
 # Coordinates

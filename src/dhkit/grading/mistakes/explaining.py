@@ -37,7 +37,6 @@ from dhkit.grading.mistakes.wording import (
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
-from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES
 
 __all__ = ["explain"]
 
@@ -167,8 +166,7 @@ def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: V
     count = 0
     for name, quantity in judged.items():
         right = [index for index, finding in quantity.findings.items() if finding.verdict.passes]
-        same_kind = (name in DYNAMICS) == (variant.identity not in KINEMATIC_MISTAKES)
-        if quantity.wrong or not right or not same_kind:
+        if quantity.wrong or not right or (name in DYNAMICS) == variant.is_kinematic:
             continue
         count += not _tables(truth, quantity).changes_none(variant, name, right)
     return count

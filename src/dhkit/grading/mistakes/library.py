@@ -9,7 +9,7 @@ from dhkit.grading.capitals import capitalised
 from dhkit.symbolic.mistakes import MISTAKES, Mistake, Subject, catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, ROW
 
-__all__ = ["FACTORS", "INVERSE", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "hint_of", "sentence_of"]
+__all__ = ["FACTORS", "INVERSE", "JACOBIAN", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "hint_of", "sentence_of"]
 
 UNNAMED_HINT = "Look again at the entries that are marked as wrong."
 """Where to look where no mistake is named."""
@@ -79,6 +79,14 @@ TABLE = catalogue(
     ),
 )
 
+JACOBIAN = catalogue(
+    _of(
+        Subject.JACOBIAN,
+        "Look again at the derivatives: d/dq cos(q) = -sin(q).",
+        derivative_of_cosine="the derivative of a cosine lacks its minus sign",
+    ),
+)
+
 INVERSE = catalogue(
     _of(
         Subject.INVERSE,
@@ -102,6 +110,8 @@ INVERSE = catalogue(
         supplement="the angle inside the triangle is given in place of the joint's, which is 180 degrees less it",
         earlier_joints_forgotten="the angles of the joints before are not subtracted: the sum of the angles is given",
         offset_forgotten="a constant length of base or table is not taken off a component of the position",
+        triangle_angle_forgotten="the angle in the triangle of two links is not taken off: the direction to the end of "
+        "the second is given in place of the first link's",
         tool_length_forgotten="the tool's length is not taken off the position: the triangle ends at the wrist",
     ),
     _of(
@@ -259,6 +269,7 @@ EQUATION = catalogue(
 
 LIBRARY: Mapping[str, Mistake] = catalogue(
     INVERSE.values(),
+    JACOBIAN.values(),
     TABLE.values(),
     KINEMATIC_MISTAKES.values(),
     MISTAKES.values(),

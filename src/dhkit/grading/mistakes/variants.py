@@ -58,12 +58,15 @@ class Variant:
     rarity
         How seldom such mistakes are made: 0 where a textbook's derivation goes wrong, 1 for what goes wrong in
         formulas, 2 for what is possible. Of several that explain an answer the least rare is named.
+    is_kinematic
+        Whether it is made in transforms and the Jacobian, not in the dynamics.
     """
 
     made: MadeAt
     make: Make
     place: str = ""
     rarity: int = 0
+    is_kinematic: bool = False
     _made: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)
 
     @property

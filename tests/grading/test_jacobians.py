@@ -1,0 +1,96 @@
+"""Transforms and Jacobians by hand: what goes wrong for those who differentiate the tool's position."""
+
+import pytest
+import sympy
+from sympy import cos, sin
+
+from dhkit import Arm
+from dhkit.description import from_dh
+
+q1, q2, q3, l1, l2, l3, d1, a2, a3 = sympy.symbols("q1 q2 q3 l1 l2 l3 d1 a2 a3")
+
+
+class Cosine(sympy.Function):
+    """A cosine whose derivative is taken for the sine."""
+
+    def fdiff(self, argindex=1):
+        return sympy.Function("sin")(self.args[0])
+
+
+def planar(lengths, cosine=cos):
+    angles = [q1, q1 + q2, q1 + q2 + q3]
+    pairs = list(zip(lengths, angles, strict=False))
+    return [sum(a * cosine(x) for a, x in pairs), sum(a * sin(x) for a, x in pairs), sympy.Integer(0)]
+
+
+def elbow(cosine=cos):
+    reach = a2 * cosine(q2) + a3 * cosine(q2 + q3)
+    return [cosine(q1) * reach, sin(q1) * reach, d1 + a2 * sin(q2) + a3 * sin(q2 + q3)]
+
+
+def arm_of(name):
+    if name != "elbow":
+        return Arm.load(name)
+    rows = [(0, "d1", 0, "pi/2"), (0, 0, "a2", 0), (0, 0, "a3", 0)]
+    return Arm(from_dh(rows, parameters={"d1": 0.4, "a2": 0.5, "a3": 0.3}))
+
+
+POSITIONS = {
+    "planar2r": lambda cosine=cos: planar([l1, l2], cosine),
+    "planar3r": lambda cosine=cos: planar([l1, l2, l3], cosine),
+    "elbow": elbow,
+}
+AXES = {
+    "planar2r": [[0, 0], [0, 0], [1, 1]],
+    "planar3r": [[0, 0, 0], [0, 0, 0], [1, 1, 1]],
+    "elbow": [[0, sin(q1), sin(q1)], [0, -cos(q1), -cos(q1)], [1, 0, 0]],
+}
+
+
+def jacobian(name, cosine=cos):
+    axes = AXES[name]
+    rows = sympy.Matrix(POSITIONS[name](cosine)).jacobian([q1, q2, q3][: len(axes[0])])
+    return [*rows.replace(Cosine, cos).doit().tolist(), *axes]
+
+
+def graded(name, rows):
+    report = arm_of(name).grade(J=[[str(entry) for entry in row] for row in rows])
+    return report, [one.mistake for one in report.diagnosis]
+
+
+@pytest.mark.parametrize("name", POSITIONS)
+def test_the_derivative_of_the_position_is_the_linear_half(name):
+    report, _ = graded(name, jacobian(name))
+    assert report.verdict.value == "correct", str(report)
+
+
+@pytest.mark.parametrize("name", POSITIONS)
+def test_a_cosine_differentiated_without_its_minus_sign(name):
+    report, found = graded(name, jacobian(name, Cosine))
+    assert found == ["derivative_of_cosine"], str(report)
+
+
+@pytest.mark.parametrize("name", POSITIONS)
+def test_rows_of_x_and_y_exchanged(name):
+    x, y, *others = jacobian(name)
+    report, found = graded(name, [y, x, *others])
+    assert found == ["jacobian_x_y_exchanged"], str(report)
+
+
+def test_axes_in_the_angular_half_that_no_joint_turned():
+    report, found = graded("elbow", [*jacobian("elbow")[:3], [0, 0, 0], [0, 0, 0], [1, 1, 1]])
+    assert found == ["angular_axes_unturned"], str(report)
+
+
+@pytest.mark.parametrize(("name", "joints"), [("planar2r", [q1, q2]), ("planar3r", [q1, q2, q3])])
+def test_cosines_of_sums_split_up_in_the_pose(name, joints):
+    c, s = sum(map(cos, joints)), sum(map(sin, joints))
+    x, y, z = (
+        p.replace(cos, lambda u: sum(map(cos, u.args)) if u.is_Add else cos(u)).replace(
+            sin, lambda u: sum(map(sin, u.args)) if u.is_Add else sin(u)
+        )
+        for p in POSITIONS[name]()
+    )
+    T = [[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]]
+    report = Arm.load(name).grade(T=[[str(entry) for entry in row] for row in T])
+    assert [one.mistake for one in report.diagnosis] == ["sum_of_angles_split"], str(report)
