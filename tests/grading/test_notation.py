@@ -113,6 +113,14 @@ MATRICES = {
     "[m1 ...\n ; l1]": [["m1"], ["l1"]],
     "1/6*[[m1, m2], [l1, 0]]": [["m1", "m2"], ["l1", "0"]],
     r"\frac{1}{6}\begin{bmatrix} m_1 \\[4pt] m_2 \end{bmatrix}^\top": [["m_1"], ["m_2"]],
+    "[m1 cos(q1); l1 2]": [["m1", "cos(q1)"], ["l1", "2"]],
+    "[cos q1 m2; l1 sin q2]": [["cos q1", "m2"], ["l1", "sin q2"]],
+    "[m1*cos q1 + m2; l1]": [["m1*cos q1 + m2"], ["l1"]],
+    "<m1, l1*cos(theta[2](t))>": [["m1"], ["l1*cos(theta[2](t))"]],
+    "np.diag([m1 + l1, m2])": [["m1 + l1", "0"], ["0", "m2"]],
+    "diag(m1 + l1, m2)": [["m1 + l1", "0"], ["0", "m2"]],
+    "diag([m1 + l1; m2])": [["m1 + l1", "0"], ["0", "m2"]],
+    r"\operatorname{diag}(m_1, l_1)": [["m_1", "0"], ["0", "l_1"]],
     r"\begin{pmatrix} \frac{1}{2} m_1 \\ 0 \end{pmatrix}": [[r"\frac{1}{2} m_1"], ["0"]],
 }
 

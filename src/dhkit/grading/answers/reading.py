@@ -15,13 +15,17 @@ from dhkit.grading.answers.latex import is_latex, latex_tokens
 from dhkit.grading.answers.pretty import in_one_line
 from dhkit.grading.answers.rewriting import rewritten
 from dhkit.grading.answers.tokens import fail, folded, nesting, shown, tokens
-from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary
 
 __all__ = ["meaning_of", "read_answer", "read_matrix"]
 
 MATRIX_WORDS = frozenset(
     ("sym", "Matrix", "array", "matrix", "simplify", "transpose", "MutableDenseMatrix", "ImmutableMatrix", "DM", "SX")
 )
+NOWHERE = -1
+"""Where the zeros beside a diagonal stand."""
+MAX_DIAGONAL = 30
+"""Rows of a matrix that is given by its diagonal: arms have fewer joints."""
 COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
 """A comment behind an answer, such as its unit: % N m."""
 STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
@@ -71,7 +75,8 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     """
     text = _in_rows(in_one_line(text))
     found = _stripped(_tokens(text, vocabulary))
-    found = _in_one_bracket(found)
+    places = [token.at for token in found]
+    found = _in_brackets(_in_one_bracket(found), text)
     start, end = _matrix_in(found, text)
     before, after = found[:start], found[end + 1 :]
     if sum(token.text in (",", ";", "&", "\\\\") for token in found) > MAX_ENTRIES:
@@ -79,7 +84,6 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     rows = _rows(found[start : end + 1], text)
     if sum(map(len, rows)) > MAX_ENTRIES:
         raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
-    places = [token.at for token in found]
     return [
         [(_written(entry, places, text), _tree(_scaled(before, entry, after), vocabulary, text)) for entry in row]
         for row in rows
@@ -185,6 +189,31 @@ def _in_one_bracket(found: list[Token]) -> list[Token]:
     return found
 
 
+def _in_brackets(found: list[Token], text: str) -> list[Token]:
+    """Return Maple's column <a, b>, and a matrix diag(a, b) that is given by its diagonal, in brackets."""
+    if found and found[0].text == "<" and found[-1].text == ">":
+        first, last = found[0].at, found[-1].at
+        rows = _separated(found[1:-1], (",",), text)
+        column = [token for row in rows for token in (Token("sign", ";", first), *row)]
+        return [Token("sign", "[", first), *column[1:], Token("sign", "]", last)]
+    if len(found) < 4 or found[0].text != "diag" or (found[1].text, found[-1].text) != ("(", ")"):
+        return found
+    at = found[0].at
+    inner = _stripped(found[2:-1])
+    if inner and inner[0].text == "[" and inner[-1].text == "]":
+        entries = [entry for row in _rows(inner, text) for entry in row]
+    else:
+        entries = _separated(inner, (",",), text)
+    if len(entries) > MAX_DIAGONAL:
+        raise AnswerError(f"a matrix of more than {MAX_DIAGONAL} rows")
+    zero, comma, semicolon = Token("number", "0", NOWHERE), Token("sign", ",", at), Token("sign", ";", at)
+    matrix: list[Token] = []
+    for k, entry in enumerate(entries):
+        for j in range(len(entries)):
+            matrix += [comma if j else semicolon, *(entry if j == k else [zero])]
+    return [Token("sign", "[", at), *matrix[1:], Token("sign", "]", found[-1].at)]
+
+
 def _scaled(before: Sequence[Token], entry: Sequence[Token], after: Sequence[Token]) -> list[Token]:
     """Return an entry with the factors of its matrix."""
     if (not before and not after) or not entry:
@@ -261,7 +290,8 @@ def _by_spaces(row: Sequence[Token], text: str) -> list[list[Token]]:
     for before, token in zip([None, *row], row, strict=False):
         spaced = text[token.at - 1 : token.at].isspace() and depth == 0
         if before is not None and spaced:
-            ends = before.kind != "sign" or before.text in (")", "'")
+            is_function = before.text in FUNCTION_NAMES and len(before.text) > 1
+            ends = not is_function and (before.kind != "sign" or before.text in (")", "'"))
             unary = token.text in "+-" and not text[token.at + 1 : token.at + 2].isspace()
             if ends and (unary or token.kind != "sign" or token.text == "("):
                 pieces.append([])
@@ -272,8 +302,8 @@ def _by_spaces(row: Sequence[Token], text: str) -> list[list[Token]]:
 
 def _written(entry: Sequence[Token], places: Sequence[int], text: str) -> str:
     """Return an entry as it was typed: up to where the next token after it begins."""
-    if not entry:
-        return ""
+    if not entry or entry[0].at == NOWHERE:
+        return "".join(token.text for token in entry)
     behind = bisect_right(places, entry[-1].at)
     return text[entry[0].at : places[behind] if behind < len(places) else len(text)].strip()
 
