@@ -36,6 +36,9 @@ SLIPS = {
     "entry_sign": {"g": [G[0], f"-({G[1]})"]},
     "entry_halved": {"M": [[M11, M12], [M12, "m2*l2^2/6"]], "g": G},
     "entry_doubled": {"h": [H[0], f"2*({H[1]})"]},
+    "entry_zero": {"g": [G[0], "0"]},
+    "factor_missing": {"g": ["m1*l1*c1/2 + m2*g*l1*c1 + m2*g*l2*c12/2", G[1]]},
+    "factor_extra": {"g": ["m1*g*l1*l2*c1/2 + m2*g*l1*c1 + m2*g*l2*c12/2", G[1]]},
     "too_few_digits": {"M": [[M11, M12], [M12, "0.33*m2*l2^2"]]},
     "mass_matrix_not_symmetric": {"M": [[M11, M12], ["m2*l2^2/3 + m2*l1*l2*c1", M22]]},
     "degrees_for_radians": {
@@ -71,7 +74,15 @@ def test_every_mistake_can_be_provoked():
     friction = {"friction_forgotten", "friction_sign", "friction_gear"}  # tests/grading/test_findings.py
     absolute = {"relative_for_absolute", "motor_torques"}
     tests = {*KINEMATIC_MISTAKES, *JACOBIAN, *TABLE, *INVERSE, *SLIPS, *friction, *absolute}
-    bodies = {"payload_forgotten", "payload_at_com", "gear_inverted", "sphere_for_rod", "parameter_sin_cos"}
+    bodies = {
+        "payload_forgotten",
+        "payload_not_moved",
+        "payload_without_weight",
+        "payload_at_com",
+        "gear_inverted",
+        "sphere_for_rod",
+        "parameter_sin_cos",
+    }
     assert set(LIBRARY) - made - tests - bodies == set()
 
 

@@ -98,6 +98,16 @@ def test_what_is_wrong_with_a_payload_is_named(arm, quantities, changed, mistake
     assert (diagnosis.mistake, diagnosis.sentence) == (mistake, sentence), str(report)
 
 
+@pytest.mark.parametrize(
+    ("quantities", "mistake"), [(("M",), "payload_not_moved"), (("V", "g"), "payload_without_weight")]
+)
+def test_a_payload_in_one_energy_only(arm, quantities, mistake):
+    """The sheet's other quantities are right, so it is not missing altogether."""
+    wrong = answers(mp="0")
+    report = arm.grade(answers() | {name: wrong[name] for name in quantities})
+    assert [one.mistake for one in report.diagnosis] == [mistake], str(report)
+
+
 def test_masses_on_one_link_exchanged_are_named(arm):
     """It is the same as their centres of mass exchanged."""
     report = arm.grade({"g": answers(m2="mp", mp="m2")["g"]})

@@ -155,10 +155,11 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
     ),
     _energy(
         COM_VELOCITY,
-        com_at_end="the centre of mass is taken at the link's end, the full length in place of the half",
+        com_at_end="the centre of mass is taken at the link's end, where its frame is",
         velocity_at_joint="the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
         velocity_cross_term="the square of the velocity lacks the cross term 2 v.(omega x r)",
-        velocity_relative_angle="the velocity uses the joint's own angle in place of the sum of the angles up to it",
+        velocity_relative_angle="the velocity uses the joint's own angle in place of the sum of the angles up to it: "
+        "the joints before are taken as still",
         com_rotation_transposed="the link's rotation is transposed where its centre of mass is placed",
     ),
     _energy(
@@ -189,8 +190,8 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
     ),
     _energy(
         POTENTIAL,
-        gravity_axis="gravity acts along the wrong axis: its components are exchanged in turn, x to y to z",
-        gravity_axis_back="gravity acts along the wrong axis: its components are exchanged in turn, z to y to x",
+        gravity_axis="gravity acts along the wrong axis: that along x is taken along y, y along z, z along x",
+        gravity_axis_back="gravity acts along the wrong axis: that along x is taken along z, z along y, y along x",
     ),
     _equation(
         "Look again at the sign of dV/dq.",
@@ -200,8 +201,10 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         RATE_TERMS,
         mass_rate_omitted="d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
         mass_rate_halved="d/dt dK/dqd - dK/dq is replaced by half of dM/dt qd",
-        kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation",
-        kinetic_gradient_sign="dK/dq has the wrong sign in Euler and Lagrange's equation",
+        kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation; of the Christoffel symbols, the "
+        "term that is taken off",
+        kinetic_gradient_sign="dK/dq has the wrong sign in Euler and Lagrange's equation; of the Christoffel symbols, "
+        "the term that is taken off",
         christoffel_indices=(
             "the indices of the Christoffel symbols are exchanged: dM_jk/dq_i is added and dM_ij/dq_k taken off"
         ),

@@ -17,9 +17,10 @@ from functools import cached_property, lru_cache, reduce
 import numpy as np
 
 from dhkit.description import Description
+from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, Symbols, exact_arm, point_inertia
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
-from dhkit.symbolic.ring import Element, Elements, Ring
+from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
 __all__ = ["BodyMotion", "LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
 
@@ -247,13 +248,14 @@ def _motion(arm: ExactArm, i: int, body: ExactBody, mistakes: frozenset[str]) ->
 class _Place:
     """Where a link's frame is."""
 
-    R_own: Elements
+    R_alone: Elements
+    """The frame's rotation if the joints before it stood still: those of parallel axes, or all where there are none."""
     R: Elements
     before: Elements
     """Origin of the frame before, in frame 0."""
     origin: Elements
     alone: Elements
-    """The frame's origin if frame i - 1 were not turned."""
+    """The frame's origin if frame i - 1 were so turned."""
     axis: Elements
     """The joint's axis in frame 0."""
 
@@ -262,7 +264,7 @@ class _Place:
 def _places(arm: ExactArm) -> tuple[_Place, ...]:
     """Walk along the arm."""
     ring = arm.ring
-    places = []
+    places: list[_Place] = []
     R, p = _identity(ring), np.array([ring.zero] * 3, dtype=object)
     for row in arm.rows:
         R_before, p_before = R, p
@@ -270,9 +272,27 @@ def _places(arm: ExactArm) -> tuple[_Place, ...]:
         R, p = R_before @ R_own, p_before + R_before @ p_own
         axis = (R_before if arm.is_standard else R)[:, 2]
         # What a student turns by the joint's own angle alone: the link from its joint on.
-        alone = p_before + p_own if arm.is_standard else p
-        places.append(_Place(R_own, R, p_before, p, alone, axis))
+        R_still = _with_joints_still(R_before, _joints_before(arm, len(places)))
+        alone = p_before + R_still @ p_own if arm.is_standard else p
+        places.append(_Place(R_still @ R_own, R, p_before, p, alone, axis))
     return tuple(places)
+
+
+def _joints_before(arm: ExactArm, i: int) -> list[int]:
+    """Return the turning joints before joint i, from 0, whose axes are parallel to its own; all where none is."""
+    run = next((run for run in parallel_runs(arm) if i in run), ())
+    turning = [j for j in range(i) if arm.ring.kinds[j] == "R"]
+    return [j for j in turning if j in run] or turning
+
+
+def _with_joints_still(R: Elements, joints: list[int]) -> Elements:
+    """Return a rotation with joints at zero."""
+    still = np.empty(R.shape, dtype=object)
+    for place, element in np.ndenumerate(R):
+        ring = element.ring
+        zeros = {ring.place("cosine", j): ring.one for j in joints} | {ring.place("sine", j): ring.zero for j in joints}
+        still[place] = translated(element, ring, zeros)
+    return still
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,7 +340,7 @@ class _MovingBody:
     def place(self, mistake: str) -> Elements:
         """Return where the centre of mass is, in frame 0."""
         if self.has(mistake):
-            return self.at.alone + self.at.R_own @ self.com  # type: ignore[no-any-return]
+            return self.at.alone + self.at.R_alone @ self.com  # type: ignore[no-any-return]
         R = self.at.R.T if self.has("com_rotation_transposed") else self.at.R
         return self.at.origin + R @ self.com  # type: ignore[no-any-return]
 

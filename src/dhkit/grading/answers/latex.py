@@ -37,6 +37,9 @@ OVER = "\\over"
 MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
 
 
+WORD = re.compile(r"[A-Za-z][A-Za-z0-9]*", re.ASCII)
+
+
 def is_latex(text: str) -> bool:
     """Whether a text is LaTeX rather than what programs read."""
     return "\\" in text or "{" in text or "_{" in text or "^{" in text
@@ -187,6 +190,10 @@ class _Latex:
         if digits and self.knows(letters + digits[0]):
             self.at = digits.end()  # m1 as programs write it
             return [Token("name", letters + digits[0], at)]
+        run = WORD.match(self.text, at)
+        if digits and run and run.end() > digits.end() and self.knows(run[0]):
+            self.at = run.end()  # I2x
+            return [Token("name", run[0], at)]
         below = self._subscript()
         if letters in FUNCTION_NAMES and not below:
             return [Token("name", letters, at)]

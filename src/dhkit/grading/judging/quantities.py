@@ -64,6 +64,13 @@ class JudgedQuantity:
         return self.truth[index[:1] if self.name == "C" else index]  # type: ignore[no-any-return]
 
     @property
+    def is_zero(self) -> bool:
+        """Whether everything that was handed in is zero."""
+        findings = [finding for finding in self.findings.values() if finding.verdict is not Verdict.INCOMPLETE]
+        answers = [finding.answer.element() if finding.answer else None for finding in findings]
+        return bool(answers) and all(answer is not None and answer.is_zero for answer in answers)
+
+    @property
     def answers(self) -> Mapping[Index, Quotient] | None:
         """The answer in the ring; None where an entry is not in it."""
         found = {index: finding.answer for index, finding in self.findings.items()}
@@ -76,11 +83,13 @@ class JudgedQuantity:
         None where an entry's difference is no element of the ring.
         """
         found: dict[Index, Element] = {}
+        rows = {index[0] for index, finding in self.findings.items() if finding.verdict is Verdict.WRONG and index}
         for index, finding in self.findings.items():
             if finding.verdict is Verdict.INCOMPLETE:
                 continue
             zero = self.right(index).ring.zero
-            element = zero if finding.verdict.passes else finding.difference
+            passes = finding.verdict.passes and not (self.name == "C" and index[0] in rows)
+            element = zero if passes else finding.difference
             if element is None:
                 return None
             found[index] = element
@@ -121,7 +130,7 @@ def judge_quantity(
     missing = _missing(truth, right, given)
     all_numbers = bool(missing) and missing == parameters_in(right, truth)
     likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
-    if judged.wrong and (all_numbers or likely or (missing and name == "C")):
+    if judged.wrong and not judged.is_zero and (all_numbers or likely or (missing and name == "C")):
         in_numbers = _at_numbers(truth, name, right, missing)
         findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth)
         other = JudgedQuantity(name, given, findings, in_numbers, missing)
@@ -232,7 +241,24 @@ def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth
                 finding, statement=f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
             )
         found |= {entry.index: finding for entry in row}
+        if finding.verdict is Verdict.WRONG:
+            found |= _right_in_wrong_row(row, finding, by, truth)
     return found
+
+
+def _right_in_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth: Truth) -> dict[Index, Finding]:
+    """Return what is right in a wrong row of C: the entries of the Christoffel factorization.
+
+    Zeros are right beside others only: a row of zeros is a row that was left out.
+    """
+    christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
+    alike = [e for e in row if _finding(e.tree, e.error, christoffel[e.index], by).verdict is Verdict.CORRECT]
+    answer = wrong.answer.element() if wrong.answer is not None else None
+    if answer is None or (answer.is_zero and not any(christoffel[entry.index] for entry in alike)):
+        return {}
+    statement = "proved equal to the Christoffel symbols' entry; another entry of its row is wrong"
+    right = replace(wrong, verdict=Verdict.CORRECT, statement=statement, witness=None)
+    return {entry.index: right for entry in alike}
 
 
 def _part_of_row(row: Sequence[Given], by: Comparison, truth: Truth) -> dict[Index, Finding]:

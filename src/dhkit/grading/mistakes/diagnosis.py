@@ -30,7 +30,7 @@ from dhkit.symbolic.textbook_kinematics import (
     derive_kinematics,
 )
 
-__all__ = ["Differences", "Index", "Variants", "variants_of"]
+__all__ = ["Differences", "Index", "Variants", "variants_of", "varying"]
 
 Index: TypeAlias = tuple[int, ...]
 Differences: TypeAlias = Mapping[Index, Element]
@@ -294,11 +294,16 @@ def keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
 
 def key_of(quantity: str, element: Element) -> Key:
     """Return a normal form to be looked up by; of energies without what does not depend on the state."""
-    terms = element.terms
-    if quantity in ("V", "L"):
-        constant = [g.kind == "constant" for g in element.ring.generators]
-        terms = {m: c for m, c in terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
-    return frozenset(terms.items())
+    return frozenset((varying(element) if quantity in ("V", "L") else element).terms.items())
+
+
+def varying(element: Element) -> Element:
+    """Return an element without its terms that do not depend on the state."""
+    ring = element.ring
+    constant = [g.kind == "constant" for g in ring.generators]
+    return ring.from_terms(
+        {m: c for m, c in element.terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
+    )
 
 
 def _fits(keys: Mapping[Index, Key], wanted: Mapping[Index, Key]) -> bool:

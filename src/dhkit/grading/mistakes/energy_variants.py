@@ -8,8 +8,9 @@ from fractions import Fraction
 from functools import partial
 from itertools import combinations
 
-from dhkit.description import Convention, Description
+from dhkit.description import Convention, Description, Joint
 from dhkit.errors import DhkitError
+from dhkit.expressions import ZERO, Expression
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.variants import Change, Variant
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
@@ -19,6 +20,7 @@ from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 __all__ = ["energy_variants"]
 
 HALF = Fraction(1, 2)
+MILLIMETRES = 1000
 SHAPES = {
     "disc_for_rod": (6,),
     "rod_about_end": (4,),
@@ -28,6 +30,16 @@ SHAPES = {
     "rod_with_half_length": (Fraction(1, 4),),
 }
 """What m l^2/12 about the centre is multiplied by: m l^2/2, m l^2/3, m l^2 about the centre and about the end, ..."""
+OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_about_com_at_joint")) | frozenset(
+    ("velocity_relative_angle", "height_relative_angle")
+)
+"""Mistakes with the angle of a link's joint, or with the inertia about its axis."""
+RARER = frozenset(("inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
+"""Mistakes of the textbook that are made less often than those that give the same answers."""
+INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
+"""Mistakes that are made at some links, where the first link only turns about its own axis."""
+MAX_LINKS_OF_SUBSETS = 4
+"""Links of arms at some of which a mistake may be made."""
 EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 
 
@@ -69,7 +81,7 @@ def _parts(textbook: TextbookDerivation) -> list[_Part]:
 
 
 def energy_variants(truth: Truth) -> Iterator[Variant]:
-    """Yield the mistakes that change energies: those made throughout before those made at one link."""
+    """Yield the mistakes that change energies."""
     textbook = derive(truth.description)
     yield from _textbook(textbook)
     yield from _payloads(textbook)
@@ -80,23 +92,49 @@ def energy_variants(truth: Truth) -> Iterator[Variant]:
 
 
 def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield the mistakes that the textbook's derivation knows."""
+    """Yield the mistakes that the textbook's derivation knows, the more frequent first."""
     n = textbook.arm.n
     names = [name for name in MISTAKES if name in LINK_MISTAKES | ROTOR_MISTAKES]
-    for name in names:
-        yield Variant(MadeAt(name), _derived(textbook, MadeAt(name)))
-    for name in names:
-        for i in range(1, n + 1) if n > 1 else ():
-            yield Variant(MadeAt(name, i), _derived(textbook, MadeAt(name, i)), f"link {i}")
     several = [part for part in _parts(textbook) if part.name is not None]
+
+    def rarity(name: str) -> int:
+        return int(name in RARER)
+
+    for name in names:
+        yield Variant(MadeAt(name), _derived(textbook, MadeAt(name)), rarity=rarity(name))
+        for i in range(1, n + 1):
+            if n == 1 or not _is_possible(textbook, name, i):
+                continue
+            yield Variant(MadeAt(name, i), _derived(textbook, MadeAt(name, i)), f"link {i}", rarity(name))
+    for name in INERTIA_MISTAKES:
+        for links in _subsets([i for i in range(1, n + 1) if _is_possible(textbook, name, i)]):
+            change = _derived(textbook, *(MadeAt(name, i) for i in links))
+            yield Variant(MadeAt(name), change, _listed(links), 1)
     for name in names:
         for part in several if name in LINK_MISTAKES else ():
-            yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1)
+            if _is_possible(textbook, name, part.link):
+                yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1)
 
 
-def _derived(textbook: TextbookDerivation, made: MadeAt) -> Callable[[str], Elements]:
+def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
+    """Whether a mistake can be made at a link: what slides has no angle of its own, and no parallel axis."""
+    return name not in OF_TURNING or textbook.arm.ring.kinds[link - 1] == "R"
+
+
+def _subsets(links: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    """Yield several of some links, not all of them."""
+    if len(links) <= MAX_LINKS_OF_SUBSETS:
+        for count in range(2, len(links)):
+            yield from combinations(links, count)
+
+
+def _listed(links: Sequence[int]) -> str:
+    return f"links {', '.join(map(str, links[:-1]))} and {links[-1]}"
+
+
+def _derived(textbook: TextbookDerivation, *made: MadeAt) -> Callable[[str], Elements]:
     def change() -> Change:
-        wrong = derive(textbook.arm.description, {made}, textbook.arm.symbols)
+        wrong = derive(textbook.arm.description, made, textbook.arm.symbols)
         return Change(wrong.K - textbook.K, wrong.V - textbook.V)
 
     return _lazily(change)
@@ -119,12 +157,14 @@ def _lazily(change: Callable[[], Change]) -> Callable[[str], Elements]:
 
 def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
     """Yield a link's second and further bodies left out, and placed where its first one is."""
-    arm = textbook.arm
+    arm, ring = textbook.arm, textbook.arm.ring
     for part in _parts(textbook):
         if part.name is None or part.motion.body is arm.bodies[part.link - 1][0]:
             continue
         left_out = Change(-part.motion.K, -part.motion.V)
         yield Variant(part.made("payload_forgotten"), left_out.of, part.place)
+        yield Variant(part.made("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
+        yield Variant(part.made("payload_without_weight"), Change(ring.zero, -part.motion.V).of, part.place, 1)
         moved = partial(_of_description, textbook, _with_com_of_first(arm.description, part))
         yield Variant(part.made("payload_at_com"), _lazily(moved), part.place)
 
@@ -161,6 +201,10 @@ def _scaled_inertia(
 ) -> Iterator[Variant]:
     if len(parts) > 1:
         yield Variant(MadeAt(identity), _lazily(partial(_more_inertia, textbook, parts, factor - 1)), rarity=1)
+    by_link = {part.link: part for part in parts}
+    for links in _subsets([*by_link]) if len(by_link) == len(parts) else ():
+        change = partial(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
+        yield Variant(MadeAt(identity), _lazily(change), _listed(links), 1)
     for part in parts:
         place = part.place if textbook.arm.n > 1 or part.name is not None else ""
         yield Variant(part.made(identity), _lazily(partial(_more_inertia, textbook, [part], factor - 1)), place, 1)
@@ -244,11 +288,11 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
         for i in range(k, ring.n):
             place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
             change = partial(_without_slide, textbook, textbook.links[i].bodies, k)
-            yield Variant(MadeAt("slide_forgotten", i + 1), _lazily(change), place, 1)
+            yield Variant(MadeAt("slide_forgotten", i + 1), _lazily(change), place, 2)
         for part in _parts(textbook):
             if part.name is not None and part.link > k:
                 change = partial(_without_slide, textbook, [part.motion], k)
-                yield Variant(part.made("slide_forgotten"), _lazily(change), f"{part.place}, q{k + 1}", 1)
+                yield Variant(part.made("slide_forgotten"), _lazily(change), f"{part.place}, q{k + 1}", 2)
 
 
 def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
@@ -278,6 +322,33 @@ def _tables(textbook: TextbookDerivation) -> Iterator[Variant]:
         place = f"row {links[0] + 1}" if len(links) == 1 else ""
         wrong = _with_twists_turned(description, links)
         yield Variant(made, _lazily(partial(_of_description, textbook, wrong)), place, 1)
+
+    if any(not x.symbols and not x.is_zero for joint in description.joints for x in _lengths(joint)):
+        wrong = replace(description, joints=tuple(map(_in_millimetres, description.joints)))
+        made = MadeAt("millimetres_for_metres")
+        yield Variant(made, _lazily(partial(_of_description, textbook, wrong)), rarity=1)
+    for i, joint in enumerate(description.joints):
+        offset = "theta" if description.kinds[i] == "R" else "d"
+        if not getattr(joint, offset).is_zero:
+            without = replace(joint, theta=ZERO) if offset == "theta" else replace(joint, d=ZERO)
+            joints = (*description.joints[:i], without, *description.joints[i + 1 :])
+            change = partial(_of_description, textbook, replace(description, joints=joints))
+            yield Variant(MadeAt("offset_in_dynamics", i + 1), _lazily(change), f"q{i + 1}", 1)
+
+
+def _lengths(joint: Joint) -> list[Expression]:
+    """Return a row's lengths, and those of its bodies' places."""
+    return [joint.a, joint.d, *(x for body in joint.bodies for x in body.com)]
+
+
+def _in_millimetres(joint: Joint) -> Joint:
+    """Return a row whose lengths are numbers a thousand times as large; inertias stay."""
+    bodies = tuple(
+        replace(body, com=(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES))
+        for body in joint.bodies
+        for x, y, z in [body.com]
+    )
+    return replace(joint, a=joint.a * MILLIMETRES, d=joint.d * MILLIMETRES, bodies=bodies)
 
 
 def _with_twists_turned(description: Description, links: Iterable[int]) -> Description:

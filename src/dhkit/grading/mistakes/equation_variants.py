@@ -26,6 +26,7 @@ def equation_variants(truth: Truth) -> Iterator[Variant]:
     yield from _signs(truth)
     yield from _steps(truth)
     yield from _gravity_torques(truth)
+    yield from _heights(truth)
     yield from _matrices(truth)
     yield from sums_of_angles(truth.lagrangian.arm, partial(right, truth.lagrangian))
     yield from _other_coordinates(truth)
@@ -34,16 +35,22 @@ def equation_variants(truth: Truth) -> Iterator[Variant]:
 
 
 def lagrangian_sum(truth: Truth) -> Variant:
-    """Return the Lagrangian as the sum of energies: of L alone likelier than a sign of gravity."""
+    """Return the Lagrangian as the sum of energies, and torques from it: likelier than a sign of gravity."""
     lag = truth.lagrangian
-    return Variant(MadeAt("lagrangian_sum"), _of_one(lag, "L", lambda: element_array(2 * lag.V)))
+
+    def make(quantity: str) -> Elements:
+        if quantity == "L":
+            return element_array(2 * lag.V)
+        return -2 * lag.g if quantity == "tau" else nothing(lag, quantity)
+
+    return Variant(MadeAt("lagrangian_sum"), make)
 
 
 def _signs(truth: Truth) -> Iterator[Variant]:
     """Yield what is wrong with whole parts of the equation: their sign, or that they are missing."""
     lag = truth.lagrangian
     yield Variant(MadeAt("velocity_torques_sign"), changed_only(lag, "h", lambda: -2 * lag.h))
-    yield Variant(MadeAt("velocity_torques_missing"), _of_one(lag, "tau", lambda: -lag.h))
+    yield Variant(MadeAt("velocity_torques_missing"), changed_only(lag, "h", lambda: -lag.h))
     yield Variant(MadeAt("gravity_torques_missing"), _of_one(lag, "tau", lambda: -lag.g))
     yield Variant(MadeAt("gravity_torque_sign"), _of_one(lag, "tau", lambda: -2 * lag.g))
     yield Variant(MadeAt("inertial_torques_missing"), _of_one(lag, "tau", lambda: lag.h + lag.g - lag.tau), rarity=1)
@@ -125,6 +132,23 @@ def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
         if j in ring.angles:
             still |= {ring.place("cosine", j): ring.one, ring.place("sine", j): ring.zero}
     return translated_array(torques, still) - torques
+
+
+def _heights(truth: Truth) -> Iterator[Variant]:
+    """Yield heights whose sines and cosines are exchanged, those of a joint's angle and of the sums that it is in."""
+    lag = truth.lagrangian
+    for i in lag.arm.ring.angles:
+        for sign in (-1, 1):
+            shifted = _shifted(lag, i, sign)
+
+            def make(quantity: str, shifted: Make = shifted) -> Elements:
+                if quantity in ("V", "g"):
+                    return shifted(quantity)
+                if quantity in ("L", "tau"):
+                    return shifted("V") * -1 if quantity == "L" else shifted("g")
+                return nothing(lag, quantity)
+
+            yield Variant(MadeAt("height_sin_cos", i + 1), make, f"q{i + 1}")
 
 
 # What is done with matrices that are right

@@ -10,18 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from dhkit.errors import AnswerError
+from dhkit.expressions.syntax import Name, Number, Product, Tree
 from dhkit.grading.capitals import capitalised
+from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.findings import Comparison, equal, readable
-from dhkit.grading.judging.numeric import doubles, general_state
+from dhkit.grading.judging.numeric import doubles, general_state, names_of
 from dhkit.grading.judging.quantities import JudgedQuantity
 from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
 from dhkit.grading.judging.rounding import has_decimals
-from dhkit.grading.judging.truth import DYNAMICS, Truth
-from dhkit.grading.mistakes.diagnosis import Differences, Index, Variants, place_of, variants_of
-from dhkit.grading.mistakes.library import FACTORS, hint_of
+from dhkit.grading.judging.truth import DYNAMICS, Truth, exact_number, substituted
+from dhkit.grading.mistakes.diagnosis import Differences, Index, Variants, place_of, variants_of, varying
+from dhkit.grading.mistakes.library import FACTORS, UNITS, hint_of
+from dhkit.grading.mistakes.parameter_variants import lengths_of
 from dhkit.grading.mistakes.parts import split_in_parts
 from dhkit.grading.mistakes.slips import Slip, slip_in
 from dhkit.grading.mistakes.terms import describe
@@ -36,7 +40,7 @@ from dhkit.grading.mistakes.wording import (
 )
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.equations import plain_text
-from dhkit.symbolic.ring import Element
+from dhkit.symbolic.ring import Element, Elements
 
 __all__ = ["explain"]
 
@@ -50,6 +54,8 @@ PARTS = {
 IN_DEGREES = (Fraction(1, 180), Fraction(180))
 LIKELY = 1
 """The largest rarity of a mistake that is named before slips in single terms are looked for."""
+ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
+"""What is missing where all of a quantity is zero."""
 LEAST_DIGITS = 2
 """Significant digits of decimals that are told to be too few rather than wrong."""
 LEAST_TERMS_OF_A_PAIR, MOST_TERMS_OF_A_PAIR = 3, 600
@@ -82,12 +88,22 @@ def explain(
     """
     left = {name: quantity for name, quantity in judged.items() if quantity.wrong}
     found: list[Diagnosis] = []
+    following = {
+        name for name in left if all(index in (follows or {}).get(name, {}) for index in wrong_entries(left[name]))
+    }
     _take(left, found, _degrees(truth, left))
-    _take(left, found, _single(truth, judged, left, lambda rarity: rarity <= LIKELY))
+    _take(left, found, _gears(truth, left))
+    found += _weights(truth, left, following)
+    found += _one_of_C(truth, left, following)
+    _take(left, found, _zeros(truth, left, following))
+    _take(left, found, _units(truth, left))
+    # What only explains answers that follow from other wrong ones is not where the sheet went wrong.
+    for allowed in (lambda names, rarity: rarity <= LIKELY, lambda names, rarity: len(names) > 1):
+        single = _single(truth, judged, left, allowed)
+        _take(left, found, {names: one for names, one in single.items() if not following.issuperset(names)})
     _take(left, found, _nearly(truth, left, digits))
-    for name in list(left):
-        if all(index in (follows or {}).get(name, {}) for index in wrong_entries(left[name])):
-            del left[name]
+    for name in following & left.keys():
+        del left[name]
     for explained in (_too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
         for name, quantity in list(left.items()):
             diagnoses = explained(truth, judged, quantity)
@@ -120,18 +136,107 @@ def _degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[st
     return found
 
 
-def _is_right_in(truth: Truth, quantity: JudgedQuantity, factor: Fraction) -> bool:
-    reading = Reading(truth.arm(quantity.name).ring, degrees=factor)
+def _is_right_in(truth: Truth, quantity: JudgedQuantity, degrees: Fraction) -> bool:
+    return _is_right(quantity, Reading(truth.arm(quantity.name).ring, degrees=degrees))
+
+
+def _is_right(quantity: JudgedQuantity, reading: Reading, change: Callable[[Tree], Tree] = lambda tree: tree) -> bool:
+    """Whether the wrong entries are right once they are changed, or read in another way."""
     for entry in quantity.given:
         if quantity.findings[entry.index].verdict is not Verdict.WRONG:
             continue
         try:
             right = quantity.right(entry.index)
-            if entry.tree is None or not reading.read(entry.tree).numerator_of_difference(right).is_zero:
+            if entry.tree is None or not reading.read(change(entry.tree)).numerator_of_difference(right).is_zero:
                 return False
         except (OutsideTheRingError, AnswerError):
             return False
     return True
+
+
+def _gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+    """Find answers that are right once gear ratios are inverted in them; numbers are inverted by the variants."""
+    gears = {name for joint in truth.description.joints if joint.drive for name in joint.drive.gear.symbols}
+    one = Number(Fraction(1), "1", 0)
+    inverse: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
+    return {
+        (name,): diagnosis_of_identity("gear_inverted", quantity, wrong_entries(quantity), name)
+        for name, quantity in wrong.items()
+        if gears
+        and name in ("M", "K", "tau")
+        and _is_right(quantity, Reading(truth.arm(name).ring), partial(renamed, change=inverse))
+    }
+
+
+def _weights(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
+    """Take gravity torques out that stand where there are none, if no other one is wrong."""
+    g = left.get("g")
+    if g is None or "g" in following or any(g.right(index) for index in wrong_entries(g)):
+        return []
+    slips = {index: _slip(truth, g, index) for index in wrong_entries(g)}
+    if any(slip is None or slip.identity != "weight_on_vertical_axis" for slip in slips.values()):
+        return []
+    del left["g"]
+    return [diagnosis_of_slip(g, index, slip) for index, slip in slips.items() if slip is not None]
+
+
+def _one_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
+    """Take C out if one entry of it is not the Christoffel factorization's, and say what is wrong in that."""
+    C = left.get("C")
+    wrong = wrong_entries(C) if C is not None else []
+    if C is None or "C" in following or len(wrong) != 1 or len(C.given) < C.truth.size**2:
+        return []
+    slip = _slip_in_C(truth, C, wrong[0])
+    if slip is None:
+        return []
+    del left["C"]
+    return [replace(diagnosis_of_slip(C, wrong[0], slip), equivalent=_equivalent(truth, C))]
+
+
+def _zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
+    """Find quantities that are handed in as zero."""
+    found: dict[tuple[str, ...], Diagnosis] = {}
+    for name, quantity in left.items():
+        wrong = wrong_entries(quantity)
+        if name in following or not quantity.is_zero or any(_mirrored(quantity, index) for index in wrong):
+            continue
+        identity = ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
+        one = diagnosis_of_identity(identity, quantity, wrong, name)
+        found[(name,)] = replace(one, equivalent=_equivalent(truth, quantity))
+    return found
+
+
+def _equivalent(truth: Truth, quantity: JudgedQuantity) -> tuple[str, ...]:
+    """Return what the mistakes are called that give a whole quantity."""
+    differences = quantity.differences
+    variants = _tables(truth, quantity).whole(quantity.name, differences) if differences else []
+    return tuple(dict.fromkeys(variant.called for variant in variants))
+
+
+def _units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+    """Find quantities with lengths as numbers in another unit, where other parameters stand as symbols."""
+    found: dict[tuple[str, ...], Diagnosis] = {}
+    lengths = lengths_of(truth.description)
+    for name, quantity in left.items():
+        there = [entry.tree for entry in quantity.given if entry.tree is not None]
+        absent = [p for p in lengths if not any(p in names_of(tree) for tree in there)]
+        ring = truth.arm(name).ring
+        if name not in DYNAMICS or not absent or not set(absent) <= set(ring.constants):
+            continue
+        for identity, factor in UNITS.items():
+            values = {p: ring.number(exact_number(truth.description, p) * factor) for p in absent}
+            expected = substituted(truth.of("h" if name == "C" else name), values, ring)
+            if name != "C" and _has_answers(quantity, expected):
+                found[(name,)] = diagnosis_of_identity(identity, quantity, wrong_entries(quantity), name)
+    return found
+
+
+def _has_answers(quantity: JudgedQuantity, expected: Elements) -> bool:
+    """Whether all wrong entries are what is expected."""
+    answers = [(index, quantity.findings[index].answer) for index in wrong_entries(quantity)]
+    return all(
+        answer is not None and answer.numerator_of_difference(expected[index]).is_zero for index, answer in answers
+    )
 
 
 # Mistakes that explain whole quantities
@@ -145,55 +250,50 @@ def _single(
     truth: Truth,
     judged: Mapping[str, JudgedQuantity],
     wrong: Mapping[str, JudgedQuantity],
-    allowed: Callable[[int], bool],
+    allowed: Callable[[tuple[str, ...], int], bool],
 ) -> dict[tuple[str, ...], Diagnosis]:
-    """Find mistakes that explain quantities entirely, each as many of them as it can."""
+    """Find mistakes that explain quantities entirely, each as many of them as it can, and that no right one denies."""
     candidates: dict[str, list[Variant]] = {}
     for name, quantity in wrong.items():
         differences = quantity.differences
         if differences:
-            candidates[name] = _tables(truth, quantity).whole(name, differences)
-    ranked = _greedily(candidates, lambda variant: _contradicted(truth, judged, variant))
+            whole = _tables(truth, quantity).whole(name, differences)
+            candidates[name] = [variant for variant in whole if not _contradicted(truth, judged, variant)]
+    ranked = _greedily(candidates)
     return {
         names: diagnosis_of(variants, [wrong[name] for name in names])
         for names, variants in ranked.items()
-        if allowed(variants[0].rarity)
+        if allowed(names, variants[0].rarity)
     }
 
 
-def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> int:
-    """Return how many quantities are right on the sheet that a mistake would have changed."""
-    count = 0
+def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> bool:
+    """Whether a quantity is right on the sheet that a mistake would have changed."""
     for name, quantity in judged.items():
         right = [index for index, finding in quantity.findings.items() if finding.verdict.passes]
         if quantity.wrong or not right or (name in DYNAMICS) == variant.is_kinematic:
             continue
-        count += not _tables(truth, quantity).changes_none(variant, name, right)
-    return count
+        if not _tables(truth, quantity).changes_none(variant, name, right):
+            return True
+    return False
 
 
-def _greedily(
-    candidates: Mapping[Any, list[Variant]], contradicted: Callable[[Variant], int]
-) -> dict[tuple[Any, ...], list[Variant]]:
+def _greedily(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], list[Variant]]:
     """Return the fewest mistakes that explain all that can be, each with what it explains and what is equivalent."""
     left, found = dict(candidates), dict[tuple[Any, ...], list[Variant]]()
-    against: dict[tuple[str, str], int] = {}
     while any(left.values()):
         explains: dict[tuple[str, str], list[Any]] = {}
         listed: dict[tuple[str, str], Variant] = {}
         for name, variants in left.items():
             for variant in variants:
                 key = (variant.identity, variant.place)
-                explains.setdefault(key, []).append(name)
-                listed[key] = variant
-        several = len(listed) > 1
-        for key, variant in listed.items() if several else ():
-            if key not in against:
-                against[key] = contradicted(variant)
-        ranked = sorted(listed, key=lambda key: (-len(explains[key]), against.get(key, 0), listed[key].rarity))
+                explained = explains.setdefault(key, [])
+                if name not in explained:  # one mistake may be made in several ways
+                    explained.append(name)
+                listed.setdefault(key, variant)
+        ranked = sorted(listed, key=lambda key: (-len(explains[key]), listed[key].rarity))
         names = explains[ranked[0]]
-        alike = [key for key in ranked if explains[key] == names and against.get(key) == against.get(ranked[0])]
-        found[tuple(names)] = [listed[key] for key in alike]
+        found[tuple(names)] = [listed[key] for key in ranked if explains[key] == names]
         left = {name: variants for name, variants in left.items() if name not in names}
     return found
 
@@ -261,10 +361,7 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         found.append(diagnosis_of_slip(quantity, index, slip))
     if len({one.sentence for one in found}) > 1 and (rare := _rare(truth, judged, quantity)):
         return rare
-    differences = quantity.differences
-    alike = _tables(truth, quantity).whole(quantity.name, differences) if differences else []
-    equivalent = tuple(dict.fromkeys(variant.called for variant in alike))
-    return [replace(one, equivalent=equivalent) for one in found]
+    return [replace(one, equivalent=_equivalent(truth, quantity)) for one in found]
 
 
 def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
@@ -272,6 +369,8 @@ def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
     if difference is None or difference.is_zero or len(difference) > MAX_TERMS:
         return None
     arm = truth.arm(quantity.name)
+    if quantity.name in ("V", "L"):  # they count from any zero
+        difference, right = varying(difference), varying(right)
     if quantity.name == "g" and not right and _is_weight(truth, difference):
         return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
     return slip_in(arm, right + difference, right)
@@ -294,7 +393,12 @@ def _slip_in_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | N
             return None
         if answer != right[given.index]:
             differing.append((answer, right[given.index]))
-    return slip_in(arm, *differing[0]) if len(differing) == 1 else None
+    if len(differing) != 1:
+        return None
+    answer, entry = differing[0]
+    names = (identity for identity, factor in FACTORS.items() if answer == entry * factor)
+    identity = next(names, None)
+    return slip_in(arm, answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
 
 
 def _is_weight(truth: Truth, difference: Element) -> bool:
@@ -309,12 +413,14 @@ def _is_weight(truth: Truth, difference: Element) -> bool:
 
 def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Find the single mistakes that are possible, and seldom made."""
-    return list(_single(truth, judged, {quantity.name: quantity}, lambda rarity: rarity > LIKELY).values())
+    return list(_single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > LIKELY).values())
 
 
 def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Find a factor that all entries, all of them wrong, share."""
     wrong = _distinct(quantity)
+    if any(_mirrored(quantity, index) for index in wrong):
+        return []
     found = [_factor(quantity, index) for index in wrong]
     names = {one.mistake for one in found if one is not None}
     if None in found or len(names) != 1:
@@ -339,7 +445,7 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         part: [variant for variant in tables.whole(part, whole) if not leaves_the_rest(variant)]
         for part, whole in parts.items()
     }
-    explained = _greedily(candidates, lambda variant: 0)
+    explained = _greedily(candidates)
     found = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
     left = [part for part in parts if not any(part in names for names in explained)]
     if not found and len(parts) == len(split):
@@ -398,9 +504,11 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
             candidates[index] = _tables(truth, quantity).entry(quantity.name, index, difference)
         else:
             candidates[index] = []
-    for indices, variants in _greedily(candidates, lambda variant: 0).items():
-        if len(indices) == 1 and quantity.name not in DYNAMICS:
-            continue  # of transforms' entries many look alike
+    # One entry alone proves little: of transforms' entries many look alike, and so do those of a muddle.
+    certain = quantity.name in DYNAMICS and all(candidates.values())
+    for indices, variants in _greedily(candidates).items():
+        if len(indices) == 1 and not certain:
+            continue
         diagnosis = diagnosis_of(variants, [quantity], indices)
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
         found.append(replace(diagnosis, sentence=alone))

@@ -9,7 +9,7 @@ from dhkit.grading.capitals import capitalised
 from dhkit.symbolic.mistakes import MISTAKES, Mistake, Subject, catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, ROW
 
-__all__ = ["FACTORS", "INVERSE", "JACOBIAN", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "hint_of", "sentence_of"]
+__all__ = ["FACTORS", "INVERSE", "JACOBIAN", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "UNITS", "hint_of", "sentence_of"]
 
 UNNAMED_HINT = "Look again at the entries that are marked as wrong."
 """Where to look where no mistake is named."""
@@ -21,10 +21,17 @@ PARAMETER_FACTORS = {
     "parameter_sign": Fraction(-1),
 }
 """What a parameter is multiplied by."""
+UNITS = {
+    "millimetres_for_metres": Fraction(1000),
+    "centimetres_for_metres": Fraction(100),
+    "inches_for_metres": Fraction(10000, 254),
+}
+"""What a length is multiplied by."""
 FACTORS = {
     "entry_sign": Fraction(-1),
     "entry_halved": Fraction(1, 2),
     "entry_doubled": Fraction(2),
+    "entry_zero": Fraction(0),
 }
 """What a whole entry is multiplied by."""
 
@@ -39,6 +46,8 @@ WRITING = catalogue(
         "Look again at the units.",
         degrees_for_radians="angles in degrees are used as if they were in radians",
         millimetres_for_metres="lengths in millimetres are used as if they were in metres",
+        centimetres_for_metres="lengths in centimetres are used as if they were in metres",
+        inches_for_metres="lengths in inches are used as if they were in metres",
     ),
     _of(
         Subject.WRITING,
@@ -51,6 +60,7 @@ WRITING = catalogue(
         entry_sign="the whole entry has the wrong sign",
         entry_halved="the whole entry is half of what it should be",
         entry_doubled="the whole entry is twice what it should be",
+        entry_zero="the entry is zero, and should not be",
     ),
 )
 
@@ -156,9 +166,16 @@ EQUATION = catalogue(
         inertia_moments_exchanged="two principal moments of the inertia are exchanged",
     ),
     _of(
+        Subject.ENERGY,
+        "Look again at the heights: from which axis does each angle count?",
+        height_sin_cos="sine and cosine are exchanged in the heights",
+    ),
+    _of(
         Subject.EQUATION,
         "Look again at the bodies that a link is made of: is each there, and where is its centre of mass?",
         payload_forgotten="the payload is missing",
+        payload_not_moved="the payload is missing in the kinetic energy",
+        payload_without_weight="the payload is missing in the potential energy",
         payload_at_com="the payload is placed at the link's centre of mass",
     ),
     _of(
@@ -171,6 +188,7 @@ EQUATION = catalogue(
         Subject.ENERGY,
         "Look again at the table behind the dynamics: convention, twists and lengths.",
         convention_in_dynamics="the table is read in the other convention: a and alpha belong to another link",
+        offset_in_dynamics="the table's constant offset is missing: the joint's value counts from another zero",
         twist_sign_in_dynamics="a twist alpha has the wrong sign in the positions of the links",
     ),
     _of(
@@ -182,21 +200,22 @@ EQUATION = catalogue(
         Subject.ENERGY,
         "Look again at the squares in the kinetic energy.",
         square_of_sum="the square of a sum lacks its mixed term: (a + b)^2 = a^2 + 2 a b + b^2",
-        exponent_dropped="an exponent is missing: m r stands where m r^2 belongs",
+        exponent_dropped="the exponent is missing: x stands where x^2 belongs",
         slide_forgotten="the variable of a sliding joint is missing in the position of a link",
     ),
     _of(
         Subject.EQUATION,
         "Look again at the formulas for sines and cosines of sums.",
         sum_of_angles_split="sines and cosines of a sum of angles are split up: cos(a + b) is not cos(a) + cos(b)",
-        sum_formula_sign="a sum formula has the wrong sign: cos(a + b) = cos(a) cos(b) - sin(a) sin(b)",
+        sum_formula_sign="a sum formula is wrong: cos(a + b) = cos(a) cos(b) - sin(a) sin(b), "
+        "sin(a + b) = sin(a) cos(b) + cos(a) sin(b)",
         angle_difference="the difference of two angles stands where their sum belongs",
     ),
     _of(
         Subject.EQUATION,
         "Look again at the time derivatives: d/dt cos(q) = -sin(q) dq/dt.",
         rate_of_cosine_sign="d/dt of M has the wrong sign: the derivative of a cosine is minus the sine",
-        chain_rule_forgotten="d/dt of M lacks the chain rule: the derivative of cos(q) is -sin(q) times q's rate",
+        chain_rule_forgotten="d/dt of M lacks the chain rule: d/dt f(q) is df/dq times q's rate",
     ),
     _of(
         Subject.EQUATION,
@@ -212,8 +231,8 @@ EQUATION = catalogue(
     _of(
         Subject.EQUATION,
         "Look again at where each joint's angle is zero, and from which axis it counts.",
-        zero_shifted="the zero pose is a quarter turn off: the joint's sine stands for its cosine, with a sign",
-        zero_shifted_back="the zero pose is a quarter turn off, the other way: cosine for sine, with a sign",
+        zero_shifted="the zero pose is a quarter turn off: -sin(q) stands for cos(q), and cos(q) for sin(q)",
+        zero_shifted_back="the zero pose is a quarter turn off: sin(q) stands for cos(q), and -cos(q) for sin(q)",
     ),
     _of(
         Subject.EQUATION,
@@ -222,8 +241,8 @@ EQUATION = catalogue(
         equations_exchanged="rows are exchanged: one joint's equation stands in another's place",
         centrifugal_index="the squares of rates have the wrong index: one joint's rate stands for another's",
         parameter_forgotten="a parameter is missing, as if it were zero",
-        parameter_halved="a parameter counts by half: was a full length meant, or half of it?",
-        parameter_doubled="a parameter counts twice: was half a length meant, or the full one?",
+        parameter_halved="a parameter counts by half",
+        parameter_doubled="a parameter counts twice",
         parameter_sign="a parameter has the wrong sign",
         parameter_for_another="one parameter stands where another belongs",
         parameters_exchanged="two parameters are exchanged",
@@ -259,9 +278,11 @@ EQUATION = catalogue(
         term_sign="a term has the wrong sign",
         term_factor="a term has the wrong factor",
         term_extra="there is a term too much",
+        factor_missing="a term lacks a factor",
+        factor_extra="a term has a factor too much",
         term_function="sine and cosine are exchanged in a term",
         term_angle="a term has the wrong angle",
-        term_rate="a term has the rate or acceleration of another joint",
+        term_rate="a term has another rate or acceleration than it should",
         term_parameter="a term has another parameter than it should",
         term_replaced="one term stands in place of another",
     ),
@@ -294,7 +315,9 @@ def sentence_of(identity: str, where: str = "", detail: str = "") -> str:
     sentence = LIBRARY[identity].sentence
     text = f"{where}: {sentence}" if where else sentence
     text = f"{text.rstrip('?')}: {detail}" if detail else text
-    return capitalised(text if text.endswith("?") else f"{text}.")
+    is_name = bool(where) and " " not in where  # of a parameter, as it is written
+    text = text if text.endswith("?") else f"{text}."
+    return text if is_name else capitalised(text)
 
 
 def hint_of(identity: str | None) -> str:

@@ -1,4 +1,4 @@
-"""Parameters that are forgotten, doubled, halved, taken for another, exchanged, or in millimetres."""
+"""Parameters that are forgotten, doubled, halved, taken for another, exchanged, or in other units."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from itertools import combinations, permutations
 from dhkit.description import INERTIA_PLACES, Description
 from dhkit.expressions import Expression
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.mistakes.library import PARAMETER_FACTORS
+from dhkit.grading.mistakes.library import PARAMETER_FACTORS, UNITS
 from dhkit.grading.mistakes.variants import Make, Variant, right, translated_array
 from dhkit.symbolic.mistakes import MadeAt
-from dhkit.symbolic.ring import Element, Elements, Ring
+from dhkit.symbolic.ring import Element, Elements
 
-__all__ = ["parameter_variants"]
+__all__ = ["lengths_of", "parameter_variants"]
 
-MILLIMETRES = 1000
 MAX_JOINTS = 3
 """Joints of arms of which half of one length may stand for another: of larger ones there are too many pairs."""
 
@@ -25,11 +24,11 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
     """Yield what goes wrong with the file's parameters."""
     lag = truth.lagrangian
     ring = lag.arm.ring
-    symbols = [name for name in lag.arm.parameters if name in ring.constants and _is_free(ring, name)]
+    symbols = [name for name in lag.arm.parameters if name in ring.constants]
     kinds = _kinds(truth.description)
     yield from _factors(truth, symbols)
     yield from _tilts(truth)
-    yield from _millimetres(truth, [name for name in symbols if kinds.get(name) == "length"])
+    yield from _units(truth, [name for name in symbols if kinds.get(name) == "length"])
     alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
     for first, second in alike:
         swapped = {first: ring.constant(second), second: ring.constant(first)}
@@ -58,13 +57,13 @@ def _factors(truth: Truth, symbols: list[str]) -> Iterator[Variant]:
             yield Variant(MadeAt(identity), _replaced(truth, {name: ring.constant(name) * factor}), name, rarity)
 
 
-def _millimetres(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
+def _units(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
     ring = truth.lagrangian.arm.ring
     groups = [lengths] if len(lengths) > 1 else []
-    for names in (*groups, *([name] for name in lengths)):
-        values = {name: ring.constant(name) * MILLIMETRES for name in names}
-        place = names[0] if len(names) == 1 else ""
-        yield Variant(MadeAt("millimetres_for_metres"), _replaced(truth, values), place, 2)
+    for identity, factor in UNITS.items():
+        for names in (*groups, *([name] for name in lengths)):
+            values = {name: ring.constant(name) * factor for name in names}
+            yield Variant(MadeAt(identity), _replaced(truth, values), names[0] if len(names) == 1 else "", 2)
 
 
 def _tilts(truth: Truth) -> Iterator[Variant]:
@@ -80,6 +79,11 @@ def _tilts(truth: Truth) -> Iterator[Variant]:
             ("parameter_sin_cos", {cosine: s, sine: c}),
         ):
             yield Variant(MadeAt(identity), _replaced(truth, values), place, 1)
+
+
+def lengths_of(description: Description) -> list[str]:
+    """Return the parameters that are lengths."""
+    return [name for name, kind in _kinds(description).items() if kind == "length"]
 
 
 def _kinds(description: Description) -> dict[str, str]:
@@ -121,18 +125,22 @@ def _letters(name: str) -> str:
     return name.rstrip("0123456789")
 
 
-def _is_free(ring: Ring, name: str) -> bool:
-    """Whether no other constant is written in a parameter, so that another may stand in its place."""
-    return not any(name in constant.symbols and constant.text != name for constant in ring.given)
-
-
 def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
-    places = {truth.lagrangian.arm.ring.place("constant", name): value for name, value in values.items()}
+    """Return what changes where parameters are replaced, in quantities without constants that are made of them."""
+    ring = truth.lagrangian.arm.ring
+    places = {ring.place("constant", name): value for name, value in values.items()}
+    made_of = [
+        ring.place("constant", constant.text)
+        for constant in ring.given
+        if constant.text not in values and not constant.symbols.isdisjoint(values)
+    ]
 
     def make(quantity: str) -> Elements:
         whole = right(truth.lagrangian, quantity)
         if quantity == "tau" and truth.friction:
             whole = whole + truth.viscous
+        if made_of and any(term[k] for element in whole.flat for term in element.terms for k in made_of):
+            return whole * 0
         return translated_array(whole, places) - whole
 
     return make

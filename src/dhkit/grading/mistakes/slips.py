@@ -16,6 +16,8 @@ __all__ = ["Slip", "slip_in"]
 Terms = Mapping[tuple[int, ...], Fraction]
 UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
 """Factors of a term in millimetres."""
+MAX_CHANGED = 16
+"""Terms in which an answer and the truth may differ for a slip to be looked for."""
 MAX_TERMS = 4
 """Terms that one slip changes alike: m2*(l1^2 + l2^2) may stand multiplied out."""
 
@@ -54,7 +56,7 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     ring, right, wrong = truth.ring, truth.terms, answer.terms
     changed = {m: wrong.get(m, Fraction(0)) - right.get(m, Fraction(0)) for m in {*right, *wrong}}
     changed = {m: c for m, c in changed.items() if c}
-    if not changed or len(changed) > 2 * MAX_TERMS:
+    if not changed or len(changed) > MAX_CHANGED:
         return None
     gone = {m: right[m] for m, c in changed.items() if m not in wrong}
     come = {m: c for m, c in changed.items() if m not in gone}
@@ -75,12 +77,14 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
 def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
     """Return a slip by which terms have another factor, all the same one."""
     factors = {(right[m] + c) / right[m] for m, c in shared.items()}
-    if len(factors) != 1 or len(shared) > MAX_TERMS or (len(shared) > 1 and len(shared) == len(right)):
+    # What stands beside one and the same sine is one term of a person's, however many parameters multiply it.
+    is_one = len(shared) <= MAX_TERMS or len({_state_part(ring, m) for m in shared}) == 1
+    if len(factors) != 1 or not is_one or (len(shared) > 1 and len(shared) == len(right)):
         return None
     (factor,) = factors
     terms = plain_text(ring.from_terms({m: right[m] for m in shared}))
     if factor == 0:
-        mixed = len(shared) == 1 and _is_mixed_term(next(iter(shared)), right)
+        mixed = all(_is_mixed_term(m, right) for m in shared)
         return Slip("square_of_sum" if mixed else "term_missing", terms)
     if factor == -1:
         return Slip("term_sign", terms)
@@ -88,6 +92,11 @@ def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
         return Slip("millimetres_for_metres", terms)
     wrong = plain_text(ring.from_terms({m: right[m] * factor for m in shared}))
     return Slip("term_factor", f"{wrong} in place of {terms}")
+
+
+def _state_part(ring: Ring, term: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a term without its parameters."""
+    return tuple(0 if g.kind == "constant" else e for g, e in zip(ring.generators, term, strict=True))
 
 
 def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
@@ -135,9 +144,11 @@ def _kind(
     ring: Ring, gone: list[tuple[Generator, int]], come: list[tuple[Generator, int]], old: tuple[int, ...]
 ) -> str:
     """Return what an exchange of generators in a term is called."""
-    if not come and len(gone) == 1 and gone[0][0].kind in ("constant", "position"):
-        place = ring.generators.index(gone[0][0])
-        return "exponent_dropped" if old[place] > gone[0][1] else "term_replaced"
+    if not come:
+        left = [old[ring.generators.index(generator)] - exponent for generator, exponent in gone]
+        return "exponent_dropped" if all(left) else "factor_missing"
+    if not gone:
+        return "factor_extra"
     kinds = {generator.kind for generator, _ in (*gone, *come)}
     if kinds == {"sine", "cosine"} and len(gone) == len(come) == 1 and gone[0][0].joints == come[0][0].joints:
         return "term_function"

@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.grading.judging.truth import Truth, kinematic_quantity
 from dhkit.grading.mistakes.variants import Make, Variant
 from dhkit.symbolic import ExactArm
-from dhkit.symbolic.exact.compact import parallel_runs
+from dhkit.symbolic.exact.compact import parallel_runs, shortened
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
@@ -23,9 +23,12 @@ Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]
 
 FORMULAS: tuple[tuple[str, Formula], ...] = (
     ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
+    ("sum_of_angles_split", lambda c, s, x, y: (c + x, s * x + c * y)),
+    ("sum_of_angles_split", lambda c, s, x, y: (c * x - s * y, s + y)),
     ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x + c * y)),
     ("sum_formula_sign", lambda c, s, x, y: (c * x - s * y, s * x - c * y)),
     ("sum_formula_sign", lambda c, s, x, y: (c * x + s * y, s * x - c * y)),
+    ("sum_formula_sign", lambda c, s, x, y: (c * x - s * y, c * x + s * y)),
     ("angle_difference", lambda c, s, x, y: (c * x + s * y, c * y - s * x)),
 )
 
@@ -47,9 +50,10 @@ def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> It
         Whether the quantities are transforms and the Jacobian.
     """
     if any(len(run) > 1 for run in parallel_runs(arm)):
-        for identity, formula in FORMULAS:
-            change = partial(_with_formula, arm, right, formula)
-            yield Variant(MadeAt(identity), change, rarity=1, is_kinematic=is_kinematic)
+        for written in (_in_sums, shortened):
+            for identity, formula in FORMULAS:
+                change = partial(_with_formula, arm, right, formula, written)
+                yield Variant(MadeAt(identity), change, rarity=1, is_kinematic=is_kinematic)
 
 
 def derivatives_of_cosines(truth: Truth) -> Variant:
@@ -87,11 +91,17 @@ def _without_minus(element: Element, joint: int) -> Element:
     return ring.from_terms(terms)
 
 
-def _with_formula(arm: ExactArm, right: Make, formula: Formula, quantity: str) -> Elements:
-    """Return what changes where sines and cosines of sums are worked out by another formula."""
+def _with_formula(
+    arm: ExactArm,
+    right: Make,
+    formula: Formula,
+    written: Callable[[ExactArm, Elements], Elements],
+    quantity: str,
+) -> Elements:
+    """Return what changes where sines and cosines of sums, as they are written, are worked out by another formula."""
     value = right(quantity)
     changed = np.empty(value.shape, dtype=object)
-    for place, element in np.ndenumerate(_in_sums(arm, value)):
+    for place, element in np.ndenumerate(written(arm, value)):
         changed[place] = _in_angles(arm, element, formula) - value[place]
     return changed
 

@@ -15,7 +15,7 @@ from dhkit.grading.report import Diagnosis, Entry, Verdict
 __all__ = ["diagnosis_of", "diagnosis_of_identity", "diagnosis_of_slip", "entry_names", "merged", "wrong_entries"]
 
 MAX_ALTERNATIVES = 3
-"""Mistakes that give the same answers and are named in one sentence."""
+"""Mistakes that give the same answers, the more frequent first, that are named in one sentence."""
 
 
 def merged(found: Sequence[Diagnosis]) -> list[Diagnosis]:
@@ -57,8 +57,8 @@ def diagnosis_of(
     for variant in variants:
         if variant.rarity == first.rarity:
             distinct.setdefault(variant.identity, variant)
-    if 1 < len(distinct) <= MAX_ALTERNATIVES:
-        listed = "; or: ".join(_clause(variant) for variant in distinct.values())
+    if len(distinct) > 1:
+        listed = "; or: ".join(_clause(variant) for variant in [*distinct.values()][:MAX_ALTERNATIVES])
         sentence = f"One of these: {listed}."
     else:
         sentence = sentence_of(first.identity, first.place)
