@@ -77,7 +77,6 @@ def test_every_mistake_can_be_provoked():
     bodies = {
         "payload_forgotten",
         "payload_not_moved",
-        "payload_without_weight",
         "payload_at_com",
         "gear_inverted",
         "sphere_for_rod",

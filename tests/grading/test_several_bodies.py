@@ -98,9 +98,7 @@ def test_what_is_wrong_with_a_payload_is_named(arm, quantities, changed, mistake
     assert (diagnosis.mistake, diagnosis.sentence) == (mistake, sentence), str(report)
 
 
-@pytest.mark.parametrize(
-    ("quantities", "mistake"), [(("M",), "payload_not_moved"), (("V", "g"), "payload_without_weight")]
-)
+@pytest.mark.parametrize(("quantities", "mistake"), [(("M",), "payload_not_moved"), (("V", "g"), "gravity_forgotten")])
 def test_a_payload_in_one_energy_only(arm, quantities, mistake):
     """The sheet's other quantities are right, so it is not missing altogether."""
     wrong = answers(mp="0")

@@ -113,7 +113,7 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
     for name in names:
         for part in several if name in LINK_MISTAKES else ():
             if _is_possible(textbook, name, part.link):
-                yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1)
+                yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1 + rarity(name))
 
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
@@ -164,7 +164,6 @@ def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
         left_out = Change(-part.motion.K, -part.motion.V)
         yield Variant(part.made("payload_forgotten"), left_out.of, part.place)
         yield Variant(part.made("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
-        yield Variant(part.made("payload_without_weight"), Change(ring.zero, -part.motion.V).of, part.place, 1)
         moved = partial(_of_description, textbook, _with_com_of_first(arm.description, part))
         yield Variant(part.made("payload_at_com"), _lazily(moved), part.place)
 

@@ -175,7 +175,6 @@ EQUATION = catalogue(
         "Look again at the bodies that a link is made of: is each there, and where is its centre of mass?",
         payload_forgotten="the payload is missing",
         payload_not_moved="the payload is missing in the kinetic energy",
-        payload_without_weight="the payload is missing in the potential energy",
         payload_at_com="the payload is placed at the link's centre of mass",
     ),
     _of(
