@@ -174,6 +174,15 @@ def test_own_names_go_before_the_usual_ones():
     assert value == pytest.approx(V.q1 + V.q2 * V.qd2 + V.qd1 * V.qd2 + V.qdd1)
 
 
+@pytest.mark.parametrize("name", ["c", "s", "t", "e", "I2x"])
+@pytest.mark.parametrize("written", ["m1*{}**2/3", "m1*{0}*{0}/3", r"\frac{{1}}{{3}} m_1 {}^2", "{}^2*m1/3"])
+def test_a_parameter_may_be_called_like_a_shorthand(name, written):
+    robot = from_dh([(0, 0, name, 0)], parameters={"m1": 2.0, name: 0.5})
+    vocabulary = Vocabulary(robot)
+    value = doubles(read_answer(written.format(name), vocabulary), {"m1": 2.0, name: 0.5})
+    assert value == pytest.approx(2.0 * 0.25 / 3)
+
+
 def test_a_files_parameter_goes_before_shorthand():
     arm = from_dh([(0, 0, "c1", 0), (0, 0, 0.2, 0)], parameters={"c1": 0.3})
     names = Vocabulary(arm)

@@ -177,6 +177,8 @@ def _judge_one(
     if name not in known:
         meant = ALIASES.get(name) or next(iter(difflib.get_close_matches(name, known, n=1)), "")
         hint = f"did you mean {meant!r}?" if meant else f"expected {', '.join(known)}, dh, ik"
+        if name in truth.description.parameters:
+            hint = f"it is a parameter of the robot; give all of {meant or 'the quantity'} as a list"
         raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
     if callable(value):
         return judge_function(name, value, truth, seed)

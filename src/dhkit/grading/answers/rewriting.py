@@ -244,7 +244,8 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
         calls = k + 1 < len(tokens) and tokens[k + 1].text in ("(", "^")
         meaning = vocabulary.find(token.text)
         _refuse_ambiguous(tokens, k, vocabulary, text)
-        is_raised = calls and tokens[k + 1].text == "^" and token.text in vocabulary.own
+        is_known = token.text in vocabulary.own or token.text in vocabulary.symbols
+        is_raised = calls and tokens[k + 1].text == "^" and is_known
         if token.text in FUNCTION_NAMES and (meaning is None or (calls and not is_raised)):
             found.append(Token("function", FUNCTION_NAMES[token.text], token.at))
         elif meaning is not None:
