@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.exact.compact import parallel_runs
-from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.ring import Element, Elements, angle_name, translated
 
-__all__ = ["Coordinates"]
+__all__ = ["ANGLE", "Coordinates"]
+
+
+ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
+"""A sine or a cosine as formulas are printed: c12."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,31 @@ class Coordinates:
     def rates(self, rates: Elements) -> Elements:
         """Return the variables' rates, or accelerations, from the joints'."""
         return rates if self.is_relative else self.S @ rates
+
+    def in_own_rates(self, element: Element) -> Element:
+        """Return what is written in the joints' rates and accelerations in the variables', to be shown."""
+        if self.is_relative:
+            return element
+        ring, places = element.ring, dict[int, Element]()
+        for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
+            own = self.B @ np.array([generator(i) for i in range(ring.n)], dtype=object)
+            places |= {ring.place(kind, i): x for i, x in enumerate(own)}
+        return translated(element, ring, places)
+
+    def in_own_angles(self, text: str) -> str:
+        """Return a formula's text with c12 as the cosine of a variable, or of the difference of two."""
+        if self.is_relative:
+            return text
+        angles = {angle_name(joints): f"q{j + 1}" for j, joints in enumerate(self.sums)}
+        for (j, more), (k, less) in product(enumerate(self.sums), repeat=2):
+            if len(less) < len(more) and more[: len(less)] == less:
+                angles.setdefault(angle_name(more[len(less) :]), f"q{j + 1} - q{k + 1}")
+
+        def own(found: re.Match[str]) -> str:
+            angle = angles.get(found[2])
+            return f"{'cos' if found[1] == 'c' else 'sin'}({angle})" if angle else found[0]
+
+        return ANGLE.sub(own, text)
 
     def by_position(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i."""

@@ -17,6 +17,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Tree
 from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.changed_formulas import renamed
+from dhkit.grading.judging.coordinates import ANGLE
 from dhkit.grading.judging.findings import Comparison, equal, readable
 from dhkit.grading.judging.numeric import doubles, general_state, names_of
 from dhkit.grading.judging.quantities import JudgedQuantity
@@ -373,7 +374,21 @@ def _slip(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
         difference, right = varying(difference), varying(right)
     if quantity.name == "g" and not right and _is_weight(truth, difference):
         return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
-    return slip_in(arm, right + difference, right)
+    return _slip_shown(truth, quantity.name, right + difference, right)
+
+
+def _slip_shown(truth: Truth, name: str, answer: Element, right: Element) -> Slip | None:
+    """Return the slip that makes an answer of the truth, in the student's own rates and angles."""
+    own = truth.coordinates.in_own_rates
+    slip = slip_in(truth.arm(name), own(answer), own(right))
+    return None if slip is None else Slip(slip.identity, _shown(truth, slip.detail))
+
+
+def _shown(truth: Truth, text: str) -> str:
+    """Return a formula's text in the student's own angles."""
+    if any(ANGLE.fullmatch(name) for name in truth.description.parameters):
+        return text
+    return truth.coordinates.in_own_angles(text)
 
 
 def _slip_in_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
@@ -398,7 +413,7 @@ def _slip_in_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | N
     answer, entry = differing[0]
     names = (identity for identity, factor in FACTORS.items() if answer == entry * factor)
     identity = next(names, None)
-    return slip_in(arm, answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
+    return _slip_shown(truth, "C", answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
 
 
 def _is_weight(truth: Truth, difference: Element) -> bool:
@@ -464,11 +479,12 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
         place = index[: len(quantity.truth.shape)]
         (entry,) = entry_names(quantity, [place])
         right = truth.of(part)[index]
-        slip = slip_in(truth.arm(part), right + difference, right)
+        slip = _slip_shown(truth, part, right + difference, right)
         if slip is not None:
             found.append(diagnosis_of_slip(quantity, place, slip))
             continue
-        excess = plain_text(readable(truth.arm(quantity.name), difference))
+        difference = truth.coordinates.in_own_rates(difference)
+        excess = _shown(truth, plain_text(readable(truth.arm(quantity.name), difference)))
         found.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
     return found
 
@@ -552,5 +568,6 @@ def _described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosi
     elif len(element) > MAX_DESCRIBED:
         words = f"{len(element)} terms, where {len(right)} are right"
     else:
-        words = describe(truth.arm(quantity.name), element, right)
+        own = truth.coordinates.in_own_rates
+        words = _shown(truth, describe(truth.arm(quantity.name), own(element), own(right)))
     return Diagnosis(None, capitalised(f"{words}."), entry, (entry,), hint_of(None))
