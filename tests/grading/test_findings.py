@@ -690,9 +690,36 @@ def test_the_name_in_front_of_an_entry_is_the_entry(head):
 
 
 @pytest.mark.parametrize("large", ["10^400", "exp(900)", "10^30*exp(q1)", "10^100*exp(q1)", "10^190*exp(q1)"])
-def test_digits_that_cancel_are_neither_right_nor_wrong(large):
-    assert verdict(V=f"({V} + {large}) - {large}") is Verdict.UNREADABLE
-    assert verdict(V=f"({V} + m1*10^-40 + {large}) - {large}") in (Verdict.UNREADABLE, Verdict.WRONG)
+def test_digits_that_cancel_are_worked_out_again(large):
+    assert verdict(V=f"({V} + {large}) - {large}") is Verdict.UNDECIDED
+    assert verdict(V=f"({V} + m1*q1*10^-20 + {large}) - {large}") is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        "(cos(1e-120*q1/2) - 1)*1e240",
+        "(exp(1e-250*q1/2) - 1)*1e250",
+        "tan(pi/2 + 1e-250)*1e-250*q1",
+        "q1*1e-250/cos(pi/2 + 1e-250)",
+        "q1*acos(1 - 1e-250)*1e125",
+        "q1*(atan(1e250) - pi/2)*1e250",
+        "((1 + 1e-250*q1)^3 - 1)*1e250",
+        "q1*(sqrt(1 + 1e-240) - 1)*1e240",
+        "sin(1e250*q1)",
+    ],
+)
+def test_what_functions_absorb_is_not_lost(hidden):
+    half = V.replace("s1", "(2*sin(q1/2)*cos(q1/2))", 1)
+    assert verdict(V=half) is Verdict.UNDECIDED
+    assert verdict(V=f"{half} + m1*{hidden}") is Verdict.WRONG
+
+
+@pytest.mark.parametrize("edge", ["asin({})", "sqrt({} - 1)", "1/({} - 1)", "sign({} - 1)", "atan2({0} - 1, {0} - 1)"])
+def test_what_lies_on_the_edge_of_a_function_is_not_decided(edge):
+    one = edge.format("(sin(q1/2)^2 + cos(q1/2)^2)")
+    assert verdict(V=f"{V} + 0*{one}") in (Verdict.UNREADABLE, Verdict.CORRECT, Verdict.UNDECIDED)
+    assert verdict(V=f"{V} + {one} - {one} + m1*q1") in (Verdict.UNREADABLE, Verdict.WRONG)
 
 
 def test_an_entry_that_is_given_twice_is_refused():

@@ -10,24 +10,16 @@ import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.judging.numeric import (
-    LostDigitsError,
-    TooLargeError,
-    doubles,
-    many_digits,
-    names_of,
-    parts_of,
-    state_arrays,
-)
+from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
+from dhkit.grading.judging.numeric import doubles, names_of, parts_of, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
 from dhkit.grading.judging.rounding import Residuals, rounding_share
 from dhkit.grading.judging.sampling import (
-    ANSWER_DIGITS,
     DIGITS,
-    FEWER_DIGITS,
+    LEAST,
     SAMPLES,
+    TOLERANCE,
     Sample,
-    checked,
     differ,
     element_value,
     samples,
@@ -209,8 +201,6 @@ MAX_EVALUATIONS = 300_000
 LEAST_STATES = 15
 """An answer too long to be evaluated at so many states cannot be judged."""
 TRIED = 24
-CHECKED = 10
-"""States after which it is checked that an answer does not lose its digits."""
 GROUP = 100
 """States that share parameters where an energy's zero is free."""
 
@@ -256,7 +246,7 @@ def names_in(element: Element) -> set[str]:
 
 
 def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
-    """Hold an answer against the truth at many states, each in fifty digits."""
+    """Hold an answer against the truth at many states, each to 25 digits."""
     import mpmath
 
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
@@ -274,7 +264,7 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
     return different or Finding(
         Verdict.UNDECIDED,
         f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {len(states)} "
-        f"random states in {ANSWER_DIGITS} digits, to 25 of them",
+        f"random states, to 25 digits",
     )
 
 
@@ -287,7 +277,7 @@ def _first_difference(
     for k, state in enumerate(states):
         right = element_value(truth, state)
         try:
-            value = _worked_out(tree, state, check=k % CHECKED == 0)
+            value = enclosed(tree, state.names, TOLERANCE / 10 * max(abs(right), LEAST), shares=not by.up_to_constant)
         except (TooLargeError, LostDigitsError):
             raise
         except AnswerError as error:
@@ -295,29 +285,8 @@ def _first_difference(
         if by.up_to_constant and k % GROUP == 0:
             shift = value - right  # energies count from any zero
         if differ(value - shift, right):
-            _worked_out(tree, state, check=True)
             return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
     return None
-
-
-def _worked_out(tree: Tree, state: Sample, check: bool) -> Any:
-    """Return an answer's value at a state; with a check that fewer digits give the same.
-
-    Raises
-    ------
-    LostDigitsError
-        They do not.
-    """
-    import mpmath
-
-    with mpmath.workdps(ANSWER_DIGITS):
-        value = checked(many_digits(tree, state.names))
-    if check:
-        with mpmath.workdps(FEWER_DIGITS):
-            fewer = checked(many_digits(tree, state.names))
-        if differ(fewer, value):
-            raise LostDigitsError(f"cancels so far that {FEWER_DIGITS} digits do not decide it")
-    return value
 
 
 def _different(state: Sample, used: set[str], value: Any, right: Any, why: str) -> Finding:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dhkit.errors import AnswerError
 from dhkit.expressions import Expression
 from dhkit.expressions.exact import Atom
 from dhkit.symbolic import ExactArm
@@ -18,12 +17,11 @@ if TYPE_CHECKING:
     from mpmath import mpf
 
 __all__ = [
-    "ANSWER_DIGITS",
     "DIGITS",
-    "FEWER_DIGITS",
+    "LEAST",
     "SAMPLES",
+    "TOLERANCE",
     "Sample",
-    "checked",
     "differ",
     "element_value",
     "samples",
@@ -32,11 +30,8 @@ __all__ = [
 
 SAMPLES = 1_000
 DIGITS = 50
-ANSWER_DIGITS = 200
-"""Digits in which answers are worked out: what cancels in them must leave as many as the truth has."""
-FEWER_DIGITS = 120
-"""Digits in which an answer is worked out again, to see whether it loses too many."""
-TOLERANCE = 1e-25
+TOLERANCE, LEAST = 1e-25, 1e-3
+"""By what share two numbers may differ that are taken for one, and the least that it is a share of."""
 NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
 """Sizes of the states that are tried within one turn; rad or m, and seconds."""
 
@@ -150,29 +145,10 @@ def _atom(atom: Atom, names: Mapping[str, Any]) -> Any:
 
 def differ(answer: Any, truth: Any) -> bool:
     """Whether two numbers in many digits are not the same."""
-    size = max(abs(answer), abs(truth), 1e-3)
+    size = max(abs(answer), abs(truth), LEAST)
     return bool(abs(answer - truth) > TOLERANCE * size)
 
 
 def show_state(sample: Sample, names: set[str]) -> dict[str, float]:
     """Return those of a sample's values that are named, as doubles."""
     return {name: float(value) for name, value in sample.names.items() if name in names}
-
-
-def checked(value: Any) -> Any:
-    """Return a real, finite number.
-
-    Raises
-    ------
-    AnswerError
-        It is complex, infinite or no number.
-    """
-    import mpmath
-
-    if isinstance(value, mpmath.mpc):
-        if value.imag:
-            raise AnswerError("no real value")
-        value = value.real
-    if not mpmath.isfinite(value):
-        raise AnswerError("no finite value")
-    return value
