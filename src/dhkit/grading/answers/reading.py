@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from bisect import bisect_right
 from collections.abc import Sequence
 from fractions import Fraction
@@ -13,8 +14,8 @@ from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima
 from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
 from dhkit.grading.answers.pretty import in_one_line
-from dhkit.grading.answers.rewriting import rewritten
-from dhkit.grading.answers.tokens import fail, folded, nesting, shown, tokens
+from dhkit.grading.answers.rewriting import MAX_DEPTH, rewritten
+from dhkit.grading.answers.tokens import closing_bracket, fail, folded, nesting, shown, tokens
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary
 
 __all__ = ["meaning_of", "read_answer", "read_matrix"]
@@ -22,6 +23,8 @@ __all__ = ["meaning_of", "read_answer", "read_matrix"]
 MATRIX_WORDS = frozenset(
     ("sym", "Matrix", "array", "matrix", "simplify", "transpose", "MutableDenseMatrix", "ImmutableMatrix", "DM", "SX")
 )
+TRANSPOSES = (["'"], [".'"], [".", "T"], ["^", "T"], ["^", "top"], ["^", "(", "T", ")"], ["^", "(", "top", ")"])
+"""Signs of a transpose, in tokens."""
 NOWHERE = -1
 """Where the zeros beside a diagonal stand."""
 MAX_DIAGONAL = 30
@@ -55,7 +58,7 @@ def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
     AnswerError
         No expression, an unknown name, or more than the limits allow; with the place.
     """
-    text = in_one_line(text)
+    text = in_one_line(unicodedata.normalize("NFD", text))
     _refuse_lines_apart(text)
     return _tree(_tokens(text, vocabulary), vocabulary, text)
 
@@ -73,17 +76,24 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     AnswerError
         As for :func:`read_answer`, or no matrix.
     """
-    text = _in_rows(in_one_line(text))
-    found = _stripped(_tokens(text, vocabulary))
+    text = _in_rows(_without_comments(in_one_line(unicodedata.normalize("NFD", text))))
+    found = _tokens(text, vocabulary)
+    _check_depth(found, text)
+    while found and found[-1].text in (";", ",", "."):
+        found.pop()
     places = [token.at for token in found]
-    found = _in_brackets(_in_one_bracket(found), text)
+    found = _with_diagonals(_unwrapped(_maples_column(found, text), text), text)
     start, end = _matrix_in(found, text)
-    before, after = found[:start], found[end + 1 :]
+    before, after, is_transposed = _around(found[:start], found[end + 1 :], text)
     if sum(token.text in (",", ";", "&", "\\\\") for token in found) > MAX_ENTRIES:
         raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
     rows = _rows(found[start : end + 1], text)
     if sum(map(len, rows)) > MAX_ENTRIES:
         raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    if is_transposed and len(rows) > 1 and max(map(len, rows)) > 1:
+        if len(set(map(len, rows))) > 1:
+            raise AnswerError(f"{shown(text)}: rows of different lengths, transposed")
+        rows = [list(column) for column in zip(*rows, strict=True)]
     return [
         [(_written(entry, places, text), _tree(_scaled(before, entry, after), vocabulary, text)) for entry in row]
         for row in rows
@@ -132,7 +142,7 @@ def _refuse_lines_apart(text: str) -> None:
 
 def _tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
     plain, places = folded(text)
-    plain = COMMENT.sub(lambda found: " " * len(found[0]), plain)
+    plain = _without_comments(plain)
     if is_mathematica(plain):
         plain = plain.partition("//")[0]
         return from_mathematica(tokens(plain, places, text, allowed="{}\\"), text)
@@ -158,6 +168,19 @@ def _tree(found: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:
 # Matrices
 
 
+def _without_comments(text: str) -> str:
+    """Return a text with spaces for the comments at the ends of its lines."""
+    return COMMENT.sub(lambda found: " " * len(found[0]), text)
+
+
+def _check_depth(found: Sequence[Token], text: str) -> None:
+    depth = 0
+    for token in found:
+        depth += nesting(token.text)
+        if depth > MAX_DEPTH:
+            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
+
+
 def _in_rows(text: str) -> str:
     """Return a text with ; where MATLAB begins a row by a new line, and without its ..."""
     if is_latex(text) or is_mathematica(text):
@@ -179,27 +202,63 @@ def _matrix_in(found: Sequence[Token], text: str) -> tuple[int, int]:
     return opening[0], end
 
 
-def _in_one_bracket(found: list[Token]) -> list[Token]:
-    """Return Maxima's rows [a, b], [c, d] of matrix(...) as a list of rows."""
-    depth = 0
-    for token in found:
-        depth += nesting(token.text)
-        if depth == 0 and token.text == "," and found[0].text == "[" and found[-1].text == "]":
-            return [Token("sign", "[", found[0].at), *found, Token("sign", "]", found[-1].at)]
-    return found
-
-
-def _in_brackets(found: list[Token], text: str) -> list[Token]:
-    """Return Maple's column <a, b>, and a matrix diag(a, b) that is given by its diagonal, in brackets."""
-    if found and found[0].text == "<" and found[-1].text == ">":
-        first, last = found[0].at, found[-1].at
-        rows = _separated(found[1:-1], (",",), text)
-        column = [token for row in rows for token in (Token("sign", ";", first), *row)]
-        return [Token("sign", "[", first), *column[1:], Token("sign", "]", last)]
-    if len(found) < 4 or found[0].text != "diag" or (found[1].text, found[-1].text) != ("(", ")"):
+def _maples_column(found: list[Token], text: str) -> list[Token]:
+    """Return Maple's <a, b> as a column in brackets."""
+    opening = next((k for k, token in enumerate(found) if token.text == "<"), None)
+    closing = next((k for k in range(len(found) - 1, -1, -1) if found[k].text == ">"), -1)
+    if opening is None or closing < opening:
         return found
-    at = found[0].at
-    inner = _stripped(found[2:-1])
+    rows = _separated(found[opening + 1 : closing], (",",), text)
+    first, last = found[opening].at, found[closing].at
+    column = [token for row in rows for token in (Token("sign", ";", first), *row)]
+    inside = [Token("sign", "[", first), *column[1:], Token("sign", "]", last)]
+    return [*found[:opening], *inside, *found[closing + 1 :]]
+
+
+def _unwrapped(found: list[Token], text: str) -> list[Token]:
+    """Return Matrix(...), np.array(...) and the like as what is in their brackets; transpose(...) with a prime."""
+    result: list[Token] = []
+    k = 0
+    while k < len(found):
+        token = found[k]
+        is_matrix = token.kind == "name" and token.text in MATRIX_WORDS and found[k + 1 : k + 2] != []
+        if not is_matrix or found[k + 1].text != "(":
+            result.append(token)
+            k += 1
+            continue
+        end = closing_bracket(found, k + 1)
+        if len(result) > 1 and result[-1].text == "." and result[-2].kind == "name":
+            del result[-2:]
+        inner = _unwrapped(found[k + 2 : end], text)
+        pieces = _separated(inner, (",",), text)
+        if len(pieces) == 3 and all(len(size) == 1 and size[0].text.isdecimal() for size in pieces[:2]):
+            inner = _shaped(int(pieces[0][0].text[:4]), int(pieces[1][0].text[:4]), pieces[2], text)
+        elif len(pieces) > 1 and all(piece and piece[0].text == "[" for piece in pieces):
+            inner = [Token("sign", "[", token.at), *inner, Token("sign", "]", found[end - 1].at)]
+        result += [Token("sign", "(", found[k + 1].at), *inner, Token("sign", ")", found[min(end, len(found) - 1)].at)]
+        result += [Token("sign", "'", token.at)] if token.text == "transpose" else []
+        k = end + 1
+    return result
+
+
+def _shaped(rows: int, columns: int, entries: Sequence[Token], text: str) -> list[Token]:
+    """Return sympy's Matrix(2, 2, [a, b, c, d]) in rows."""
+    pieces = _separated(entries[1:-1], (",",), text) if entries and entries[0].text == "[" else []
+    if len(pieces) != rows * columns:
+        raise AnswerError(f"{shown(text)}: {len(pieces)} entries in a matrix of {rows} times {columns}")
+    at, shaped = entries[0].at, list[Token]()
+    for k, piece in enumerate(pieces):
+        shaped += [Token("sign", "," if k % columns else ";", at), *piece]
+    return [Token("sign", "[", at), *shaped[1:], Token("sign", "]", entries[-1].at)]
+
+
+def _with_diagonals(found: list[Token], text: str) -> list[Token]:
+    """Return a matrix diag(a, b) that is given by its diagonal in full."""
+    k = next((k for k, token in enumerate(found[:-1]) if token.text == "diag" and found[k + 1].text == "("), None)
+    if k is None:
+        return found
+    at, end = found[k].at, closing_bracket(found, k + 1)
+    inner = _stripped(found[k + 2 : end])
     if inner and inner[0].text == "[" and inner[-1].text == "]":
         entries = [entry for row in _rows(inner, text) for entry in row]
     else:
@@ -208,10 +267,35 @@ def _in_brackets(found: list[Token], text: str) -> list[Token]:
         raise AnswerError(f"a matrix of more than {MAX_DIAGONAL} rows")
     zero, comma, semicolon = Token("number", "0", NOWHERE), Token("sign", ",", at), Token("sign", ";", at)
     matrix: list[Token] = []
-    for k, entry in enumerate(entries):
+    for i, entry in enumerate(entries):
         for j in range(len(entries)):
-            matrix += [comma if j else semicolon, *(entry if j == k else [zero])]
-    return [Token("sign", "[", at), *matrix[1:], Token("sign", "]", found[-1].at)]
+            matrix += [comma if j else semicolon, *(entry if j == i else [zero])]
+    before = found[: k - 2] if k > 1 and found[k - 1].text == "." and found[k - 2].kind == "name" else found[:k]
+    return [*before, Token("sign", "[", at), *matrix[1:], Token("sign", "]", at), *found[end + 1 :]]
+
+
+def _around(before: list[Token], after: list[Token], text: str) -> tuple[list[Token], list[Token], bool]:
+    """Return the factors before and behind a matrix, and whether it is transposed.
+
+    Raises
+    ------
+    AnswerError
+        Anything but factors: a power of a matrix is not that of its entries.
+    """
+    is_transposed = False
+    while after or before:
+        behind = next((sign for sign in TRANSPOSES if [x.text for x in after[: len(sign)]] == sign), None)
+        if behind is not None:
+            is_transposed, after = not is_transposed, after[len(behind) :]
+        elif before[-1:] and after[:1] and before[-1].text == "(" and after[0].text == ")":
+            before, after = before[:-1], after[1:]
+        else:
+            break
+    if after and after[0].kind == "sign" and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,"):
+        fail(text, after[0].at, f"{after[0].text!r} behind a matrix, which is not read,")
+    if before and before[-1].text in ("^", "/", ".", "./"):
+        fail(text, before[-1].at, f"{before[-1].text!r} before a matrix, which is not read,")
+    return before, after, is_transposed
 
 
 def _scaled(before: Sequence[Token], entry: Sequence[Token], after: Sequence[Token]) -> list[Token]:
@@ -223,22 +307,12 @@ def _scaled(before: Sequence[Token], entry: Sequence[Token], after: Sequence[Tok
 
 
 def _stripped(found: list[Token]) -> list[Token]:
-    """Take Matrix(...), np.array(...) and brackets around a matrix away, and transposes behind it."""
+    """Take round brackets around a row away, and signs behind it."""
     low, high = 0, len(found)
     while low < high:
-        first, last = found[low], found[high - 1]
-        behind = [token.text for token in found[max(low, high - 4) : high]]
-        if last.text in ("'", ".'", ";", ",", "."):
+        if found[high - 1].text in (";", ",", "."):
             high -= 1
-        elif behind[-2:] in ([".", "T"], ["^", "T"]):
-            high -= 2
-        elif behind in (["^", "(", "T", ")"], ["^", "(", "top", ")"]):
-            high -= 4
-        elif first.kind == "name" and first.text in MATRIX_WORDS and last.text == ")":
-            low, high = low + 2, high - 1
-        elif high - low > 2 and first.kind == "name" and found[low + 1].text == ".":
-            low += 2
-        elif first.text == "(" and last.text == ")":
+        elif found[low].text == "(" and closing_bracket(found[:high], low) == high - 1:
             low, high = low + 1, high - 1
         else:
             break
@@ -249,7 +323,11 @@ def _rows(found: Sequence[Token], text: str) -> list[list[list[Token]]]:
     """Split the inside of a matrix into rows of entries."""
     inner = found[1:-1]
     if inner and inner[0].text == "[":
-        return [_separated(_stripped(list(row))[1:-1], (",", "&"), text) for row in _separated(inner, (",", ";"), text)]
+        rows = [_stripped(list(row)) for row in _separated(inner, (",", ";"), text)]
+        for row in rows:
+            if not row or row[0].text != "[" or closing_bracket(row, 0) != len(row) - 1:
+                fail(text, row[0].at if row else inner[-1].at, "a row that is not in brackets, beside rows that are,")
+        return [_separated(row[1:-1], (",", "&"), text) for row in rows]
     rows = _separated(inner, (";", "\\\\"), text)
     spaced = not is_latex(text) and not is_mathematica(text)
     return [

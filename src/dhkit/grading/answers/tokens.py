@@ -136,7 +136,7 @@ def closing_bracket(found: Sequence[Token], k: int) -> int:
     """Return where the bracket at k closes; the number of tokens where it does not."""
     depth = 0
     for end in range(k, len(found)):
-        depth += {"(": 1, ")": -1}.get(found[end].text, 0)
+        depth += nesting(found[end].text)
         if depth == 0:
             return end
     return len(found)

@@ -254,7 +254,7 @@ def _right_in_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, tr
     christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
     alike = [e for e in row if _finding(e.tree, e.error, christoffel[e.index], by).verdict is Verdict.CORRECT]
     answer = wrong.answer.element() if wrong.answer is not None else None
-    if answer is None or (answer.is_zero and not any(christoffel[entry.index] for entry in alike)):
+    if answer is not None and answer.is_zero and not any(christoffel[entry.index] for entry in alike):
         return {}
     statement = "proved equal to the Christoffel symbols' entry; another entry of its row is wrong"
     right = replace(wrong, verdict=Verdict.CORRECT, statement=statement, witness=None)

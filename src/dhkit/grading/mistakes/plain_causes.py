@@ -93,7 +93,8 @@ def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], foll
     if any(slip is None or slip.identity != "weight_on_vertical_axis" for slip in slips.values()):
         return []
     del left["g"]
-    return [diagnosis_of_slip(g, index, slip) for index, slip in slips.items() if slip is not None]
+    alike = equivalent(truth, g)
+    return [replace(diagnosis_of_slip(g, i, slip), equivalent=alike) for i, slip in slips.items() if slip is not None]
 
 
 def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
