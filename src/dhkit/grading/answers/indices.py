@@ -54,7 +54,7 @@ def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) 
             index = int(behind[1].text[:4])
             whole = ""
             if pattern == ["(", "number", ")"]:
-                whole = _in_round_brackets(name, index, vocabulary)
+                whole = _in_round_brackets(name, index, vocabulary, text)
             elif pattern == ["[", "number", "]"]:
                 whole = _in_square_brackets(name, index, first, vocabulary, text)
             if whole:
@@ -73,11 +73,15 @@ def _both(name: str, index: int, vocabulary: Vocabulary) -> tuple[str, str]:
     return names[0] if vocabulary.knows(names[0]) else "", names[1] if vocabulary.knows(names[1]) else ""
 
 
-def _in_round_brackets(name: Token, index: int, vocabulary: Vocabulary) -> str:
+def _in_round_brackets(name: Token, index: int, vocabulary: Vocabulary, text: str) -> str:
     whole = plain_name(name.text) + str(index)
     alone = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
-    is_index = alone or (name.text not in FUNCTION_NAMES and not vocabulary.knows(name.text))
-    return whole if is_index and vocabulary.knows(whole) else ""
+    is_known = vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES
+    if is_known and not alone and (vocabulary.is_state(whole) or (len(name.text) == 1 and vocabulary.knows(whole))):
+        fail(
+            text, name.at, f"{name.text}({index}) may be {whole}, or {name.text} and a number in brackets; write which"
+        )
+    return whole if (alone or not is_known) and vocabulary.knows(whole) else ""
 
 
 def _in_square_brackets(name: Token, index: int, first: int | None, vocabulary: Vocabulary, text: str) -> str:

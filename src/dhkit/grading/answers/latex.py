@@ -187,13 +187,13 @@ class _Latex:
         if len(letters) > MAX_LETTERS:
             fail(self.text, at, f"{len(letters)} letters in a row")
         digits = re.compile(r"\d+", re.ASCII).match(self.text, self.at)
-        if digits and self.knows(letters + digits[0]):
-            self.at = digits.end()  # m1 as programs write it
-            return [Token("name", letters + digits[0], at)]
         run = WORD.match(self.text, at)
         if digits and run and run.end() > digits.end() and self.knows(run[0]):
             self.at = run.end()  # I2x
             return [Token("name", run[0], at)]
+        if digits and self.knows(letters + digits[0]):
+            self.at = digits.end()  # m1 as programs write it
+            return [Token("name", letters + digits[0], at)]
         below = self._subscript()
         if letters in FUNCTION_NAMES and not below:
             return [Token("name", letters, at)]
@@ -212,6 +212,9 @@ class _Latex:
         if not self._next_is("_"):
             return ""
         at = self.at
+        if careless := re.compile(r"_(\d)(\d+)", re.ASCII).match(self.text, at):
+            first, rest = careless.groups()
+            fail(self.text, at, f"{careless[0]} is _{first} followed by {rest} in LaTeX; write _{{{first}{rest}}}")
         self._skip()
         inner = self._argument(at)
         word = "".join({"+": "p", "-": "m", ",": ""}.get(token.text, token.text) for token in inner)

@@ -12,6 +12,8 @@ from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_n
 
 __all__ = ["rewritten"]
 
+TURNS = ("sin", "cos", "tan")
+SHORTHAND = ("c", "s")
 CALLED = frozenset(FUNCTION_NAMES.values())
 MODULES = frozenset(("np", "numpy", "math", "sp", "sympy", "sym", "ca", "cs", "casadi", "cmath", "mpmath", "mp", "cas"))
 ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
@@ -32,7 +34,7 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
     """
     _check_depth(tokens, text)
     found = _without_modules(_methods(tokens), text)
-    found = _without_time(without_indices(_without_primes(found, vocabulary, text), vocabulary, text), vocabulary)
+    found = _without_time(without_indices(_without_primes(found, vocabulary, text), vocabulary, text), vocabulary, text)
     # Square brackets that are left stand for round ones.
     found = [Token("sign", {"[": "(", "]": ")"}.get(x.text, x.text), x.at) if x.kind == "sign" else x for x in found]
     found = _derivatives(found, text)
@@ -104,17 +106,24 @@ def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) 
     return found
 
 
-def _without_time(tokens: Sequence[Token], vocabulary: Vocabulary) -> list[Token]:
-    """Read theta1(t), and Mathematica's theta1[t], as theta1."""
-    if vocabulary.knows("t"):
-        return list(tokens)
+def _without_time(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
+    """Read theta1(t), and Mathematica's theta1[t], as theta1.
+
+    Raises
+    ------
+    AnswerError
+        The robot has a parameter t.
+    """
     found: list[Token] = []
     k = 0
     while k < len(tokens):
         found.append(tokens[k])
         is_operand = (tokens[k].kind == "name" and tokens[k].text not in FUNCTION_NAMES) or tokens[k].text in (")", "}")
         behind = [x.text for x in tokens[k + 1 : k + 4]]
-        k += 4 if is_operand and behind in (["(", "t", ")"], ["[", "t", "]"]) else 1
+        is_of_time = is_operand and behind in (["(", "t", ")"], ["[", "t", "]"])
+        if is_of_time and vocabulary.is_exactly("t"):
+            fail(text, tokens[k].at, f"{tokens[k].text}(t) may be a function of time, or a product; t is a parameter")
+        k += 4 if is_of_time else 1
     return found
 
 
@@ -203,6 +212,9 @@ def _fraction_by_time(
         stop = _operand(tokens, at, text)
         end = _over_time(tokens, stop, order) if stop > at else 0
         return (_by_time(tokens[at:stop], order, token.at), end) if end else None
+    twice = re.fullmatch(r"d[2d](\w+)", token.text, re.ASCII)
+    if twice and vocabulary.is_position(twice[1]) and [x.text for x in tokens[k + 1 : k + 3]] == ["/", "dt2"]:
+        return _by_time([Token("name", twice[1], token.at)], 2, token.at), k + 3
     name, end = token.text[1:], _over_time(tokens, k + 1, 1)
     if end and vocabulary.is_state(name):
         return _by_time([Token("name", name, token.at)], 1, token.at), end
@@ -244,6 +256,7 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
         calls = k + 1 < len(tokens) and tokens[k + 1].text in ("(", "^")
         meaning = vocabulary.find(token.text)
         _refuse_ambiguous(tokens, k, vocabulary, text)
+        _refuse_shorthand(tokens, k, vocabulary, text)
         is_known = token.text in vocabulary.own or token.text in vocabulary.symbols
         is_raised = calls and tokens[k + 1].text == "^" and is_known
         if token.text in FUNCTION_NAMES and (meaning is None or (calls and not is_raised)):
@@ -253,6 +266,44 @@ def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[T
         else:
             found += _split(token, calls, vocabulary, text)
     return found
+
+
+def _refuse_shorthand(tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str) -> None:
+    """Refuse c (...) where c is a parameter or the cosine, c W where W is no angle, and q1(0).
+
+    Raises
+    ------
+    AnswerError
+        One of these.
+    """
+    name, at = tokens[k].text, tokens[k].at
+    behind = [x.text for x in tokens[k + 1 : k + 4]]
+    if name in FUNCTION_NAMES and vocabulary.is_exactly(name) and behind[:1] == ["("]:
+        fail(
+            text, at, f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
+        )
+    following = tokens[k + 1] if k + 1 < len(tokens) else None
+    is_shorthand = name in SHORTHAND and not vocabulary.is_exactly(name)
+    if (
+        is_shorthand
+        and following is not None
+        and following.kind == "name"
+        and not _is_angle(following.text, vocabulary)
+    ):
+        fail(text, at, f"{name} before {following.text[:40]}, which is no angle,")
+    if (
+        vocabulary.is_state(name)
+        and len(behind) == 3
+        and behind[0] == "("
+        and behind[2] == ")"
+        and behind[1].isdecimal()
+    ):
+        fail(text, at, f"{name}({behind[1][:20]}) may be a value at a time, or a product; write which")
+
+
+def _is_angle(name: str, vocabulary: Vocabulary) -> bool:
+    """Whether a sine may be taken of a name: a joint's variable, or what is no length, mass or other parameter."""
+    return vocabulary.is_position(name) or not vocabulary.is_exactly(name)
 
 
 AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
@@ -340,6 +391,10 @@ def _functions(tokens: Sequence[Token], text: str) -> list[Token]:
         argument = _functions(tokens[k:end], text)
         if not argument:
             fail(text, token.at, f"{token.text} without an argument")
+        following = tokens[end] if end < len(tokens) else Token("sign", "", token.at)
+        goes_on = following.kind in ("name", "function") or (argument[-1].text != ")" and following.text == "/")
+        if token.text in TURNS and goes_on and all(x.kind in ("number", "sign") for x in argument):
+            fail(text, token.at, f"{token.text} of a number, or of more; put its argument in brackets")
         if argument[0].text != "(" or _closing(argument, 0, text) != len(argument) - 1:
             argument = [Token("sign", "(", token.at), *argument, Token("sign", ")", token.at)]
         found += [Token("call", token.text, token.at), *argument, *power]

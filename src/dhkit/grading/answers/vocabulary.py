@@ -206,6 +206,10 @@ class Vocabulary:
             return (symbol,)
         return found
 
+    def is_exactly(self, name: str) -> bool:
+        """Whether a name is one of the file's parameters or of the student's own, letter by letter."""
+        return name in self.own or name in self.symbols or name in self.further
+
     @cached_property
     def _exact(self) -> dict[str, Meaning]:
         names = [*self.further, *self.symbols]
