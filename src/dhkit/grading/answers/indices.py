@@ -77,7 +77,7 @@ def _in_round_brackets(name: Token, index: int, vocabulary: Vocabulary, text: st
     whole = plain_name(name.text) + str(index)
     alone = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
     is_known = vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES
-    if is_known and not alone and (vocabulary.is_state(whole) or (len(name.text) == 1 and vocabulary.knows(whole))):
+    if is_known and not alone and (vocabulary.is_state(whole) or (name.text in ("c", "s") and vocabulary.knows(whole))):
         fail(
             text, name.at, f"{name.text}({index}) may be {whole}, or {name.text} and a number in brackets; write which"
         )

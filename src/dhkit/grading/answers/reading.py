@@ -282,15 +282,17 @@ def _around(before: list[Token], after: list[Token], text: str) -> tuple[list[To
     AnswerError
         Anything but factors: a power of a matrix is not that of its entries.
     """
-    is_transposed = False
-    while after or before:
-        behind = next((sign for sign in TRANSPOSES if [x.text for x in after[: len(sign)]] == sign), None)
-        if behind is not None:
-            is_transposed, after = not is_transposed, after[len(behind) :]
-        elif before[-1:] and after[:1] and before[-1].text == "(" and after[0].text == ")":
-            before, after = before[:-1], after[1:]
+    is_transposed, start, end = False, 0, len(before)
+    while True:
+        behind = [token.text for token in after[start : start + 4]]
+        sign = next((sign for sign in TRANSPOSES if behind[: len(sign)] == sign), None)
+        if sign is not None:
+            is_transposed, start = not is_transposed, start + len(sign)
+        elif end and behind and before[end - 1].text == "(" and behind[0] == ")":
+            start, end = start + 1, end - 1
         else:
             break
+    before, after = before[:end], after[start:]
     if after and after[0].kind == "sign" and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,"):
         fail(text, after[0].at, f"{after[0].text!r} behind a matrix, which is not read,")
     if before and before[-1].text in ("^", "/", ".", "./"):

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["PRECISIONS", "LostDigitsError", "TooLargeError", "enclosed"]
 
-PRECISIONS = (60, 250, 1000)
+PRECISIONS = (60, 250, 1000, 6000)
 """Digits in which a tree is worked out, one after the other until its value is known."""
+MAX_WORK = 1_000_000
+"""Parts of a tree times digits, beyond the first precision: a second's work at most."""
 RELATIVE = 26
 """Digits of a value that are enough to tell it from another one."""
 LARGEST, LARGEST_POWER = 2_000, 100_000
@@ -43,13 +45,15 @@ class _UndecidedError(Exception):
     """An interval that is too wide for a function: it holds zero, or the end of the function's domain."""
 
 
-def enclosed(tree: Tree, values: Mapping[str, mpf], tolerance: mpf, shares: bool = True) -> mpf:
-    """Return a tree's value, known to ``tolerance``.
+def enclosed(tree: Tree, parts: int, values: Mapping[str, mpf], tolerance: mpf, shares: bool = True) -> tuple[mpf, int]:
+    """Return a tree's value, known to ``tolerance``, and in how many digits it was worked out.
 
     Parameters
     ----------
     tree
         An answer as :func:`dhkit.grading.answers.read_answer` reads it.
+    parts
+        How many it has.
     values
         Numbers of mpmath by name; ``pi`` and units need not be given.
     tolerance
@@ -64,11 +68,14 @@ def enclosed(tree: Tree, values: Mapping[str, mpf], tolerance: mpf, shares: bool
     TooLargeError
         A number that is too large to be worked out.
     LostDigitsError
-        Even :data:`PRECISIONS` digits do not give it: they cancel, or a function has no value nearby.
+        No number of digits in :data:`PRECISIONS` gives it within the work that is allowed: they cancel, or a function
+        has no value nearby.
     """
     import mpmath
 
     for digits in PRECISIONS:
+        if digits > PRECISIONS[0] and parts * digits > MAX_WORK:
+            break
         iv, before = mpmath.iv, mpmath.iv.dps
         iv.dps = digits
         try:
@@ -77,12 +84,12 @@ def enclosed(tree: Tree, values: Mapping[str, mpf], tolerance: mpf, shares: bool
                 middle, width = mpmath.mpf(interval.mid), mpmath.mpf(interval.delta.b)
             allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE) if shares else tolerance
             if mpmath.isfinite(width) and width <= allowed:
-                return middle
+                return middle, digits
         except _UndecidedError:
             continue
         finally:
             iv.dps = before
-    raise LostDigitsError(f"cancels so far that {PRECISIONS[-1]} digits do not decide it")
+    raise LostDigitsError("its digits cancel so far that they do not decide it")
 
 
 class _Evaluation:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Tree
+from dhkit.expressions import CONSTANTS
+from dhkit.expressions.syntax import Number, Sum, Tree
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
 from dhkit.grading.judging.numeric import doubles, names_of, parts_of, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
@@ -198,6 +200,8 @@ def _texts(arm: ExactArm, answer: Quotient, truth: Element, difference: Element 
 MAX_NODES = 20_000
 MAX_EVALUATIONS = 300_000
 """Nodes times states that an answer outside the ring is evaluated at."""
+MAX_WORK = 60 * MAX_EVALUATIONS
+"""Nodes times digits, of all states together."""
 LEAST_STATES = 15
 """An answer too long to be evaluated at so many states cannot be judged."""
 TRIED = 24
@@ -258,35 +262,62 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
         count = max(LEAST_STATES, min(SAMPLES, MAX_EVALUATIONS // nodes))
         states = samples(by.arm, by.numbers, by.seed, every=GROUP if by.up_to_constant else 1, count=count)
         try:
-            different = _first_difference(tree, truth, by, reason, states)
+            found = _first_difference(tree, nodes, truth, by, reason, states)
         except (TooLargeError, LostDigitsError) as error:
             raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
-    return different or Finding(
+    if isinstance(found, Finding):
+        return found
+    return Finding(
         Verdict.UNDECIDED,
-        f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {len(states)} "
-        f"random states, to 25 digits",
+        f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {found} random "
+        "states, to 25 digits",
     )
 
 
+def _divided(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]:
+    """Return a sum without its terms that do not depend on the state, and these."""
+    if names_of(tree) <= constants:
+        return Number(Fraction(0), "0", 0), [tree]
+    if not isinstance(tree, Sum):
+        return tree, []
+    kept: list[tuple[bool, Tree]] = []
+    left_out: list[Tree] = []
+    for added, term in tree.terms:
+        varying, still = _divided(term, constants)
+        left_out += still
+        if not (isinstance(varying, Number) and not varying.value):
+            kept.append((added, varying))
+    return Sum(tuple(kept)), left_out
+
+
 def _first_difference(
-    tree: Tree, truth: Element, by: Comparison, reason: str, states: Sequence[Sample]
-) -> Finding | None:
-    """Return what the first state shows at which an answer differs from the truth; None where none does."""
+    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Sequence[Sample]
+) -> Finding | int:
+    """Return what the first state shows at which an answer differs from the truth; at how many it does not, if none."""
     used = names_of(tree) | names_in(truth)
     shift: Any = 0
+    work, constants = 0, list[Tree]()
+    if by.up_to_constant:  # energies count from any zero, however large, if it is a number at all
+        tree, constants = _divided(tree, {*by.arm.parameters, *CONSTANTS})
     for k, state in enumerate(states):
         right = element_value(truth, state)
         try:
-            value = enclosed(tree, state.names, TOLERANCE / 10 * max(abs(right), LEAST), shares=not by.up_to_constant)
+            for constant in constants if k % GROUP == 0 else ():
+                enclosed(constant, nodes, state.names, LEAST)
+            tolerance = TOLERANCE / 10 * max(abs(right), LEAST)
+            value, digits = enclosed(tree, nodes, state.names, tolerance, shares=not by.up_to_constant)
         except (TooLargeError, LostDigitsError):
             raise
         except AnswerError as error:
             return _different(state, used, None, right, f"{error} there")
         if by.up_to_constant and k % GROUP == 0:
-            shift = value - right  # energies count from any zero
+            shift = value - right
         if differ(value - shift, right):
             return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
-    return None
+        work += nodes * digits
+        if work > MAX_WORK and k + 1 >= LEAST_STATES:
+            return k + 1
+    return len(states)
 
 
 def _different(state: Sample, used: set[str], value: Any, right: Any, why: str) -> Finding:
