@@ -27,7 +27,8 @@ import dhkit.symbolic
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.grading import grade
-from dhkit.grading.answers.reading import read_answer, read_matrix
+from dhkit.grading.answers.matrices import read_matrix
+from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.batch import GIGABYTE, Sheet, find_sheets, grade_all
 from dhkit.grading.judgement import grade_answers, prepare

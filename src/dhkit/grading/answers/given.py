@@ -15,10 +15,11 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.documents.statements import Statement, has_relation, statements_of
 from dhkit.grading.answers.indices import first_index
+from dhkit.grading.answers.matrices import read_matrix
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
-from dhkit.grading.answers.reading import meaning_of, read_matrix
+from dhkit.grading.answers.reading import meaning_of
 from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
