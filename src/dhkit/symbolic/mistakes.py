@@ -201,10 +201,8 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         RATE_TERMS,
         mass_rate_omitted="d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
         mass_rate_halved="d/dt dK/dqd - dK/dq is replaced by half of dM/dt qd",
-        kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation; of the Christoffel symbols, the "
-        "term that is taken off",
-        kinetic_gradient_sign="dK/dq has the wrong sign in Euler and Lagrange's equation; of the Christoffel symbols, "
-        "the term that is taken off",
+        kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation",
+        kinetic_gradient_sign="dK/dq has the wrong sign in Euler and Lagrange's equation",
         christoffel_indices=(
             "the indices of the Christoffel symbols are exchanged: dM_jk/dq_i is added and dM_ij/dq_k taken off"
         ),

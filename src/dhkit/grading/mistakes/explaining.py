@@ -61,6 +61,8 @@ PARTS = {
     "K": "in the kinetic energy",
     "V": "in the potential energy",
 }
+FEW_ENTRIES = 2
+"""Entries that a sentence says a mistake is made in alone."""
 LIKELY = 1
 """The largest rarity of a mistake that is named before slips in single terms are looked for."""
 LEAST_TERMS_OF_A_PAIR, MOST_TERMS_OF_A_PAIR = 3, 600
@@ -333,7 +335,8 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
         if len(indices) == 1 and not certain:
             continue
         diagnosis = diagnosis_of(variants, [quantity], indices)
+        few = len(diagnosis.entries) <= FEW_ENTRIES
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
-        found.append(replace(diagnosis, sentence=alone))
+        found.append(replace(diagnosis, sentence=alone) if few else diagnosis)
         candidates = {index: v for index, v in candidates.items() if index not in indices}
     return found + [described(truth, quantity, index) for index in candidates]

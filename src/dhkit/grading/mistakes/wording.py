@@ -18,6 +18,15 @@ MAX_ALTERNATIVES = 3
 """Mistakes that give the same answers, the more frequent first, that are named in one sentence."""
 
 
+CHRISTOFFEL = {
+    "kinetic_gradient_omitted": "of the Christoffel symbols the term that is taken off, dM_ij/dq_k / 2",
+    "kinetic_gradient_sign": "of the Christoffel symbols the term dM_ij/dq_k / 2 is added, and should be taken off",
+    "mass_rate_omitted": "of the Christoffel symbols the two terms that are added",
+    "velocity_torques_doubled": "the Christoffel symbols lack their factor 1/2",
+}
+"""What mistakes in Euler and Lagrange's equation are in the entries of C."""
+
+
 def merged(found: Sequence[Diagnosis]) -> list[Diagnosis]:
     """Return diagnoses, those that say the same of several quantities as one."""
     same: dict[tuple[str | None, str], list[Diagnosis]] = {}
@@ -53,21 +62,24 @@ def diagnosis_of(
     entries = tuple(dict.fromkeys(names))
     places = [quantity.name for quantity in quantities] if not indices else entries
     where = ", ".join([*places, *([first.place] if first.place else [])])
+    of_C = all(quantity.name == "C" for quantity in quantities)
     distinct: dict[str, Variant] = {}
     for variant in variants:
         if variant.rarity == first.rarity:
             distinct.setdefault(variant.identity, variant)
     if len(distinct) > 1:
-        listed = "; or: ".join(_clause(variant) for variant in [*distinct.values()][:MAX_ALTERNATIVES])
+        listed = "; or: ".join(_clause(variant, of_C) for variant in [*distinct.values()][:MAX_ALTERNATIVES])
         sentence = f"One of these: {listed}."
     else:
-        sentence = sentence_of(first.identity, first.place)
+        sentence = sentence_of(first.identity, first.place, CHRISTOFFEL.get(first.identity, "") if of_C else "")
     equivalent = tuple(dict.fromkeys(v.called for v in variants if v.called != first.called))
     return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
 
 
-def _clause(variant: Variant) -> str:
+def _clause(variant: Variant, of_C: bool) -> str:
     sentence = LIBRARY[variant.identity].sentence
+    if of_C and variant.identity in CHRISTOFFEL:
+        sentence = f"{sentence}: {CHRISTOFFEL[variant.identity]}"
     return f"{variant.place}: {sentence}" if variant.place else sentence
 
 
