@@ -57,7 +57,10 @@ from grading_attacks import (
     symbolic,
 )
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: no attack is stopped there")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: no attack is stopped there"),
+    pytest.mark.xdist_group("attacks"),  # what they prepare takes ten seconds a process
+]
 
 PLANAR = library_robot("planar2r")
 SECONDS = 20.0
