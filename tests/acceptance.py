@@ -84,7 +84,7 @@ class Recorder:
                 print(f"\n  {row['quantity']}: {row['seen']:.3g} of at most {row['required']:.3g}", end="")
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows:
+        if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows or not _is_whole(session.config):
             return
         packages = ("numpy", "numba", "casadi", "pin", "yourdfpy", "eaik", "ssik", "hypothesis")
         RESULTS.parent.mkdir(parents=True, exist_ok=True)
@@ -112,6 +112,12 @@ class Recorder:
         terminalreporter.section("laws: worst seen, required")
         for name, (seen, required, count) in worst.items():
             terminalreporter.write_line(f"{seen:10.2e} {required:10.1e}  {name} ({count})")
+
+
+def _is_whole(config: pytest.Config) -> bool:
+    """Whether all tests were asked for: what a part of them saw must not replace what all of them saw."""
+    asked = [(config.invocation_params.dir / argument).resolve() for argument in config.args]
+    return asked == [Path(__file__).resolve().parent] and not config.option.keyword
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
