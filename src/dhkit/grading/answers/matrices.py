@@ -13,8 +13,7 @@ from dhkit.grading.answers.computer_algebra import is_mathematica
 from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.pretty import in_one_line
 from dhkit.grading.answers.reading import answer_tokens, answer_tree, without_comments
-from dhkit.grading.answers.rewriting import MAX_DEPTH
-from dhkit.grading.answers.tokens import closing_bracket, fail, nesting, shown
+from dhkit.grading.answers.tokens import check_depth, closing_bracket, fail, nesting, shown
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary
 
 __all__ = ["read_matrix"]
@@ -46,7 +45,7 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     """
     text = _in_rows(without_comments(in_one_line(unicodedata.normalize("NFD", text))))
     found = answer_tokens(text, vocabulary)
-    _check_depth(found, text)
+    check_depth(found, text)
     while found and found[-1].text in (";", ",", "."):
         found.pop()
     places = [token.at for token in found]
@@ -66,14 +65,6 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
         [(_written(entry, places, text), answer_tree(_scaled(before, entry, after), vocabulary, text)) for entry in row]
         for row in rows
     ]
-
-
-def _check_depth(found: Sequence[Token], text: str) -> None:
-    depth = 0
-    for token in found:
-        depth += nesting(token.text)
-        if depth > MAX_DEPTH:
-            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 
 
 def _in_rows(text: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.indices import without_indices
-from dhkit.grading.answers.tokens import closing_bracket, fail, nesting
+from dhkit.grading.answers.tokens import check_depth, closing_bracket, fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
 __all__ = ["rewritten"]
@@ -20,7 +20,6 @@ ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
 MATLAB = re.compile(r"\.[*/^']")
 """Signs that are MATLAB's alone."""
-MAX_DEPTH = 50
 MAX_TOKENS = 300_000
 
 
@@ -32,7 +31,7 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
     AnswerError
         An unknown name, an attribute, or brackets that do not match.
     """
-    _check_depth(tokens, text)
+    check_depth(tokens, text)
     found = _without_modules(_methods(tokens), text)
     found = _without_time(without_indices(_without_primes(found, vocabulary, text), vocabulary, text), vocabulary, text)
     # Square brackets that are left stand for round ones.
@@ -42,14 +41,6 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
     found = _named(found, vocabulary, text)
     found = _functions(found, text)
     return _products(found)
-
-
-def _check_depth(tokens: Sequence[Token], text: str) -> None:
-    depth = 0
-    for token in tokens:
-        depth += nesting(token.text)
-        if depth > MAX_DEPTH:
-            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 
 
 def _methods(tokens: Sequence[Token]) -> list[Token]:

@@ -10,10 +10,12 @@ from typing import NoReturn
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
 
-__all__ = ["MAX_LENGTH", "closing_bracket", "dotted", "fail", "folded", "nesting", "shown", "tokens"]
+__all__ = ["MAX_LENGTH", "check_depth", "closing_bracket", "dotted", "fail", "folded", "nesting", "shown", "tokens"]
 
 MAX_LENGTH = 200_000
 """Characters of one entry: a PUMA's first, multiplied out in numbers, has 30,000."""
+
+MAX_DEPTH = 50
 
 TOKEN = re.compile(
     r"\s*(?:((?:\d+(?:\.(?![*/^'])\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)"
@@ -130,6 +132,21 @@ def tokens(text: str, places: list[int], original: str, allowed: str = "") -> li
 def nesting(text: str) -> int:
     """Return by how much a token changes the depth of round and square brackets: 1, -1 or 0."""
     return {"(": 1, "[": 1, ")": -1, "]": -1}.get(text, 0)
+
+
+def check_depth(found: Sequence[Token], text: str) -> None:
+    """Refuse tokens whose brackets are nested deeper than :data:`MAX_DEPTH`.
+
+    Raises
+    ------
+    AnswerError
+        They are; with the place.
+    """
+    depth = 0
+    for token in found:
+        depth += nesting(token.text)
+        if depth > MAX_DEPTH:
+            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 
 
 def closing_bracket(found: Sequence[Token], k: int) -> int:

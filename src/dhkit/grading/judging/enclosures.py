@@ -145,14 +145,19 @@ def _rational(value: Fraction) -> Interval:
     return iv.mpf(value.numerator) / value.denominator
 
 
-def _bits(x: Interval) -> int:
-    """Return how many bits the larger bound has before its point; 0 for numbers below 1."""
+def _magnitudes(x: Interval) -> list[int]:
+    """Return the binary magnitudes of an interval's bounds; those of zeros are left out."""
     import mpmath
 
     bounds = [mpmath.mpf(bound) for bound in (x.a, x.b)]
     if not all(map(mpmath.isfinite, bounds)):
         raise _UndecidedError
-    return max((int(mpmath.mag(bound)) for bound in bounds if bound), default=0)
+    return [int(mpmath.mag(bound)) for bound in bounds if bound]
+
+
+def _bits(x: Interval) -> int:
+    """Return how many bits the larger bound has before its point; negative for numbers below 1/2."""
+    return max(_magnitudes(x), default=0)
 
 
 def _refuse_below(x: Interval, bound: int) -> None:
@@ -176,10 +181,7 @@ def _power(base: Interval, exponent: Interval) -> Interval:
 
     if _bits(exponent) > LARGEST:
         raise TooLargeError("a number too large to be worked out")
-    bounds = [mpmath.mpf(bound) for bound in (base.a, base.b)]
-    if not all(map(mpmath.isfinite, bounds)):
-        raise _UndecidedError
-    size = max((abs(int(mpmath.mag(bound))) for bound in bounds if bound), default=0)
+    size = max(map(abs, _magnitudes(base)), default=0)
     power = mpmath.mpf(exponent.mid)
     if size * abs(power) > LARGEST_POWER:
         raise TooLargeError("a number too large to be worked out")

@@ -131,12 +131,11 @@ def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tup
         there = [entry.tree for entry in quantity.given if entry.tree is not None]
         absent = [p for p in lengths if not any(p in names_of(tree) for tree in there)]
         ring = truth.arm(name).ring
-        if name not in DYNAMICS or not absent or not set(absent) <= set(ring.constants):
+        if name not in DYNAMICS or name == "C" or not absent or not set(absent) <= set(ring.constants):
             continue
         for identity, factor in UNITS.items():
             values = {p: ring.number(exact_number(truth.description, p) * factor) for p in absent}
-            expected = substituted(truth.of("h" if name == "C" else name), values, ring)
-            if name != "C" and _has_answers(quantity, expected):
+            if _has_answers(quantity, substituted(truth.of(name), values, ring)):
                 found[(name,)] = diagnosis_of_identity(identity, quantity, wrong_entries(quantity), name)
     return found
 
