@@ -23,7 +23,7 @@ settings.register_profile(
     derandomize=not acceptance.ACCEPTING,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
     print_blob=True,
-    # Without "explain": its tracing makes compiling kernels ten times slower.
+    # Without "explain": its tracing makes deriving programs ten times slower.
     phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.target, Phase.shrink),
 )
 settings.load_profile("dhkit")
@@ -40,8 +40,14 @@ def check_urdf() -> str:
 
 
 @pytest.fixture
-def array_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels in NumPy: for tests of so many tables that compiling each would take hours."""
+def compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every batch, single states too, is computed by compiled kernels."""
+    monkeypatch.setenv("DHKIT_KERNELS", "on")
+
+
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every batch is computed by CasADi's virtual machine."""
     monkeypatch.setenv("DHKIT_KERNELS", "off")
 
 

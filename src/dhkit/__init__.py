@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dhkit.errors import (
     AnswerError,
@@ -14,6 +13,7 @@ from dhkit.errors import (
     PlanningError,
     UnreachableError,
 )
+from dhkit.lazy import lazy_names
 
 if TYPE_CHECKING:
     from dhkit.arm import Arm
@@ -79,45 +79,45 @@ __all__ = [
     "robots",
 ]
 
-_HOMES = {
-    "Arm": "dhkit.arm",
-    "Description": "dhkit.description",
-    "Effort": "dhkit.planning",
-    "Energy": "dhkit.planning",
-    "Floor": "dhkit.planning",
-    "Friction": "dhkit.dynamics",
-    "GradeReport": "dhkit.grading",
-    "IKFlag": "dhkit.kinematics",
-    "IKSolutions": "dhkit.kinematics",
-    "IKStatus": "dhkit.kinematics",
-    "Jerk": "dhkit.planning",
-    "Limits": "dhkit.trajectories",
-    "MotorPower": "dhkit.planning",
-    "Obstacle": "dhkit.planning",
-    "Payload": "dhkit.planning",
-    "Time": "dhkit.planning",
-    "ToolAcceleration": "dhkit.planning",
-    "ToolDirection": "dhkit.planning",
-    "ToolOrientation": "dhkit.planning",
-    "ToolSpeed": "dhkit.planning",
-    "TorqueSpeedLine": "dhkit.planning",
-    "Trajectory": "dhkit.trajectories",
-    "grade": "dhkit.grading",
-    "plot": "dhkit.viewer",
-    "pose": "dhkit.description",
-    "pose_parts": "dhkit.description",
-    "robots": "dhkit.description",
-}
-"""Where the public names live: imported when first used, so that ``import dhkit`` takes no time."""
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'dhkit' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "dhkit.arm": ("Arm",),
+        "dhkit.description": (
+            "Description",
+            "pose",
+            "pose_parts",
+            "robots",
+        ),
+        "dhkit.planning": (
+            "Effort",
+            "Energy",
+            "Floor",
+            "Jerk",
+            "MotorPower",
+            "Obstacle",
+            "Payload",
+            "Time",
+            "ToolAcceleration",
+            "ToolDirection",
+            "ToolOrientation",
+            "ToolSpeed",
+            "TorqueSpeedLine",
+        ),
+        "dhkit.dynamics": ("Friction",),
+        "dhkit.grading": (
+            "GradeReport",
+            "grade",
+        ),
+        "dhkit.kinematics": (
+            "IKFlag",
+            "IKSolutions",
+            "IKStatus",
+        ),
+        "dhkit.trajectories": (
+            "Limits",
+            "Trajectory",
+        ),
+        "dhkit.viewer": ("plot",),
+    },
+)

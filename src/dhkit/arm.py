@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -143,6 +143,26 @@ class Arm:
     def configurations(self) -> Mapping[str, Array]:
         """Named joint vectors, shape (n,), rad and m, read-only."""
         return Named(self._description.numbers.configurations)
+
+    def compile(self, progress: Callable[[int, int], None] | None = None) -> None:
+        """Compile all kernels of this arm now, for control loops, servers and benchmarks.
+
+        Without it a kernel is compiled when large batches have asked for 65,536 items, and interpreted until then. What
+        is compiled stays in the cache for later processes. ``DHKIT_KERNELS=off`` still interprets.
+
+        Parameters
+        ----------
+        progress
+            Called with how many kernels are ready and how many there are.
+        """
+        from dhkit.dynamics import dynamic_kernels
+        from dhkit.kinematics import kinematic_kernels
+
+        kernels = kinematic_kernels(self._description) + dynamic_kernels(self._description)
+        for k, kernel in enumerate(kernels):
+            kernel.compile()
+            if progress is not None:
+                progress(k + 1, len(kernels))
 
     # Kinematics
 

@@ -88,7 +88,7 @@ def test_build_writes_a_urdf_with_its_meshes(dhkit, tmp_path):
     assert (tmp_path / "meshes" / "puma560" / "base.stl").is_file()
 
 
-def test_verify_says_how_well_and_fails_where_it_does_not(dhkit, monkeypatch, array_kernels):
+def test_verify_says_how_well_and_fails_where_it_does_not(dhkit, monkeypatch):
     status, out, _ = dhkit("verify", "ur5", "--samples", "10")
     assert status == 0
     assert "agrees" in out

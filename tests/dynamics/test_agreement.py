@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from acceptance import ACCEPTING
 from dhkit.description import library_robot, robots
 from dhkit.dynamics import (
     bias,
@@ -17,8 +16,6 @@ from dhkit.dynamics import (
     potential_energy,
 )
 from dynamics_reference import hold, motions, tilted_arms
-
-COMPILED = ("puma560", "stanford", "cart_pendulum", "planar2r")
 
 
 def kernels(arm, q, qd, x):
@@ -36,24 +33,25 @@ def kernels(arm, q, qd, x):
     }
 
 
-@pytest.mark.parametrize("name", robots() if ACCEPTING else COMPILED)
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("name", robots())
 def test_compiled_dynamics_agree_with_pinocchio(name, law):
     arm = library_robot(name)
     states = motions(arm, law.samples(1000))
     hold(law, arm, kernels(arm, *states), *states, "compiled")
 
 
-@pytest.mark.usefixtures("array_kernels")
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("name", robots())
-def test_dynamics_of_library_robots_agree_with_pinocchio(name, law):
+def test_interpreted_dynamics_agree_with_pinocchio(name, law):
     arm = library_robot(name)
     states = motions(arm, law.samples(1000), seed=1)
-    hold(law, arm, kernels(arm, *states), *states, "in NumPy")
+    hold(law, arm, kernels(arm, *states), *states, "interpreted")
 
 
-@pytest.mark.usefixtures("array_kernels")
+@pytest.mark.usefixtures("interpreted")
 @given(tilted_arms())
 def test_dynamics_of_any_arm_agree_with_pinocchio(law, arm):
     law.samples(1000)
     states = motions(arm, 4)
-    hold(law, arm, kernels(arm, *states), *states, "in NumPy")
+    hold(law, arm, kernels(arm, *states), *states, "interpreted")

@@ -119,7 +119,6 @@ def test_arguments_of_the_wrong_kind_are_refused(function, arm):
             function(arm, *good[:k], ["a"] * 6, *good[k + 1 :])
 
 
-@pytest.mark.usefixtures("array_kernels")
 @every
 def test_an_arm_without_bodies_says_what_to_do(function):
     arm = from_dh([(0, 0.1, 0.2, 0)] * 6)

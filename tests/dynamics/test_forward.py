@@ -14,8 +14,6 @@ from dhkit.expressions import ZERO, exact
 from dhkit.model import pinocchio_model
 from dynamics_reference import hold, motions
 
-pytestmark = pytest.mark.usefixtures("array_kernels")
-
 
 def without_drives(arm):
     return replace(arm, joints=tuple(replace(joint, drive=None) for joint in arm.joints))

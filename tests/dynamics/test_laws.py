@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -25,8 +24,6 @@ from dhkit.dynamics import (
 from dhkit.kinematics import jacobian
 from dhkit.verification.measure import Floors, forward_tolerance, relative_error
 from dynamics_reference import ARMS, motions, tilted_arms
-
-pytestmark = pytest.mark.usefixtures("array_kernels")
 
 ROUNDINGS = 1e-12
 RATES = 1e-9  # what central differences leave

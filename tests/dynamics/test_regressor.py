@@ -17,7 +17,6 @@ from dhkit.verification.states import random_motions
 from random_arms import arms
 
 
-@pytest.mark.usefixtures("array_kernels")
 @given(arms(least=1, most=7))
 def test_torques_are_linear_in_the_parameters(law, description):
     motion = random_motions(description, law.samples(100))

@@ -1,4 +1,4 @@
-"""Sine, cosine and arc tangent against extended precision, compiled and in NumPy."""
+"""Sine, cosine and arc tangent against extended precision, compiled and interpreted."""
 
 import casadi
 import numpy as np
@@ -33,9 +33,9 @@ def ulps(seen, exact):
     return np.abs(seen - exact) / np.spacing(np.abs(exact.astype(float)))
 
 
-@pytest.fixture(params=["compiled", "numpy"])
-def mode(request, monkeypatch):
-    monkeypatch.setenv("DHKIT_KERNELS", "off" if request.param == "numpy" else "on")
+@pytest.fixture(params=["compiled", "interpreted"])
+def mode(request):
+    request.getfixturevalue(request.param)
     return request.param
 
 

@@ -12,7 +12,6 @@ from random_arms import states, tables
 FUNCTIONS = (forward_kinematics, frames, jacobian)
 
 
-@pytest.mark.usefixtures("array_kernels")
 @given(tables())
 def test_frames_are_rigid_and_their_product_is_the_tool(arm):
     q = states(arm, 4)

@@ -94,9 +94,8 @@ def test_it_is_one_of_the_closed_form_s_branches(name):
 
 @settings(max_examples=acceptance.sample_size(400))
 @given(arm=tables(least=1, most=8))
-def test_any_arm_without_limits_is_solved_from_near_by(arm, monkeypatch):
+def test_any_arm_without_limits_is_solved_from_near_by(arm):
     """Prismatic joints, few joints and many, any table: the pose is met, angles are in (-pi, pi]."""
-    monkeypatch.setenv("DHKIT_KERNELS", "off")  # compiling would take a second an arm
     q = states(arm, 3)
     T = forward_kinematics(arm, q)
     found = solve_numerically(arm, T, q + 1e-3, tolerance=1e-10, restarts=7)

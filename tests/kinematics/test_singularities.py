@@ -61,7 +61,7 @@ def test_pinocchio_has_that_determinant(name):
 
 
 @given(arm=ARMS)
-def test_any_arm_of_the_families(law, array_kernels, arm):
+def test_any_arm_of_the_families(law, arm):
     law.samples(1000)
     family = classify(arm).family
     assume(family is not None and family.name not in ("pan_tilt", "slider"))  # links that cancel have none

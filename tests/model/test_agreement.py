@@ -83,7 +83,6 @@ def test_check_urdf_accepts_the_library(name, tmp_path, check_urdf):
             assert "Successfully Parsed XML" in done.stdout
 
 
-@pytest.mark.usefixtures("array_kernels")
 @given(tables())
 def test_any_table_agrees_with_pinocchio_and_yourdfpy(tmp_path, law, arm):
     law.samples(1000)

@@ -70,7 +70,6 @@ def test_deriving_everything_takes_little(law):
     law.takes("seconds to derive the dynamics of the PUMA", min(seconds), 0.5)
 
 
-@pytest.mark.usefixtures("array_kernels")
 @settings(max_examples=max(5, sample_size(100)))
 @given(tilted_arms(least=1))
 def test_layers_of_any_arm(law, description):

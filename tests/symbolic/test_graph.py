@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
-from dhkit.symbolic import Graph, SymbolicTable, jacobian, jacobian_dot, joint_symbols, python_lines, table_pattern
+from dhkit.symbolic import Graph, SymbolicTable, jacobian, jacobian_dot, joint_symbols, table_pattern
 from random_arms import states, tables
 
 
@@ -86,10 +86,13 @@ def test_an_operation_without_a_place_in_programs_is_refused():
         Graph.of("program", {"x": x}, {"y": casadi.exp(x[0])})
 
 
-def test_sine_and_cosine_of_one_angle_are_one_line():
+def test_sine_and_cosine_of_one_angle_are_a_pair():
     graph = Graph.of("program", {"x": x}, {"y": EXPRESSIONS["sine and cosine"]})
-    lines = list(python_lines(graph, lambda k, i: f"x[{i}]", lambda k, i, value: f"y = {value}"))
-    assert sum("sincos" in line for line in lines) == 2
+    assert len(graph.angle_pairs) == 2
+    for angle, (sine, cosine) in graph.angle_pairs.items():
+        assert sine == -1 or graph.nodes[sine].arguments == (angle,)
+        assert graph.nodes[cosine].arguments == (angle,)
+    assert sorted(sine for sine, _ in graph.angle_pairs.values())[0] == -1
 
 
 @given(tables(), st.integers(0, 2**32 - 1))

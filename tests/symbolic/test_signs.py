@@ -4,16 +4,14 @@ import casadi
 import numpy as np
 import pytest
 
-from dhkit.kernels.source import array_source
+from dhkit.kernels.interpreter import Interpreter
 from dhkit.symbolic import Graph, operation_count
 
 
 def run(expression, x, values):
     graph = Graph.of("program", {"p": casadi.SX(0, 1), "x": x}, {"y": expression})
-    space = {}
-    exec(array_source(graph, ["float64"]), space)
     y = np.empty((len(values), expression.numel()))
-    space["kernel"](np.zeros(0), np.asarray(values, dtype=float), y)
+    Interpreter(graph, ["float64"])(np.zeros(0), [np.asarray(values, dtype=float)], [y])
     return y, operation_count(graph)
 
 

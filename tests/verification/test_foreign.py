@@ -18,8 +18,6 @@ from dhkit.model.foreign_urdf import read_chain
 from dhkit.model.urdf_checks import MAX_BYTES
 from dhkit.verification import verify_urdf
 
-pytestmark = pytest.mark.usefixtures("array_kernels")
-
 
 @pytest.mark.parametrize("name", dhkit.robots())
 def test_our_own_urdfs_agree(name, law):

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import acceptance
 import dhkit
 from dhkit import Arm
 from dhkit.description import from_dh, library_robot
@@ -30,9 +29,7 @@ DYNAMICS = {
 
 
 @pytest.mark.parametrize("name", dhkit.robots())
-def test_every_robot_agrees(name, law, monkeypatch):
-    if not acceptance.ACCEPTING:  # compiling all of them takes ten minutes
-        monkeypatch.setenv("DHKIT_KERNELS", "off")
+def test_every_robot_agrees(name, law):
     report = verify(library_robot(name), law.samples(1000))
     for agreement in report.agreements:
         law.holds(agreement.quantity, agreement.error, agreement.tolerance, name)
@@ -41,7 +38,6 @@ def test_every_robot_agrees(name, law, monkeypatch):
     assert compared >= DYNAMICS or any("forward dynamics not compared" in note for note in report.notes)
 
 
-@pytest.mark.usefixtures("array_kernels")
 @pytest.mark.parametrize(
     ("change", "found"),
     [
@@ -62,7 +58,6 @@ def test_what_is_wrong_is_found(monkeypatch, change, found):
     assert "DISAGREES at q = [" in str(report)
 
 
-@pytest.mark.usefixtures("array_kernels")
 def test_the_worst_state_is_where_it_happens(monkeypatch):
     import dhkit.dynamics as dynamics
 
@@ -81,7 +76,6 @@ def test_the_worst_state_is_where_it_happens(monkeypatch):
     assert agreement.qd == ()
 
 
-@pytest.mark.usefixtures("array_kernels")
 def test_nan_is_no_agreement(monkeypatch):
     import dhkit.dynamics as dynamics
 
@@ -91,7 +85,6 @@ def test_nan_is_no_agreement(monkeypatch):
     assert [agreement.quantity for agreement in report.agreements if not agreement.ok] == ["kinetic energy K"]
 
 
-@pytest.mark.usefixtures("array_kernels")
 def test_an_arm_without_bodies_is_compared_as_far_as_it_goes():
     report = verify(from_dh([(0, 0, 0.3, 0), (0, 0, 0.3, 0)]), 5)
     assert report.ok
@@ -99,7 +92,6 @@ def test_an_arm_without_bodies_is_compared_as_far_as_it_goes():
     assert "no body on joint1, joint2" in str(report)
 
 
-@pytest.mark.usefixtures("array_kernels")
 def test_a_singular_mass_matrix_is_said():
     planar = library_robot("planar2r")
     body = replace(planar.joints[1].body, mass=planar.joints[1].body.mass * 0)
@@ -135,5 +127,5 @@ def test_reports_for_people_and_papers():
     assert json.loads(json.dumps(report().json()))["agreements"][0]["ok"] is True
 
 
-def test_arm_verify(array_kernels):
+def test_arm_verify():
     assert Arm.load("cart_pendulum").verify(samples=5, seed=4).ok

@@ -72,13 +72,13 @@ class Operations:
 def operations(arm: Arm) -> list[Operations]:
     """Return the operations of inverse dynamics, gravity torque and mass matrix."""
     programs = (
-        (INVERSE_DYNAMICS, "inverse_dynamics", ("q", "qd", "qdd")),
-        ("gravity torque", "gravity_torque", ("q",)),
-        ("mass matrix", "mass_matrix", ("q",)),
+        (INVERSE_DYNAMICS, "inverse_dynamics"),
+        ("gravity torque", "gravity_torque"),
+        ("mass matrix", "mass_matrix"),
     )
     found = []
-    for name, quantity, states in programs:
-        counts = operation_count(dynamics_graph(quantity, arm.description, states))
+    for name, quantity in programs:
+        counts = operation_count(dynamics_graph(quantity, arm.description))
         additions = counts.get("additions", 0) + counts.get("negations", 0)
         found.append(Operations(name, additions, counts.get("multiplications", 0), counts.get("sines and cosines", 0)))
     return found

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from dhkit.kernels import compiling
+from dhkit.kernels import kernel_mode
 
 __all__ = ["Machine", "cores"]
 
@@ -17,7 +17,6 @@ PACKAGES = (
     "dhkit",
     "numpy",
     "scipy",
-    "numba",
     "llvmlite",
     "pin",
     "EAIK",
@@ -49,7 +48,7 @@ class Machine:
     packages
         Versions of what took part, by name; missing ones are left out.
     kernels
-        Whether compiled kernels are on.
+        The setting ``DHKIT_KERNELS``: auto, on or off.
     """
 
     processor: str
@@ -58,7 +57,7 @@ class Machine:
     system: str
     python: str
     packages: dict[str, str]
-    kernels: bool
+    kernels: str
 
     @classmethod
     def here(cls) -> Machine:
@@ -72,7 +71,7 @@ class Machine:
             system=f"{platform.system()} {platform.machine()}",
             python=f"{platform.python_implementation()} {platform.python_version()}",
             packages={name: found for name in PACKAGES if (found := _version(name))},
-            kernels=compiling(),
+            kernels=kernel_mode(),
         )
 
 

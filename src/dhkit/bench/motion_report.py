@@ -112,7 +112,7 @@ class MotionReport:
         machine = self.machine
         return [
             f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
-            f"{machine.system}, {machine.python}, kernels {'on' if machine.kernels else 'off'}",
+            f"{machine.system}, {machine.python}, kernels {machine.kernels}",
             ", ".join(f"{name} {version}" for name, version in machine.packages.items()),
         ]
 

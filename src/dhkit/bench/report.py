@@ -209,7 +209,7 @@ class BenchReport:
         packages = ", ".join(f"{name} {version}" for name, version in machine.packages.items())
         return [
             f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
-            f"{machine.system}, {machine.python}, kernels {'on' if machine.kernels else 'off'}",
+            f"{machine.system}, {machine.python}, kernels {machine.kernels}",
             packages,
         ]
 

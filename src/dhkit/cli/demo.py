@@ -116,7 +116,7 @@ def _equations(arm: Arm, folder: Path) -> str:
         write_atomically(folder / "equations.html", equations_page(lag, listed))
     except DhkitError as error:
         return f"skipped: {error}"
-    operations = operation_count(dynamics_graph("inverse_dynamics", arm.description, ("q", "qd", "qdd")))
+    operations = operation_count(dynamics_graph("inverse_dynamics", arm.description))
     sums, products = operations.get("additions", 0), operations.get("multiplications", 0)
     return (
         f"M qdd + C qd + g proved equal to Euler and Lagrange's equation in {seconds:.2f} s: "

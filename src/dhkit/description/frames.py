@@ -41,6 +41,8 @@ def number_array(value: ArrayLike, name: str, shape: str) -> Array:
     TypeError
         Not numbers; names the argument and the shape expected.
     """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "fiu" and array.size:

@@ -3,6 +3,7 @@
 from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
 from dhkit.dynamics.equations import bias, coriolis_matrix, gravity_torque, inverse_dynamics, mass_matrix
 from dhkit.dynamics.forward import forward_dynamics
+from dhkit.dynamics.kernels import dynamic_kernels
 from dhkit.dynamics.loads import friction_torque, wrench_torque
 from dhkit.dynamics.programs import dynamics_graph
 from dhkit.dynamics.regressor import inertial_parameters, regressor
@@ -12,6 +13,7 @@ __all__ = [
     "Friction",
     "bias",
     "coriolis_matrix",
+    "dynamic_kernels",
     "dynamics_graph",
     "forward_dynamics",
     "friction_torque",

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.frames import number_array
-from dhkit.kernels import fill, kernel
+from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
 from dhkit.symbolic import friction_torque as friction_expression
 
-__all__ = ["external_torque", "friction_torque", "wrench_torque"]
+__all__ = ["external_torque", "friction_kernel", "friction_torque", "wrench_kernel", "wrench_torque"]
 
 
 def friction_torque(
@@ -48,9 +48,7 @@ def friction_torque(
     """
     state = joint_array(description, qd, "qd")
     width = Friction().width if friction is None else friction.width
-    smooth = width > 0
-    name = "smooth_friction" if smooth else "friction"
-    run = kernel(name, str(description.n), lambda: _friction_graph(name, description.n, smooth))
+    run = friction_kernel(description.n, width > 0)
     numbers = description.numbers
     parameters = np.concatenate([numbers.viscous, numbers.coulomb.ravel(), [width]])
     return fill(run, parameters, [state], (description.n,), out, threads)
@@ -78,8 +76,7 @@ def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, thr
     load = number_array(wrench, "wrench", "(..., 6)")
     if load.ndim == 0 or load.shape[-1] != 6:
         raise ValueError(f"wrench has shape {load.shape}; expected (..., 6): force, then moment")
-    pattern, parameters = _table_pattern_of(description)
-    run = kernel("wrench_torque", pattern, lambda: _wrench_graph(description))
+    run, parameters = wrench_kernel(description)
     return fill(run, parameters, [joint_array(description, q), load], (description.n,), None, threads)
 
 
@@ -106,6 +103,19 @@ def external_torque(
     return -loss if push is None else push - loss
 
 
+def friction_kernel(n: int, smooth: bool) -> Kernel:
+    """Return the kernel of :func:`friction_torque` for n joints, with a smooth change of direction or a step."""
+    name = "smooth_friction" if smooth else "friction"
+    return kernel(name, str(n), lambda: _friction_graph(name, n, smooth))
+
+
+@lru_cache(maxsize=512)
+def wrench_kernel(description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`wrench_torque` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    return kernel("wrench_torque", pattern, lambda: _wrench_graph(description)), parameters
+
+
 def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
     import casadi
 
@@ -124,8 +134,3 @@ def _wrench_graph(description: Description) -> Graph:
     return Graph.of(
         "wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": jacobian(table, q).T @ wrench}
     )
-
-
-@lru_cache(maxsize=512)
-def _table_pattern_of(description: Description) -> tuple[str, Array]:
-    return table_pattern(description)

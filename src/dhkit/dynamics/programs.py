@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import fill, kernel
+from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import (
     Graph,
     InertialTable,
@@ -28,7 +28,7 @@ from dhkit.symbolic import (
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["dynamics_graph", "evaluate"]
+__all__ = ["EXPRESSIONS", "dynamics_graph", "dynamics_kernel", "evaluate"]
 
 EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "mass_matrix": composite_mass_matrix,
@@ -40,7 +40,18 @@ EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "kinetic_energy": kinetic_energy,
     "potential_energy": potential_energy,
 }
-"""What computes each quantity, as a function of the table and of the joint vectors."""
+"""What computes each quantity, as a function of the table and of the joint vectors of ``STATES``."""
+STATES: Mapping[str, tuple[str, ...]] = {
+    "mass_matrix": ("q",),
+    "coriolis_matrix": ("q", "qd"),
+    "gravity_torque": ("q",),
+    "bias": ("q", "qd"),
+    "inverse_dynamics": ("q", "qd", "qdd"),
+    "forward_dynamics": ("q", "qd", "tau"),
+    "kinetic_energy": ("q", "qd"),
+    "potential_energy": ("q",),
+}
+"""The joint vectors that each quantity is a function of."""
 
 
 def evaluate(
@@ -61,15 +72,27 @@ def evaluate(
         A joint vector of another shape, or not numeric; ``out`` does not fit.
     """
     arrays = [joint_array(description, state, name) for name, state in states.items()]
-    pattern, parameters = _pattern_of(description)
-    run = kernel(quantity, pattern, lambda: dynamics_graph(quantity, description, tuple(states)))
+    run, parameters = dynamics_kernel(quantity, description)
     return fill(run, parameters, arrays, tail, out, threads)
 
 
-def dynamics_graph(quantity: str, description: Description, states: tuple[str, ...]) -> Graph:
+@lru_cache(maxsize=4096)
+def dynamics_kernel(quantity: str, description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of a quantity and an arm's parameters of it.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body.
+    """
+    pattern, parameters = _pattern_of(description)
+    return kernel(quantity, pattern, lambda: dynamics_graph(quantity, description)), parameters
+
+
+def dynamics_graph(quantity: str, description: Description) -> Graph:
     """Return the program of a quantity, parametric in the arm's numbers."""
     table, parameters = InertialTable.parametric(description)
-    symbols = {name: joint_symbols(name, description.n) for name in states}
+    symbols = {name: joint_symbols(name, description.n) for name in STATES[quantity]}
     expression = EXPRESSIONS[quantity](table, *symbols.values())
     return Graph.of(quantity, {"parameters": parameters, **symbols}, {"result": expression})
 

@@ -1,6 +1,6 @@
-"""Straight-line programs as batch functions: SIMD blocks compiled by Numba and cached on disk, or NumPy."""
+"""Programs as batch functions: interpreted by CasADi's virtual machine, or compiled to SIMD blocks by LLVM."""
 
 from dhkit.kernels.batches import check_whole, fill, pose_rows, result_array
-from dhkit.kernels.kernel import Kernel, compiling, kernel
+from dhkit.kernels.kernel import Kernel, kernel, kernel_mode
 
-__all__ = ["Kernel", "check_whole", "compiling", "fill", "kernel", "pose_rows", "result_array"]
+__all__ = ["Kernel", "check_whole", "fill", "kernel", "kernel_mode", "pose_rows", "result_array"]

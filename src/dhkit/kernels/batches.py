@@ -43,19 +43,30 @@ def fill(
         The batch axes do not broadcast, ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
     check_whole("threads", threads, 1)
+    batch = _batch(states)
+    result = result_array((*batch, *tail), out)
+    if not result.size:
+        return result
+    rows = [_rows(state, batch) for state in states]
+    if out is not None and any(np.may_share_memory(out, row) for row in rows):
+        rows = [row.copy() for row in rows]
+    kernel(parameters, rows, [result.reshape(len(rows[0]), -1)], threads)
+    return result
+
+
+def _batch(states: Sequence[Array]) -> tuple[int, ...]:
+    """Return the batch axes that all states broadcast to."""
+    first = states[0].shape[:-1]
+    for state in states:
+        if state.shape[:-1] != first:
+            break
+    else:
+        return first
     shapes = [state.shape[:-1] for state in states]
     try:
-        batch = shapes[0] if len(states) == 1 else np.broadcast_shapes(*shapes)
+        return np.broadcast_shapes(*shapes)
     except ValueError:
         raise ValueError(f"the arguments' batch axes {', '.join(map(str, shapes))} do not broadcast") from None
-    out = result_array((*batch, *tail), out)
-    if not out.size:
-        return out
-    rows = [_rows(state, batch) for state in states]
-    if any(np.may_share_memory(out, row) for row in rows):
-        rows = [row.copy() for row in rows]
-    kernel(parameters, rows, [out.reshape(len(rows[0]), -1)], threads)
-    return out
 
 
 def check_whole(name: str, value: object, least: int) -> None:
@@ -110,5 +121,4 @@ def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
 def _rows(state: Array, batch: tuple[int, ...]) -> Array:
     if state.shape[:-1] != batch:
         state = np.broadcast_to(state, (*batch, state.shape[-1]))
-    rows = state.reshape(-1, state.shape[-1])
-    return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
+    return np.ascontiguousarray(state).reshape(-1, state.shape[-1])

@@ -1,4 +1,4 @@
-"""Elementary functions without branches: the same text serves NumPy arrays and, compiled, vector registers.
+"""Elementary functions of vectors, without branches and without calls: a kernel's body holds their operations.
 
 Polynomials have the coefficients of fdlibm (Sun Microsystems, 1993; its s_sin.c, k_cos.c and s_atan.c), computed by
 Remez exchange; they are numbers, the code is ours.
@@ -6,11 +6,11 @@ Remez exchange; they are numbers, the code is ours.
 
 from __future__ import annotations
 
-from typing import Any
+from math import nan
 
-import numpy as np
+from dhkit.kernels.vectors import Vector, absolute, select
 
-__all__ = ["EXACT_RANGE", "absolute", "atan2", "floor", "logical_not", "maximum", "minimum", "select", "sincos", "sqrt"]
+__all__ = ["EXACT_RANGE", "atan2", "maximum", "minimum", "sincos"]
 
 EXACT_RANGE = 1e6
 """rad: sine and cosine are right up to here and NaN beyond, where a double says little about an angle."""
@@ -25,42 +25,17 @@ QUARTER_PI, HALF_PI, PI = 0.78539816339744830962, 1.57079632679489661923, 3.1415
 TAN_EIGHTH_PI = 0.41421356237309504880
 
 
-def select(condition: Any, true: Any, false: Any) -> Any:
-    """Return one of two values without a branch; the compiled twin is in ``compiler``."""
-    return np.where(condition, true, false)
-
-
-def absolute(x: Any) -> Any:
-    """Return the absolute value."""
-    return np.abs(x)
-
-
-def floor(x: Any) -> Any:
-    """Return the greatest integer that is not above x."""
-    return np.floor(x)
-
-
-def sqrt(x: Any) -> Any:
-    """Return the square root, NaN below 0."""
-    return np.sqrt(x)
-
-
-def logical_not(x: Any) -> Any:
-    """Return the opposite of a condition."""
-    return x == False  # noqa: E712 - `not` has no meaning for arrays
-
-
-def minimum(a: Any, b: Any) -> Any:
-    """Return the smaller of two numbers."""
+def minimum(a: Vector, b: Vector) -> Vector:
+    """Return the smaller of two numbers; b where one is NaN."""
     return select(a < b, a, b)
 
 
-def maximum(a: Any, b: Any) -> Any:
-    """Return the greater of two numbers."""
+def maximum(a: Vector, b: Vector) -> Vector:
+    """Return the greater of two numbers; b where one is NaN."""
     return select(a > b, a, b)
 
 
-def sincos(x: Any) -> Any:
+def sincos(x: Vector) -> tuple[Vector, Vector]:
     """Return sine and cosine by one reduction to [-pi/4, pi/4] (Cody & Waite, 1980, in three parts).
 
     The absolute error is at most 2.3e-16 up to ``EXACT_RANGE``, and 2 units in the last place of results above 1e-5;
@@ -70,19 +45,17 @@ def sincos(x: Any) -> Any:
     # The remainder is r + tail: its rounding is kept, or it would cost half a unit in the last place.
     t = x - k * HALF_PI_1
     second = k * HALF_PI_2
-    r = select(absolute(x) <= EXACT_RANGE, t - second, np.nan)
+    r = select(absolute(x) <= EXACT_RANGE, t - second, nan)
     tail = ((t - r) - second) - k * HALF_PI_3
     z = r * r
     half = 0.5 * z
-    p = 1.58969099521155010221e-10
-    p = p * z - 2.50507602534068634195e-08
+    p = z * 1.58969099521155010221e-10 - 2.50507602534068634195e-08
     p = p * z + 2.75573137070700676789e-06
     p = p * z - 1.98412698298579493134e-04
     p = p * z + 8.33333333332248946124e-03
     p = p * z - 1.66666666666666324348e-01
     sine = r + (r * (z * p) + tail * (1.0 - half))
-    p = -1.13596475577881948265e-11
-    p = p * z + 2.08757232129817482790e-09
+    p = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09
     p = p * z - 2.75573143513906633035e-07
     p = p * z + 2.48015872894767294178e-05
     p = p * z - 1.38888888888741095749e-03
@@ -99,20 +72,19 @@ def sincos(x: Any) -> Any:
     return select(opposite | (quadrant < -0.125), -s, s), select(opposite | (quadrant > 0.125), -c, c)
 
 
-def atan2(y: Any, x: Any) -> Any:
+def atan2(y: Vector, x: Vector) -> Vector:
     """Return the angle of (x, y) in (-pi, pi], to 4 units in the last place; 0 of (0, 0), NaN of NaN."""
     width, height = absolute(x), absolute(y)
     steep = height > width
-    larger = select(steep, height, width)
-    smaller = select(steep, width, height)
+    longer = select(steep, height, width)
+    shorter = select(steep, width, height)
     # Above tan(pi/8) take the angle's difference from pi/4, so that the polynomial's argument is at most tan(pi/8).
-    wide = smaller > TAN_EIGHTH_PI * larger
-    numerator = select(wide, smaller - larger, smaller)
-    denominator = select(wide, smaller + larger, larger)
+    wide = shorter > TAN_EIGHTH_PI * longer
+    numerator = select(wide, shorter - longer, shorter)
+    denominator = select(wide, shorter + longer, longer)
     t = select(denominator > 0.0, numerator / denominator, 0.0)
     z = t * t
-    p = 1.62858201153657823623e-02
-    p = p * z - 3.65315727442169155270e-02
+    p = z * 1.62858201153657823623e-02 - 3.65315727442169155270e-02
     p = p * z + 4.97687799461593236017e-02
     p = p * z - 5.83357013379057348645e-02
     p = p * z + 6.66107313738753120669e-02
@@ -127,4 +99,4 @@ def atan2(y: Any, x: Any) -> Any:
     angle = select(steep, HALF_PI - angle, angle)
     angle = select(x < 0.0, PI - angle, angle)
     angle = select(y < 0.0, -angle, angle)
-    return select((x == x) & (y == y), angle, np.nan)
+    return select(x.differs(x) | y.differs(y), nan, angle)

@@ -1,116 +1,197 @@
-"""Kernels: batch functions on arrays (N, size), compiled, or in NumPy where compiling is switched off."""
+"""Kernels: programs as functions of batches, interpreted or compiled, whichever answers sooner."""
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.kernels import store
-from dhkit.kernels.source import array_source, loop_source
+from dhkit.errors import DhkitError
 from dhkit.symbolic import Graph
 
-__all__ = ["Kernel", "compiling", "kernel"]
+if TYPE_CHECKING:
+    from dhkit.kernels.interpreter import Interpreter
+    from dhkit.kernels.machine_code import CompiledFunction
 
+__all__ = ["COMPILE_AFTER", "SMALL", "Kernel", "kernel", "kernel_mode"]
+
+log = logging.getLogger(__name__)
+
+MODES = ("auto", "on", "off")
+
+SMALL = 64
+"""Items: smaller batches are interpreted and do not count towards compiling, so that no control loop waits for it."""
+COMPILE_AFTER = 65_536
+"""Items that larger batches have asked for when a kernel is compiled: interpreting so many takes about as long as
+compiling (30 to 250 ms)."""
 SHARE = 4_096
 """Items that a thread must have to itself: below that handing them over costs more than it saves."""
-ARRAY_BLOCK = 2_048
-"""Items that NumPy works on at once."""
+KEPT = 2_048
+"""Kernels that a process keeps; the oldest goes first."""
 
 
-def compiling() -> bool:
-    """Return whether kernels are compiled: unless the environment variable ``DHKIT_KERNELS`` is ``off``."""
-    return os.environ.get("DHKIT_KERNELS", "").lower() != "off"
+def kernel_mode() -> str:
+    """Return what ``DHKIT_KERNELS`` asks for: ``auto``, ``on`` (always compiled) or ``off`` (never).
+
+    Raises
+    ------
+    DhkitError
+        The variable has another value.
+    """
+    mode = os.environ.get("DHKIT_KERNELS") or "auto"
+    if mode not in MODES:
+        raise DhkitError(f"DHKIT_KERNELS is {mode!r}; expected auto, on or off")
+    return mode
 
 
-@dataclass(frozen=True)
 class Kernel:
-    """A function of items: ``kernel(parameters, inputs, outputs)`` fills the outputs.
+    """A program as a function of batches: ``kernel(parameters, inputs, outputs)`` fills the outputs.
 
-    Inputs are (N, size) float64, C-contiguous; outputs likewise, of the kinds that :func:`kernel` was given. Items are
-    independent; one whose input is not finite gives NaN.
+    Inputs are (N, size) float64, C-contiguous; outputs likewise, of the types that :func:`kernel` was given. Items are
+    independent; where an item's input is not finite, its float results are NaN.
     """
 
-    name: str
-    function: Callable[..., None]
-    compiled: bool
+    def __init__(self, name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str]) -> None:
+        self.name = name
+        self._pattern = pattern
+        self._derive = derive
+        self._types = types
+        self._graph: Graph | None = None
+        self._interpreter: Interpreter | None = None
+        self._function: CompiledFunction | None = None
+        self._looked_up = False
+        """Whether the cache has been asked for machine code."""
+        self._failed = False
+        """Whether there will be no machine code on this machine."""
+        self._items = 0
+        """What has been asked for in batches that are not small."""
 
     def __call__(
         self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]], threads: int = 1
     ) -> None:
-        """Fill ``outputs``; with several threads each takes a share of a large batch."""
+        """Fill ``outputs``; with several threads each takes a share of a large compiled batch."""
         count = len(inputs[0])
-        shares = min(threads, count // SHARE) if self.compiled else 1
+        function = self._function_for(count)
+        if function is None:
+            interpreter = self._interpreter or self._interpreted()
+            interpreter(parameters, inputs, outputs)
+            return
+        shares = min(threads, count // SHARE)
         if shares < 2:
-            self._run(parameters, (*inputs, *outputs))
+            function(parameters, inputs, outputs)
             return
         edges = np.linspace(0, count, shares + 1).astype(int)
-        parts = [tuple(array[start:stop] for array in (*inputs, *outputs)) for start, stop in pairwise(edges)]
-        pending = [_workers(shares - 1).submit(self._run, parameters, part) for part in parts[1:]]
-        self._run(parameters, parts[0])
+        parts = [([x[a:b] for x in inputs], [y[a:b] for y in outputs]) for a, b in pairwise(edges)]
+        pending = [_workers(shares - 1).submit(function, parameters, *part) for part in parts[1:]]
+        function(parameters, *parts[0])
         for share in pending:
             share.result()
 
-    def _run(self, parameters: Array, arrays: Sequence[NDArray[Any]]) -> None:
-        if self.compiled:
-            self.function(parameters, *arrays)
+    def compile(self) -> None:
+        """Have machine code from now on: from the cache, or compiled now."""
+        with _lock:
+            if self._function is None and not self._failed:
+                self._look_up()
+            if self._function is None and not self._failed:
+                self._compile()
+
+    def _function_for(self, count: int) -> CompiledFunction | None:
+        """Return the machine code for a batch, or None if it is to be interpreted."""
+        mode = kernel_mode()
+        if mode == "off" or (mode == "auto" and count < SMALL):
+            return None
+        if self._function is None and not self._failed:
+            self._items += count
+            if mode == "on" or self._items >= COMPILE_AFTER:
+                self.compile()
+            elif not self._looked_up:
+                with _lock:
+                    self._look_up()
+        return self._function
+
+    def _look_up(self) -> None:
+        """Take machine code from the cache, if it is there."""
+        if self._looked_up:
             return
-        with np.errstate(all="ignore"):
-            for start in range(0, len(arrays[0]), ARRAY_BLOCK):
-                self.function(parameters, *(array[start : start + ARRAY_BLOCK] for array in arrays))
+        self._looked_up = True
+        try:
+            from dhkit.kernels import machine_code, store
+
+            code = store.read(self.name, store.digest(self.name, self._pattern))
+            if code is not None:
+                self._function = machine_code.CompiledFunction(code)
+        except MACHINE_CODE_ERRORS as error:
+            self._give_up(error)
+
+    def _compile(self) -> None:
+        program = self._program()
+        log.info("compiling %s", self.name)
+        try:
+            from dhkit.kernels import machine_code, store
+            from dhkit.kernels.llvm_source import llvm_source
+
+            code = machine_code.compiled(llvm_source(program, self._types))
+            self._function = machine_code.CompiledFunction(code)
+        except MACHINE_CODE_ERRORS as error:
+            self._give_up(error)
+            return
+        store.write(self.name, store.digest(self.name, self._pattern), code)
+
+    def _give_up(self, error: Exception) -> None:
+        """Interpret from now on: a processor that LLVM does not know must never stop a computation."""
+        self._failed = True
+        log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
+
+    def _interpreted(self) -> Interpreter:
+        with _lock:
+            if self._interpreter is None:
+                from dhkit.kernels.interpreter import Interpreter
+
+                self._interpreter = Interpreter(self._program(), self._types)
+            return self._interpreter
+
+    def _program(self) -> Graph:
+        if self._graph is None:
+            self._graph = self._derive()
+        return self._graph
 
 
-def kernel(
-    name: str,
-    pattern: str,
-    derive: Callable[[], Graph],
-    types: Sequence[str] = ("float64",),
-    written_in: str | None = None,
-) -> Kernel:
-    """Return the kernel of a program: from this process, from the disk, or derived and compiled now.
+MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
+"""What llvmlite and the loader raise on a machine that they do not serve."""
+
+_kernels: dict[tuple[str, str], Kernel] = {}
+_pools: dict[int, ThreadPoolExecutor] = {}
+_lock = threading.RLock()
+"""Held while programs are derived, compiled and loaded, which neither CasADi nor LLVM do in two threads at once."""
+
+
+def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)) -> Kernel:
+    """Return the kernel of a program, the same one each time.
 
     Parameters
     ----------
     name, pattern
-        Together say which program it is: the kernel is found by them, and ``derive`` is only called when it is new.
+        Together say which program it is: ``derive`` is only called when it is new.
     derive
-        Returns the program; its first input holds the parameters.
+        Returns the program; its first input holds the parameters, which all items share.
     types
-        Of each output: float64, or uint8 for small whole numbers.
-    written_in
-        The file or folder that decides what is derived: the kernel is made anew when it changes. The file of
-        ``derive`` unless given.
+        Of each output: float64, or uint8 for whole numbers from 0 to 255.
     """
-    key = (name, pattern, compiling())
-    found = _kernels.get(key)
+    found = _kernels.get((name, pattern))
     if found is None:
         with _lock:
-            found = _kernels.get(key) or _made(name, pattern, derive, types, written_in)
-            _kernels[key] = found
+            found = _kernels.setdefault((name, pattern), Kernel(name, pattern, derive, types))
+            while len(_kernels) > KEPT:
+                del _kernels[next(iter(_kernels))]
     return found
-
-
-def _made(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str], written_in: str | None) -> Kernel:
-    if not compiling():
-        space: dict[str, Any] = {}
-        exec(compile(array_source(derive(), types), f"<{name}>", "exec"), space)  # noqa: S102 - text of our own making
-        return Kernel(name, space["kernel"], compiled=False)
-    key = store.digest(name, pattern, written_in or derive.__code__.co_filename)
-    function = store.load(name, key, lambda cache: loop_source(derive(), types, cache=cache))
-    return Kernel(name, function, compiled=True)
-
-
-_kernels: dict[tuple[str, str, bool], Kernel] = {}
-_pools: dict[int, ThreadPoolExecutor] = {}
-_lock = threading.RLock()
 
 
 def _workers(count: int) -> ThreadPoolExecutor:
@@ -122,11 +203,14 @@ def _workers(count: int) -> ThreadPoolExecutor:
 
 
 def _after_fork() -> None:
-    """Threads do not survive a fork, nor does whoever held the lock: the child makes its own."""
+    """Threads do not survive a fork: the child makes its own."""
     global _lock
     _lock = threading.RLock()
     _pools.clear()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
+    # A fork waits for what is being compiled: LLVM's own locks would stay closed in the child.
+    os.register_at_fork(
+        before=lambda: _lock.acquire(), after_in_parent=lambda: _lock.release(), after_in_child=_after_fork
+    )

@@ -1,126 +1,121 @@
-"""Compiled kernels on disk: a second process neither derives nor compiles."""
+"""Machine code of kernels on disk: a later process neither derives nor compiles."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import logging
 import os
-import sys
-import types
-from collections.abc import Callable
+import stat
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
 import platformdirs
 
 from dhkit.description import write_atomically
+from dhkit.errors import DhkitError
+from dhkit.kernels.machine_code import processor
 
-__all__ = ["cache_folder", "digest", "load"]
+__all__ = ["cache_folder", "digest", "read", "write"]
 
 log = logging.getLogger(__name__)
 
-END = "# end of kernel\n"
-"""The last line of a kernel's file."""
+PACKAGES = ("description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
+"""Of dhkit: every source that can decide what a kernel computes."""
+VERSIONS = ("casadi", "llvmlite", "numpy")
+"""Packages that programs and machine code are made with."""
 
 
 def cache_folder() -> Path | None:
-    """Return the user's own folder of kernels, made if missing: ``DHKIT_CACHE_DIR`` or the platform's cache folder.
+    """Return the user's own folder of kernels, made if missing: in ``DHKIT_CACHE_DIR`` or the platform's cache folder.
 
-    None where it cannot be written, or could be written by others: what lies in it is run.
+    None where it cannot be written, or where others could write to it or to a folder above it: what lies in it is run.
+
+    Raises
+    ------
+    DhkitError
+        ``DHKIT_CACHE_DIR`` names the home of a user that does not exist.
     """
     root = os.environ.get("DHKIT_CACHE_DIR") or platformdirs.user_cache_dir("dhkit", appauthor=False)
-    folder = Path(root).expanduser() / "kernels"
+    try:
+        folder = Path(os.path.abspath(Path(root).expanduser())) / "kernels"  # noqa: PTH100 - keeps symbolic links
+    except RuntimeError:
+        raise DhkitError(f"DHKIT_CACHE_DIR is {root!r}: there is no such user; expected a folder") from None
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
-    except OSError:
+        folder = folder.resolve()
+        foreign = next((level for level in (folder, *folder.parents) if _writable_by_others(level)), None)
+    except OSError as error:
+        log.info("kernels are not cached: %s: %s", folder, error.strerror)
         return None
-    if hasattr(os, "geteuid") and (status.st_uid != os.geteuid() or status.st_mode & 0o022):
-        log.warning("kernels are not cached: %s can be written by other users", folder)
+    if foreign is not None:
+        log.warning("kernels are not cached: %s can be written by other users", foreign)
         return None
     return folder if os.access(folder, os.W_OK | os.X_OK) else None
 
 
-def digest(name: str, pattern: str, derivation: str) -> str:
-    """Return what a kernel is found by: its function and pattern, the code that derives and compiles it, versions, CPU.
-
-    Parameters
-    ----------
-    name, pattern
-        What the kernel computes, and for which arms.
-    derivation
-        Path of the file, or of the folder of files, that derives it.
-    """
-    return hashlib.sha256("\0".join((name, pattern, _sources(derivation), _machine())).encode()).hexdigest()[:32]
+def _writable_by_others(folder: Path) -> bool:
+    """Return whether somebody else than this user and the administrator could put another folder in its place."""
+    if not hasattr(os, "geteuid"):
+        return False
+    status = folder.stat()
+    # In a sticky folder, such as /tmp, nobody can move what is another's.
+    open_to_all = status.st_mode & 0o022 and not status.st_mode & stat.S_ISVTX
+    return status.st_uid not in (0, os.geteuid()) or bool(open_to_all)
 
 
-def load(name: str, key: str, text: Callable[[bool], str]) -> Callable[..., None]:
-    """Return a kernel from the disk, or from new text; ``text(cached)`` derives it."""
+def digest(name: str, pattern: str) -> str:
+    """Return what a kernel is found by: its function and pattern, dhkit's sources, versions and the processor."""
+    return hashlib.sha256("\0".join((name, pattern, *_circumstances())).encode()).hexdigest()[:32]
+
+
+def read(name: str, key: str) -> bytes | None:
+    """Return a kernel's machine code, or None if it is not there, damaged, or not to be trusted."""
     folder = cache_folder()
     if folder is None:
-        return _in_memory(name, text)
-    path = folder / f"{name}_{key}.py"
-    known = _is_whole(path)
-    if not (known and any((folder / "__pycache__").glob(f"{path.stem}.kernel-*.nbc"))):
-        log.info("compiling %s for the first time; later processes load it from %s", name, folder)
-    new = "" if known else text(True)
+        return None
+    path = _path(folder, name, key)
     try:
-        if not known:
-            write_atomically(path, new + END)
-        return _from_file(path)
-    except Exception as error:
-        # A damaged or vanished cache must never stop a computation.
-        log.warning("the kernel cache in %s is unusable (%s): compiling in memory", folder, error)
-        for damaged in (path, *(folder / "__pycache__").glob(f"{path.stem}.*")):
-            damaged.unlink(missing_ok=True)
-        return _in_memory(name, text)
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        log.warning("%s: %s; the kernel is compiled anew", path, error.strerror)
+        return None
+    seal, code = content[: len(_seal(b""))], content[len(_seal(b"")) :]
+    if seal != _seal(code):
+        log.warning("%s: damaged; the kernel is compiled anew", path)
+        return None
+    return code
 
 
-def _is_whole(path: Path) -> bool:
-    """Return whether a kernel's text was written to its end: a full disk or a power cut may have left part of it."""
+def write(name: str, key: str, code: bytes) -> None:
+    """Keep a kernel's machine code for later processes; without a folder, or with a full disk, do nothing."""
+    folder = cache_folder()
+    if folder is None:
+        return
+    path = _path(folder, name, key)
     try:
-        return path.read_text(encoding="utf-8").endswith(END)
-    except (OSError, UnicodeDecodeError):
-        return False
+        if path.is_dir():
+            path.rename(path.with_suffix(f".{os.getpid()}.set-aside"))
+        write_atomically(path, _seal(code) + code)
+    except OSError as error:
+        log.warning("kernels are not cached: %s: %s", path, error.strerror)
 
 
-def _in_memory(name: str, text: Callable[[bool], str]) -> Callable[..., None]:
-    log.info("compiling %s", name)
-    module = types.ModuleType(f"dhkit_kernel_{name}")
-    exec(compile(text(False), f"<{module.__name__}>", "exec"), vars(module))  # noqa: S102 - text of our own making
-    function: Callable[..., None] = module.kernel
-    return function
+def _path(folder: Path, name: str, key: str) -> Path:
+    return folder / f"{name}_{key}.kernel"
 
 
-def _from_file(path: Path) -> Callable[..., None]:
-    name = f"dhkit_kernel_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no module")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # Numba looks there for the module of what it unpickles
-    spec.loader.exec_module(module)
-    function: Callable[..., None] = module.kernel
-    return function
+def _seal(code: bytes) -> bytes:
+    """Return what stands before machine code: a full disk or a power cut may have left part of it."""
+    return hashlib.sha256(code).digest()
 
 
 @cache
-def _sources(derivation: str) -> str:
-    here, own = Path(__file__).parent, Path(derivation)
-    total = hashlib.sha256()
-    symbolic = here.parent / "symbolic"
-    for folder in (here, symbolic / "differentiable", symbolic / "programs", own):
-        for path in sorted(folder.glob("*.py")) if folder.is_dir() else [folder]:
+def _circumstances() -> tuple[str, ...]:
+    root, total = Path(__file__).parents[1], hashlib.sha256()
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
             total.update(path.read_bytes())
-    return total.hexdigest()
-
-
-@cache
-def _machine() -> str:
-    import llvmlite.binding
-    import numba
-
-    cpu = f"{llvmlite.binding.get_host_cpu_name()} {sorted(llvmlite.binding.get_host_cpu_features().items())}"
-    return f"{sys.version} {numba.__version__} {np.__version__} {os.environ.get('NUMBA_CPU_NAME', cpu)}"
+    return (total.hexdigest(), *(f"{name} {version(name)}" for name in VERSIONS), *processor())

@@ -6,6 +6,7 @@ from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
+from dhkit.kinematics.kernels import kinematic_kernels
 from dhkit.kinematics.manipulability import (
     Ellipsoid,
     Motion,
@@ -57,6 +58,7 @@ __all__ = [
     "isotropy",
     "jacobian",
     "jacobian_dot",
+    "kinematic_kernels",
     "manipulability",
     "measures",
     "singular_configurations",

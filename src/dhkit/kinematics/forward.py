@@ -7,10 +7,10 @@ from functools import lru_cache
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import fill, kernel
+from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
-__all__ = ["forward_kinematics", "frames", "pattern_of"]
+__all__ = ["forward_kinematics", "frames", "frames_kernel", "tool_kernel"]
 
 
 def forward_kinematics(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
@@ -37,22 +37,28 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
     ValueError, TypeError
         q has not shape (..., n) or is not numeric; ``out`` does not fit.
     """
-    pattern, parameters = pattern_of(description)
-    run = kernel("forward_kinematics", pattern, lambda: _tool_graph(description))
+    run, parameters = tool_kernel(description)
     return fill(run, parameters, [joint_array(description, q)], (4, 4), out, threads)
 
 
 def frames(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`."""
-    pattern, parameters = pattern_of(description)
-    run = kernel("frames", pattern, lambda: _frames_graph(description))
+    run, parameters = frames_kernel(description)
     return fill(run, parameters, [joint_array(description, q)], (description.n + 1, 4, 4), out, threads)
 
 
 @lru_cache(maxsize=512)
-def pattern_of(description: Description) -> tuple[str, Array]:
-    """Return :func:`dhkit.symbolic.table_pattern`, worked out once for a description."""
-    return table_pattern(description)
+def tool_kernel(description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`forward_kinematics` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    return kernel("forward_kinematics", pattern, lambda: _tool_graph(description)), parameters
+
+
+@lru_cache(maxsize=512)
+def frames_kernel(description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`frames` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    return kernel("frames", pattern, lambda: _frames_graph(description)), parameters
 
 
 def _tool_graph(description: Description) -> Graph:

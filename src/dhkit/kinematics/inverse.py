@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -10,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import check_whole, kernel, pose_rows, result_array
-from dhkit.kinematics import closed_form
+from dhkit.kernels import Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
+from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
-__all__ = ["inverse_kinematics"]
+__all__ = ["inverse_kinematics", "solver_of"]
 
 
 def inverse_kinematics(
@@ -58,7 +56,7 @@ def inverse_kinematics(
     """
     check_whole("threads", threads, 1)
     poses = pose_rows(T)
-    solver = _solver(description)
+    solver = solver_of(description)
     if solver is None:
         return _solved_externally(description, poses, out, threads)
     fit = solver.fit
@@ -72,7 +70,6 @@ def inverse_kinematics(
     status = np.empty(batch, dtype=np.uint8)
     count = poses.size // 16
     if count:
-        run = kernel(solver.name, fit.structure, solver.program, OUTPUT_TYPES, closed_form.__path__[0])
         free = _free_angles(description, fit, seed, batch)
         rows = [
             q.reshape(count, B * n),
@@ -81,7 +78,7 @@ def inverse_kinematics(
             flags.reshape(count, B),
             status.reshape(count, 1),
         ]
-        run(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
+        solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
     numbers = description.numbers
     return IKSolutions(
         q=q,
@@ -119,17 +116,16 @@ def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, bat
 
 
 @dataclass(frozen=True)
-class _Solver:
-    """An arm's closed form, made ready for its kernel."""
+class Solver:
+    """An arm's closed form, made ready."""
 
-    name: str
     fit: Fit
+    kernel: Kernel
     parameters: Array
-    program: Callable[[], Graph]
 
 
 @lru_cache(maxsize=512)
-def _solver(description: Description) -> _Solver | None:
+def solver_of(description: Description) -> Solver | None:
     """Return an arm's closed form, or None where we have none."""
     found = classify(description)
     if found.family is None or found.fit is None:
@@ -137,15 +133,11 @@ def _solver(description: Description) -> _Solver | None:
     family, fit, numbers = found.family, found.fit, description.numbers
     prismatic = tuple(bool(slides) for slides in numbers.prismatic)
     limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
-    return _Solver(
-        name=f"ik_{family.name}",
-        fit=fit,
-        parameters=np.concatenate([fit.vector(), limits]),
-        program=lambda: _derived(family, fit, prismatic),
-    )
 
+    def derived() -> Graph:
+        from dhkit.kinematics.closed_form.program import program
 
-def _derived(family: Family, fit: Fit, prismatic: tuple[bool, ...]) -> Graph:
-    from dhkit.kinematics.closed_form.program import program
+        return program(family, fit, prismatic)
 
-    return program(family, fit, prismatic)
+    solver = kernel(f"ik_{family.name}", fit.structure, derived, OUTPUT_TYPES)
+    return Solver(fit, solver, np.concatenate([fit.vector(), limits]))

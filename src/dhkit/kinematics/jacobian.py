@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import fill, kernel
-from dhkit.kinematics.forward import pattern_of
-from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols
+from dhkit.kernels import Kernel, fill, kernel
+from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols, table_pattern
 from dhkit.symbolic import jacobian as symbolic_jacobian
 from dhkit.symbolic import jacobian_dot as symbolic_jacobian_dot
 
-__all__ = ["ReferenceAxes", "jacobian", "jacobian_dot"]
+__all__ = ["ReferenceAxes", "jacobian", "jacobian_dot", "jacobian_dot_kernel", "jacobian_kernel"]
 
 
 def jacobian(
@@ -46,8 +47,7 @@ def jacobian(
         q has not shape (..., n); another frame; ``out`` does not fit.
     """
     _check_frame(frame)
-    pattern, parameters = pattern_of(description)
-    run = kernel(f"jacobian_{frame}", pattern, lambda: _graph(description, frame))
+    run, parameters = jacobian_kernel(description, frame)
     return fill(run, parameters, [joint_array(description, q)], (6, description.n), out, threads)
 
 
@@ -81,10 +81,23 @@ def jacobian_dot(
         As for :func:`jacobian`.
     """
     _check_frame(frame)
-    pattern, parameters = pattern_of(description)
-    run = kernel(f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame))
+    run, parameters = jacobian_dot_kernel(description, frame)
     states = [joint_array(description, q), joint_array(description, qd, "qd")]
     return fill(run, parameters, states, (6, description.n), out, threads)
+
+
+@lru_cache(maxsize=1024)
+def jacobian_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`jacobian` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    return kernel(f"jacobian_{frame}", pattern, lambda: _graph(description, frame)), parameters
+
+
+@lru_cache(maxsize=1024)
+def jacobian_dot_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`jacobian_dot` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    return kernel(f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame)), parameters
 
 
 def _check_frame(frame: str) -> None:

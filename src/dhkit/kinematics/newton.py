@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
-from dhkit.kernels import kernel
+from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.symbolic import Graph
 
-__all__ = ["Newton"]
-
-PROGRAMS = str(Path(__file__).with_name("newton_program.py"))
+__all__ = ["Newton", "error_kernel", "step_kernel"]
 
 TURN = 2 * np.pi
 
@@ -95,7 +92,7 @@ class Newton:
         """
         T = forward_kinematics(self.description, q, threads=self.threads).reshape(-1, 16)
         error = np.empty((len(q), self.size))
-        run = kernel("pose_error", f"{self.size}", lambda: _error_program(self.size), written_in=PROGRAMS)
+        run = error_kernel(self.size)
         run(np.array([self.length]), [T, goals], [error], self.threads)
         return error
 
@@ -114,19 +111,29 @@ class Newton:
         n = self.description.n
         J = jacobian(self.description, q, threads=self.threads).reshape(-1, 6 * n)
         new = np.empty_like(q)
-        run = kernel("newton_step", f"{n} {self.size}", lambda: _step_program(n, self.size), written_in=PROGRAMS)
+        run = step_kernel(n, self.size)
         parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
         run(parameters, [q, error, J, damping[:, None]], [new], self.threads)
         return new
 
 
-def _error_program(size: int) -> Graph:
-    from dhkit.kinematics.newton_program import error_program
+def error_kernel(size: int) -> Kernel:
+    """Return the kernel of :meth:`Newton.error` for 6 coordinates of a pose, or 3."""
 
-    return error_program(size)
+    def derived() -> Graph:
+        from dhkit.kinematics.newton_program import error_program
+
+        return error_program(size)
+
+    return kernel("pose_error", f"{size}", derived)
 
 
-def _step_program(n: int, size: int) -> Graph:
-    from dhkit.kinematics.newton_program import step_program
+def step_kernel(n: int, size: int) -> Kernel:
+    """Return the kernel of :meth:`Newton.step` for n joints and 6 coordinates of a pose, or 3."""
 
-    return step_program(n, size)
+    def derived() -> Graph:
+        from dhkit.kinematics.newton_program import step_program
+
+        return step_program(n, size)
+
+    return kernel("newton_step", f"{n} {size}", derived)

@@ -1,39 +1,50 @@
 """An arm's mechanics as expressions: CasADi frames and Jacobians, straight-line programs, and their source text."""
 
-from dhkit.symbolic.differentiable.bodies import Moments
-from dhkit.symbolic.differentiable.casadi_functions import CasadiFunctions
-from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
-from dhkit.symbolic.differentiable.energies import (
-    kinetic_energy,
-    lagrange_coriolis_matrix,
-    lagrange_gravity_torque,
-    lagrange_inverse_dynamics,
-    lagrange_mass_matrix,
-    lagrange_torque,
-    potential_energy,
-)
-from dhkit.symbolic.differentiable.forward_dynamics import SINGULAR, recursive_forward_dynamics, solve_for_acceleration
-from dhkit.symbolic.differentiable.frames import (
-    ReferenceAxes,
-    SymbolicTable,
-    jacobian,
-    jacobian_dot,
-    joint_symbols,
-    table_pattern,
-)
-from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
-from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern
-from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
-from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
-from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
-from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
-from dhkit.symbolic.exact.regressor import Regressor
-from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
-from dhkit.symbolic.programs.graph import Graph, Node, Variable
-from dhkit.symbolic.programs.operations import operation_count
-from dhkit.symbolic.programs.printers import c_source, export_c, python_lines
-from dhkit.symbolic.ring.elements import Element, Elements, RingError
-from dhkit.symbolic.textbook import TextbookDerivation, derive
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dhkit.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from dhkit.symbolic.differentiable.bodies import Moments
+    from dhkit.symbolic.differentiable.casadi_functions import CasadiFunctions
+    from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+    from dhkit.symbolic.differentiable.energies import (
+        kinetic_energy,
+        lagrange_coriolis_matrix,
+        lagrange_gravity_torque,
+        lagrange_inverse_dynamics,
+        lagrange_mass_matrix,
+        lagrange_torque,
+        potential_energy,
+    )
+    from dhkit.symbolic.differentiable.forward_dynamics import (
+        SINGULAR,
+        recursive_forward_dynamics,
+        solve_for_acceleration,
+    )
+    from dhkit.symbolic.differentiable.frames import (
+        ReferenceAxes,
+        SymbolicTable,
+        jacobian,
+        jacobian_dot,
+        joint_symbols,
+        table_pattern,
+    )
+    from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
+    from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern
+    from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+    from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
+    from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
+    from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
+    from dhkit.symbolic.exact.regressor import Regressor
+    from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
+    from dhkit.symbolic.programs.graph import Graph, Node, Variable
+    from dhkit.symbolic.programs.operations import operation_count
+    from dhkit.symbolic.programs.printers import c_source, export_c
+    from dhkit.symbolic.ring.elements import Element, Elements, RingError
+    from dhkit.symbolic.textbook import TextbookDerivation, derive
 
 __all__ = [
     "MISTAKES",
@@ -81,7 +92,6 @@ __all__ = [
     "lagrangian",
     "operation_count",
     "potential_energy",
-    "python_lines",
     "recursive_bias",
     "recursive_forward_dynamics",
     "recursive_gravity",
@@ -90,3 +100,91 @@ __all__ = [
     "solve_for_acceleration",
     "table_pattern",
 ]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "dhkit.symbolic.differentiable.bodies": ("Moments",),
+        "dhkit.symbolic.differentiable.casadi_functions": ("CasadiFunctions",),
+        "dhkit.symbolic.differentiable.composite_bodies": (
+            "composite_coriolis_matrix",
+            "composite_mass_matrix",
+        ),
+        "dhkit.symbolic.differentiable.energies": (
+            "kinetic_energy",
+            "lagrange_coriolis_matrix",
+            "lagrange_gravity_torque",
+            "lagrange_inverse_dynamics",
+            "lagrange_mass_matrix",
+            "lagrange_torque",
+            "potential_energy",
+        ),
+        "dhkit.symbolic.differentiable.forward_dynamics": (
+            "SINGULAR",
+            "recursive_forward_dynamics",
+            "solve_for_acceleration",
+        ),
+        "dhkit.symbolic.differentiable.frames": (
+            "ReferenceAxes",
+            "SymbolicTable",
+            "jacobian",
+            "jacobian_dot",
+            "joint_symbols",
+            "table_pattern",
+        ),
+        "dhkit.symbolic.differentiable.friction": (
+            "Friction",
+            "friction_torque",
+            "smooth_direction",
+        ),
+        "dhkit.symbolic.differentiable.inertial_table": (
+            "InertialTable",
+            "inertial_pattern",
+        ),
+        "dhkit.symbolic.differentiable.recursive": (
+            "recursive_bias",
+            "recursive_gravity",
+            "recursive_inverse_dynamics",
+        ),
+        "dhkit.symbolic.exact.base_parameters": (
+            "BaseParameters",
+            "base_parameters",
+        ),
+        "dhkit.symbolic.exact.exact_arm": (
+            "ExactArm",
+            "Symbols",
+            "exact_arm",
+        ),
+        "dhkit.symbolic.exact.lagrangian": (
+            "Lagrangian",
+            "Proof",
+            "lagrangian",
+        ),
+        "dhkit.symbolic.exact.regressor": ("Regressor",),
+        "dhkit.symbolic.mistakes": (
+            "MISTAKES",
+            "MadeAt",
+            "Mistake",
+            "Subject",
+        ),
+        "dhkit.symbolic.programs.graph": (
+            "Graph",
+            "Node",
+            "Variable",
+        ),
+        "dhkit.symbolic.programs.operations": ("operation_count",),
+        "dhkit.symbolic.programs.printers": (
+            "c_source",
+            "export_c",
+        ),
+        "dhkit.symbolic.ring.elements": (
+            "Element",
+            "Elements",
+            "RingError",
+        ),
+        "dhkit.symbolic.textbook": (
+            "TextbookDerivation",
+            "derive",
+        ),
+    },
+)

@@ -164,6 +164,16 @@ class Graph:
             results,
         )
 
+    @property
+    def angle_pairs(self) -> dict[int, tuple[int, int]]:
+        """Of each angle's node, the nodes of its sine and its cosine; -1 for one that nobody needs."""
+        pairs: dict[int, tuple[int, int]] = {}
+        for k, node in enumerate(self.nodes):
+            if node.operation in ("sin", "cos"):
+                sine, cosine = pairs.get(node.arguments[0], (-1, -1))
+                pairs[node.arguments[0]] = (k, cosine) if node.operation == "sin" else (sine, k)
+        return pairs
+
     def renamed(self, name: str) -> Graph:
         """Return the same program under another name."""
         return replace(self, name=name)

@@ -1,17 +1,17 @@
-"""Straight-line programs as source text: Python lines for kernels and NumPy, and C99."""
+"""Straight-line programs as C99."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.description import write_atomically
 from dhkit.symbolic.programs.graph import Graph, Node
 
-__all__ = ["c_source", "export_c", "python_lines"]
+__all__ = ["c_source", "export_c"]
 
-PYTHON = {
+C = {
     "add": "{} + {}",
     "subtract": "{} - {}",
     "multiply": "{} * {}",
@@ -21,12 +21,6 @@ PYTHON = {
     "less_equal": "{} <= {}",
     "equal": "{} == {}",
     "unequal": "{} != {}",
-    "logical_and": "{} & {}",
-    "logical_or": "{} | {}",
-}
-"""Operations with a sign; the others are calls of a function of their name."""
-
-C = PYTHON | {
     "absolute": "fabs({})",
     "floor": "floor({})",
     "sqrt": "sqrt({})",
@@ -40,44 +34,8 @@ C = PYTHON | {
     "logical_not": "!{}",
     "select": "{} ? {} : {}",
 }
-
-
+"""Operations in C."""
 C_NUMBERS = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
-
-
-def python_lines(graph: Graph, load: Callable[[int, int], str], store: Callable[[int, int, str], str]) -> Iterator[str]:
-    """Yield assignments ``v0 = ...``; sine and cosine of one angle are one call of ``sincos``.
-
-    The text knows ``nan`` and ``inf``, and a function for every operation that has no sign.
-
-    Parameters
-    ----------
-    graph
-        The program.
-    load
-        Text that reads an entry of an input, from its number and the entry's.
-    store
-        A line that writes an entry of an output, from its number, the entry's and the text of the value.
-    """
-    pairs = _angle_pairs(graph)
-    written: set[int] = set()
-    for k, node in enumerate(graph.nodes):
-        if node.operation == "constant" or k in written:
-            continue
-        if node.operation in ("sin", "cos"):
-            sine, cosine = pairs[node.arguments[0]]
-            written |= {sine, cosine}
-            targets = ", ".join(f"v{place}" if place >= 0 else "_" for place in (sine, cosine))
-            yield f"{targets} = sincos({_python_value(graph, node.arguments[0])})"
-        elif node.operation == "input":
-            yield f"v{k} = {load(*node.arguments)}"
-        else:
-            arguments = [_python_value(graph, j) for j in node.arguments]
-            pattern = PYTHON.get(node.operation, f"{node.operation}({', '.join(['{}'] * len(arguments))})")
-            yield f"v{k} = {pattern.format(*arguments)}"
-    for output, entries in enumerate(graph.results):
-        for entry, k in enumerate(entries):
-            yield store(output, entry, _python_value(graph, k))
 
 
 def c_source(graph: Graph) -> str:
@@ -129,21 +87,6 @@ def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str
     body = "\n".join(c_source(graph) for graph in graphs)
     write_atomically(source, f'/* {comment} */\n#include "{name}.h"\n\n#include <math.h>\n\n{body}')
     return source, header
-
-
-def _angle_pairs(graph: Graph) -> dict[int, tuple[int, int]]:
-    """Return where the sine and the cosine of each angle are, -1 for one that nobody needs."""
-    pairs: dict[int, tuple[int, int]] = {}
-    for k, node in enumerate(graph.nodes):
-        if node.operation in ("sin", "cos"):
-            sine, cosine = pairs.get(node.arguments[0], (-1, -1))
-            pairs[node.arguments[0]] = (k, cosine) if node.operation == "sin" else (sine, k)
-    return pairs
-
-
-def _python_value(graph: Graph, k: int) -> str:
-    node = graph.nodes[k]
-    return f"({node.value!r})" if node.operation == "constant" else f"v{k}"
 
 
 def _c_expression(graph: Graph, node: Node) -> str:

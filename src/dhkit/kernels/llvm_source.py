@@ -1,0 +1,257 @@
+"""A kernel as text of LLVM's intermediate representation: a straight-line program over structure-of-arrays blocks."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import TypeAlias
+
+from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
+from dhkit.kernels.vectors import VECTOR, WIDTH, Body, Mask, Vector, absolute, constant, floor, select, sqrt
+from dhkit.symbolic import Graph
+
+__all__ = ["BLOCK", "FLOAT", "SMALL_INTEGER", "llvm_source"]
+
+BLOCK = 64
+"""Items of one block: 8 vectors of 8 doubles; all rows of a block, inverse kinematics included, fit the first cache."""
+
+FLOAT, SMALL_INTEGER = "float64", "uint8"
+"""Types of an output's entries, by NumPy's names."""
+STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
+"""The same by LLVM's names."""
+
+Value: TypeAlias = Vector | Mask
+
+NUMERIC: Mapping[str, Callable[..., Value]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "negate": operator.neg,
+    "absolute": absolute,
+    "floor": floor,
+    "sqrt": sqrt,
+    "atan2": atan2,
+    "minimum": minimum,
+    "maximum": maximum,
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "equal": Vector.equals,
+    "unequal": Vector.differs,
+}
+"""Operations of a program on numbers."""
+LOGICAL: Mapping[str, Callable[..., Mask]] = {
+    "logical_and": operator.and_,
+    "logical_or": operator.or_,
+    "logical_not": operator.invert,
+}
+"""Operations on truth values."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the entries of a program's variables lie in the rows of a block, each ``BLOCK`` doubles long."""
+
+    graph: Graph
+
+    @property
+    def inputs(self) -> list[int]:
+        """The first row of each input behind the parameters, and the row after the last."""
+        return [0, *accumulate(variable.size for variable in self.graph.inputs[1:])]
+
+    @property
+    def outputs(self) -> list[int]:
+        """The first row of each output, and the row after the last."""
+        start = self.inputs[-1]
+        return [start, *(start + x for x in accumulate(variable.size for variable in self.graph.outputs))]
+
+
+def llvm_source(graph: Graph, types: Sequence[str]) -> str:
+    """Return a module with ``void kernel(double *parameters, void **arrays, double *work, int64 count)``.
+
+    ``arrays`` holds the addresses of inputs, then outputs: (count, size) each, row by row. They are transposed block by
+    block in ``work`` (``BLOCK`` doubles for each of their columns, aligned to 64 bytes), so that every load and store
+    of the program is of neighbouring items. Where an item's input is not finite, its float results are NaN.
+
+    Parameters
+    ----------
+    graph
+        The program; its first input holds the parameters, which all items share.
+    types
+        Of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
+    """
+    layout, body = Layout(graph), Body()
+    results = _results(graph, layout, body, types)
+    inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
+    outputs = [f"%y{k}" for k in range(len(graph.outputs))]
+    lines = [
+        *(f"declare {VECTOR} @llvm.{name}.v{WIDTH}f64({VECTOR})" for name in ("fabs", "sqrt", "floor")),
+        "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
+        "entry:",
+        *(line for k, name in enumerate((*inputs, *outputs)) for line in _array(k, name)),
+        *(line for k in range(graph.inputs[0].size) for line in _broadcast(k)),
+        "  br label %block",
+        "block:",
+        "  %start = phi i64 [0, %entry], [%next_start, %written]",
+        "  %left = sub i64 %count, %start",
+        f"  %partial = icmp slt i64 %left, {BLOCK}",
+        f"  %size = select i1 %partial, i64 %left, i64 {BLOCK}",
+        "  br label %read0",
+    ]
+    for k, name in enumerate(inputs):
+        before = f"read{k - 1}_end" if k else "block"
+        lines += _copied(f"read{k}", before, name, graph.inputs[k + 1].size, layout.inputs[k], "double", reading=True)
+        lines += [f"  br label %{f'read{k + 1}' if k + 1 < len(inputs) else 'compute'}"]
+    lines += [
+        "compute:",
+        f"  %item = phi i64 [0, %read{len(inputs) - 1}_end], [%next_item, %compute]",
+        *body.lines,
+        *results,
+        f"  %next_item = add i64 %item, {WIDTH}",
+        "  %computing = icmp slt i64 %next_item, %size",
+        "  br i1 %computing, label %compute, label %write0",
+    ]
+    for k, name in enumerate(outputs):
+        before = f"write{k - 1}_end" if k else "compute"
+        kind = STORED[types[k]]
+        lines += _copied(f"write{k}", before, name, graph.outputs[k].size, layout.outputs[k], kind, reading=False)
+        lines += [f"  br label %{f'write{k + 1}' if k + 1 < len(outputs) else 'written'}"]
+    lines += [
+        "written:",
+        f"  %next_start = add i64 %start, {BLOCK}",
+        "  %more = icmp slt i64 %next_start, %count",
+        "  br i1 %more, label %block, label %end",
+        "end:",
+        "  ret void",
+        "}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _results(graph: Graph, layout: Layout, body: Body, types: Sequence[str]) -> list[str]:
+    """Write the program's operations into ``body`` and return the lines that store its results."""
+    rows = [
+        [_loaded(body, start + entry) for entry in range(variable.size)]
+        for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False)
+    ]
+    values = _computed(graph, body, rows)
+    missing: Vector | None = None  # 0, or NaN where an input is not finite
+    for x in (entry for row in rows for entry in row):
+        missing = x - x if missing is None else missing + (x - x)
+    lines = []
+    for k, entries in enumerate(graph.results):
+        for entry, place in enumerate(entries):
+            result = _number(values[place])
+            if types[k] == FLOAT and missing is not None:
+                result = result + missing
+            address = _address(body, layout.outputs[k] + entry)
+            lines.append(f"  store {VECTOR} {result.name}, ptr {address}, align 64")
+    return lines
+
+
+def _computed(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[Value]:
+    """Return the value of every node."""
+    values: dict[int, Value] = {}
+    pairs = graph.angle_pairs
+    for k, node in enumerate(graph.nodes):
+        if node.operation == "constant":
+            values[k] = Vector(body, constant(node.value))
+        elif node.operation == "input":
+            variable, entry = node.arguments
+            values[k] = Vector(body, f"%p{entry}") if variable == 0 else rows[variable - 1][entry]
+        elif node.operation in ("sin", "cos"):
+            if k not in values:
+                angle = node.arguments[0]
+                values |= dict(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
+        else:
+            values[k] = _applied(node.operation, [values[j] for j in node.arguments])
+    return [values[k] for k in range(len(graph.nodes))]
+
+
+def _applied(operation: str, arguments: Sequence[Value]) -> Value:
+    if operation == "select":
+        condition, true, false = arguments
+        return select(_mask(condition), _number(true), _number(false))
+    if operation in LOGICAL:
+        return LOGICAL[operation](*map(_mask, arguments))
+    return NUMERIC[operation](*map(_number, arguments))
+
+
+def _number(value: Value) -> Vector:
+    """Return a value as numbers: 1 where a truth value holds, else 0."""
+    return value if isinstance(value, Vector) else select(value, Vector(value.body, constant(1.0)), 0.0)
+
+
+def _mask(value: Value) -> Mask:
+    """Return a value as truth values: a number other than 0 is true."""
+    return value if isinstance(value, Mask) else value.differs(0.0)
+
+
+def _broadcast(k: int) -> Iterator[str]:
+    """Yield the lines that put a parameter into all lanes of ``%pK``."""
+    yield f"  %p{k}_at = getelementptr double, ptr %parameters, i64 {k}"
+    yield f"  %p{k}_value = load double, ptr %p{k}_at"
+    yield f"  %p{k}_lane = insertelement {VECTOR} poison, double %p{k}_value, i64 0"
+    yield f"  %p{k} = shufflevector {VECTOR} %p{k}_lane, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer"
+
+
+def _array(k: int, name: str) -> Iterator[str]:
+    """Yield the lines that read an array's address."""
+    yield f"  {name}_at = getelementptr ptr, ptr %arrays, i64 {k}"
+    yield f"  {name} = load ptr, ptr {name}_at"
+
+
+def _address(body: Body, row: int) -> str:
+    """Return where a row's entries of the vector that is worked on begin."""
+    return body.define(f"getelementptr double, ptr {_row(body, row)}, i64 %item")
+
+
+def _row(body: Body, row: int) -> str:
+    return body.define(f"getelementptr double, ptr %work, i64 {row * BLOCK}")
+
+
+def _loaded(body: Body, row: int) -> Vector:
+    return Vector(body, body.define(f"load {VECTOR}, ptr {_address(body, row)}, align 64"))
+
+
+def _copied(label: str, before: str, array: str, size: int, row: int, kind: str, *, reading: bool) -> Iterator[str]:
+    """Yield a loop over a block's items that copies rows of ``array`` into the block, or back.
+
+    Parameters
+    ----------
+    label
+        Of the loop; it ends in LABEL_end, which the caller closes by a jump.
+    before
+        The label that jumps here.
+    array, size
+        The array's pointer and how many entries an item has.
+    row
+        The block's first row of the array.
+    kind
+        LLVM's type of the array's entries.
+    reading
+        Whether the block is read into; otherwise it is written back.
+    """
+    yield f"{label}:"
+    yield f"  %{label}_i = phi i64 [0, %{before}], [%{label}_next, %{label}]"
+    yield f"  %{label}_item = add i64 %start, %{label}_i"
+    yield f"  %{label}_offset = mul i64 %{label}_item, {size}"
+    yield f"  %{label}_entries = getelementptr {kind}, ptr {array}, i64 %{label}_offset"
+    yield f"  %{label}_column = getelementptr double, ptr %work, i64 %{label}_i"
+    for k in range(size):
+        outer, inner, value = f"%{label}_outer{k}", f"%{label}_inner{k}", f"%{label}_value{k}"
+        yield f"  {outer} = getelementptr {kind}, ptr %{label}_entries, i64 {k}"
+        yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {(row + k) * BLOCK}"
+        yield f"  {value} = load double, ptr {outer if reading else inner}"
+        if kind != "double":
+            # In two steps: the instruction of the processor is one to 32 bits.
+            yield f"  {value}_wide = fptosi double {value} to i32"
+            value = f"{value}_whole"
+            yield f"  {value} = trunc i32 %{label}_value{k}_wide to {kind}"
+        yield f"  store {kind} {value}, ptr {inner if reading else outer}"
+    yield f"  %{label}_next = add i64 %{label}_i, 1"
+    yield f"  %{label}_more = icmp slt i64 %{label}_next, %size"
+    yield f"  br i1 %{label}_more, label %{label}, label %{label}_end"
+    yield f"{label}_end:"

@@ -1,0 +1,138 @@
+"""Vectors of doubles as values of LLVM's intermediate representation: operators write lines of a straight-line body."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+__all__ = ["WIDTH", "Body", "Mask", "Number", "Vector", "absolute", "constant", "floor", "select", "sqrt"]
+
+WIDTH = 8
+"""Doubles of one vector: a register of AVX-512, two of AVX, four of SSE and NEON."""
+VECTOR, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
+
+LIBERTIES = "contract nsz"
+"""What LLVM may do: fuse products into sums, and drop the sign of zero. NaN must survive, so nothing else."""
+
+
+@dataclass
+class Body:
+    """The lines written so far; each defines one value."""
+
+    lines: list[str] = field(default_factory=list)
+
+    def define(self, instruction: str) -> str:
+        """Append an instruction and return the name of its value."""
+        name = f"%v{len(self.lines)}"
+        self.lines.append(f"  {name} = {instruction}")
+        return name
+
+
+@dataclass(frozen=True, eq=False)
+class Vector:
+    """``WIDTH`` doubles. Comparisons with ``<``, ``<=``, :meth:`equals` and :meth:`differs` return a :class:`Mask`."""
+
+    body: Body
+    name: str
+    """Of the value, or the text of a constant."""
+
+    def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
+        first, second = self.name, _text(other)
+        return self.body.define(f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}")
+
+    def __add__(self, other: Number) -> Vector:
+        return Vector(self.body, self._with(f"fadd {LIBERTIES}", other))
+
+    def __sub__(self, other: Number) -> Vector:
+        return Vector(self.body, self._with(f"fsub {LIBERTIES}", other))
+
+    def __mul__(self, other: Number) -> Vector:
+        return Vector(self.body, self._with(f"fmul {LIBERTIES}", other))
+
+    def __truediv__(self, other: Number) -> Vector:
+        return Vector(self.body, self._with(f"fdiv {LIBERTIES}", other))
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __rsub__(self, other: Number) -> Vector:
+        return Vector(self.body, self._with(f"fsub {LIBERTIES}", other, swapped=True))
+
+    def __neg__(self) -> Vector:
+        return Vector(self.body, self.body.define(f"fneg {LIBERTIES} {VECTOR} {self.name}"))
+
+    # Ordered comparisons are false of NaN; ``differs`` is true of it.
+
+    def __lt__(self, other: Number) -> Mask:
+        return Mask(self.body, self._with("fcmp olt", other))
+
+    def __le__(self, other: Number) -> Mask:
+        return Mask(self.body, self._with("fcmp ole", other))
+
+    def __gt__(self, other: Number) -> Mask:
+        return Mask(self.body, self._with("fcmp ogt", other))
+
+    def equals(self, other: Number) -> Mask:
+        """Return where two vectors are equal."""
+        return Mask(self.body, self._with("fcmp oeq", other))
+
+    def differs(self, other: Number) -> Mask:
+        """Return where two vectors are not equal."""
+        return Mask(self.body, self._with("fcmp une", other))
+
+    def call(self, intrinsic: str) -> Vector:
+        """Return one of LLVM's functions of one number: fabs, sqrt or floor."""
+        function = f"@llvm.{intrinsic}.v{WIDTH}f64({VECTOR} {self.name})"
+        return Vector(self.body, self.body.define(f"call {LIBERTIES} {VECTOR} {function}"))
+
+
+Number: TypeAlias = Vector | float
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """``WIDTH`` truth values."""
+
+    body: Body
+    name: str
+
+    def __and__(self, other: Mask) -> Mask:
+        return Mask(self.body, self.body.define(f"and {MASK} {self.name}, {other.name}"))
+
+    def __or__(self, other: Mask) -> Mask:
+        return Mask(self.body, self.body.define(f"or {MASK} {self.name}, {other.name}"))
+
+    def __invert__(self) -> Mask:
+        return Mask(self.body, self.body.define(f"xor {MASK} {self.name}, splat (i1 true)"))
+
+
+def constant(value: float) -> str:
+    """Return a double as LLVM's text: its bits, as the value of all lanes."""
+    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+    return f"splat (double 0x{bits:016X})"
+
+
+def _text(number: Number) -> str:
+    return number.name if isinstance(number, Vector) else constant(number)
+
+
+def select(condition: Mask, true: Number, false: Number) -> Vector:
+    """Return one of two values in each lane, without a branch."""
+    body = condition.body
+    choice = f"select {LIBERTIES} {MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
+    return Vector(body, body.define(choice))
+
+
+def absolute(x: Vector) -> Vector:
+    """Return the absolute value."""
+    return x.call("fabs")
+
+
+def floor(x: Vector) -> Vector:
+    """Return the greatest integer that is not above x."""
+    return x.call("floor")
+
+
+def sqrt(x: Vector) -> Vector:
+    """Return the square root, NaN below 0."""
+    return x.call("sqrt")

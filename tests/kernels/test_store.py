@@ -1,0 +1,239 @@
+"""Machine code on disk: found by later processes, made anew when damaged, and never shared with strangers."""
+
+import errno
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conftest import require
+from dhkit.errors import DhkitError
+from dhkit.kernels import store
+
+CALL = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, format="%(name)s %(message)s", stream=sys.stderr)
+import dhkit, numpy as np
+arm = dhkit.Arm.load("planar2r")
+q = np.random.default_rng(0).normal(size=(70_000, 2))
+T = arm.fk(q)
+a1, a2 = arm.description.numbers.a
+assert abs(T[:, 0, 3] - a1 * np.cos(q[:, 0]) - a2 * np.cos(q.sum(axis=1))).max() < 1e-14
+print(*sorted({"casadi", "numba", "llvmlite"} & set(sys.modules)))
+"""
+
+
+def in_new_process(code, folder, **environment):
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "DHKIT_CACHE_DIR": str(folder), **environment},
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def test_the_second_process_neither_derives_nor_compiles(tmp_path):
+    first = in_new_process(CALL, tmp_path)
+    assert first.stderr.count("compiling forward_kinematics") == 1
+    assert first.stdout.split() == ["casadi", "llvmlite"]
+    second = in_new_process(CALL, tmp_path)
+    assert "compiling" not in second.stderr
+    assert second.stdout.split() == ["llvmlite"]
+    assert (tmp_path / "kernels").stat().st_mode & 0o777 == 0o700
+
+
+def test_switched_off_nothing_is_compiled_or_written(tmp_path):
+    done = in_new_process(CALL, tmp_path, DHKIT_KERNELS="off")
+    assert done.stdout.split() == ["casadi"]
+    assert not list(Path(tmp_path).rglob("*"))
+
+
+def damage(path, how):
+    whole = path.read_bytes()
+    path.unlink()
+    if how == "folder":
+        (path / "with something in it").mkdir(parents=True)
+    elif how == "unreadable":
+        path.symlink_to("nowhere")
+    else:
+        path.write_bytes(
+            {
+                "empty": b"",
+                "half": whole[: len(whole) // 2],
+                "one bit": whole[:-9] + bytes([whole[-9] ^ 4]) + whole[-8:],
+                "longer": whole + b"\0",
+                "Python": b"raise SystemExit",
+                "number": b"kernel = 1\n",
+            }[how]
+        )
+    return whole
+
+
+@pytest.mark.parametrize("how", ["empty", "half", "one bit", "longer", "Python", "number", "folder", "unreadable"])
+def test_a_damaged_entry_is_made_anew(tmp_path, how):
+    in_new_process(CALL, tmp_path)
+    (path,) = (tmp_path / "kernels").glob("forward_kinematics_*.kernel")
+    whole = damage(path, how)
+    again = in_new_process(CALL, tmp_path)
+    assert again.stderr.count("compiling forward_kinematics") == 1
+    assert path.read_bytes() == whole
+    assert "compiling" not in in_new_process(CALL, tmp_path).stderr
+
+
+def test_every_source_that_can_matter_is_in_the_key(tmp_path, monkeypatch):
+    """Among them what closed forms bake in: the numbers of statuses and flags."""
+    root = tmp_path / "dhkit"
+    shutil.copytree(Path(store.__file__).parents[1], root, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    monkeypatch.setattr(store, "__file__", str(root / "kernels" / "store.py"))
+
+    def key():
+        store._circumstances.cache_clear()
+        return store.digest("ik", "")
+
+    before = key()
+    for place in (
+        "kinematics/solutions.py",
+        "kinematics/closed_form/program.py",
+        "kinematics/newton_program.py",
+        "dynamics/loads.py",
+        "description/poses.py",
+        "symbolic/differentiable/frames.py",
+        "symbolic/programs/graph.py",
+        "kernels/elementary.py",
+    ):
+        path = root / place
+        path.write_text(path.read_text() + "\n# changed\n")
+        now = key()
+        assert now != before, place
+        before = now
+    monkeypatch.undo()
+    store._circumstances.cache_clear()
+    assert store.digest("ik", "") != store.digest("ik", "x")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.parametrize("level", ["kernels", "cache", "above"])
+@pytest.mark.parametrize("mode", [0o777, 0o770])
+def test_a_folder_that_others_can_write_is_not_used(tmp_path, monkeypatch, caplog, level, mode):
+    cache = tmp_path / "above" / "cache"
+    (cache / "kernels").mkdir(mode=0o700, parents=True)
+    monkeypatch.setenv("DHKIT_CACHE_DIR", str(cache))
+    assert store.cache_folder() == cache / "kernels"
+    open_folder = {"kernels": cache / "kernels", "cache": cache, "above": tmp_path / "above"}[level]
+    open_folder.chmod(mode)
+    assert store.cache_folder() is None
+    assert f"{open_folder} can be written by other users" in caplog.text
+    open_folder.chmod(mode | 0o1000)
+    assert store.cache_folder() == cache / "kernels", "in a sticky folder others cannot move what is ours"
+
+
+def test_a_user_that_does_not_exist_is_one_line(monkeypatch):
+    monkeypatch.setenv("DHKIT_CACHE_DIR", "~nobody-of-this-name/x")
+    with pytest.raises(
+        DhkitError, match=r"^DHKIT_CACHE_DIR is '~nobody-of-this-name/x': there is no such user; expected a folder$"
+    ):
+        store.cache_folder()
+    command = [sys.executable, "-m", "dhkit", "workspace", "planar2r"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 2, done.stderr
+    assert re.fullmatch(r".*DHKIT_CACHE_DIR.*\n", done.stderr)
+
+
+def test_an_unwritable_home_means_memory_only(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "compiling forward_kinematics" in in_new_process(CALL, tmp_path / "file").stderr
+
+
+FULL = """
+import resource, signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_a_full_disk_means_memory_only(tmp_path):
+    done = in_new_process(FULL + CALL, tmp_path)
+    assert "kernels are not cached" in done.stderr
+    assert os.strerror(errno.EFBIG) in done.stderr
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()], "a half-written file was left"
+
+
+THREADS = """
+import threading, numpy as np, dhkit
+arm = dhkit.Arm.load("puma560")
+q = np.random.default_rng(0).normal(size=(4_000, 6))
+start, results = threading.Barrier(32), []
+def work():
+    start.wait()
+    small = [arm.inverse_dynamics(q[k], q[k], q[k]) for k in range(20)]
+    results.append((arm.inverse_dynamics(q, q, q), np.array(small)))
+threads = [threading.Thread(target=work) for _ in range(32)]
+[t.start() for t in threads]
+[t.join() for t in threads]
+M = arm.mass_matrix(q)
+expected = np.einsum("kij,kj->ki", M, q) + arm.bias(q, q)
+assert len(results) == 32
+for large, small in results:
+    assert abs(large - expected).max() < 1e-12
+    assert abs(small - expected[:20]).max() < 1e-12
+"""
+
+
+def test_processes_and_threads_that_ask_for_the_same_new_kernel(tmp_path):
+    environment = {**os.environ, "DHKIT_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", THREADS]
+    running = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in running:
+        _, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+
+
+FORK = """
+import multiprocessing, threading, numpy as np, dhkit
+arm = dhkit.Arm.load("puma560")
+q = np.random.default_rng(0).normal(size=(10, 6))
+expected = arm.fk(q)
+arm.compile()  # what Python imports in one thread, a fork of another must not need
+arms = [dhkit.Arm.load(name) for name in ("stanford", "panda", "ur5", "planar2r")]
+def child():
+    ok = abs(arm.fk(q) - expected).max() < 1e-14
+    for other in arms[::-1]:
+        other.compile()
+        ok &= bool(np.isfinite(other.fk(np.zeros((100, other.n)))).all())
+    raise SystemExit(0 if ok else 3)
+compiling = threading.Thread(target=lambda: [other.compile() for other in arms])
+compiling.start()
+context = multiprocessing.get_context("fork")
+codes = []
+while compiling.is_alive():
+    process = context.Process(target=child)
+    process.start()
+    process.join(60)
+    codes.append(process.exitcode)
+print(*set(codes))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork of POSIX")
+def test_forks_while_another_thread_compiles_do_not_hang(tmp_path):
+    assert in_new_process(FORK, tmp_path).stdout.strip() == "0"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="object files of ELF")
+def test_machine_code_needs_no_symbols_from_outside(tmp_path):
+    """Cached code is linked into a process that may not have what the compiling one had."""
+    nm = require("nm", "Debian's binutils have it")
+    in_new_process("import dhkit; dhkit.Arm.load('puma560').compile()", tmp_path)
+    for path in (tmp_path / "kernels").glob("*.kernel"):
+        path.with_suffix(".o").write_bytes(path.read_bytes()[len(store._seal(b"")) :])
+        done = subprocess.run([nm, "-u", str(path.with_suffix(".o"))], capture_output=True, text=True, check=True)
+        assert done.stdout == "", path.name
