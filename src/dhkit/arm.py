@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -209,6 +209,18 @@ class Arm:
         from dhkit.kinematics import inverse_kinematics
 
         return inverse_kinematics(self._description, T, seed, out, threads)
+
+    def ik_chunks(
+        self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1
+    ) -> Iterator[tuple[slice, IKSolutions]]:
+        """Return an iterator over poses (N, 4, 4): which, and their solutions, which the next chunk overwrites.
+
+        Several times faster than one call for a million poses; see
+        :func:`dhkit.kinematics.inverse_kinematics_in_chunks`.
+        """
+        from dhkit.kinematics import inverse_kinematics_in_chunks
+
+        return inverse_kinematics_in_chunks(self._description, T, size, seed, threads)
 
     def ik_numeric(self, T: ArrayLike, q0: ArrayLike | None = None, **options: Any) -> IKSolutions:
         """Return one solution per pose by iteration, for any arm; see :func:`dhkit.kinematics.solve_numerically`."""

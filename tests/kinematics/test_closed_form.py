@@ -5,13 +5,20 @@ import pytest
 from hypothesis import assume, given
 
 from dhkit.description import library_robot, world_to_tool
-from dhkit.kinematics import IKFlag, classify, forward_kinematics, inverse_kinematics
+from dhkit.errors import ModelError
+from dhkit.kinematics import (
+    IKFlag,
+    classify,
+    forward_kinematics,
+    inverse_kinematics,
+    inverse_kinematics_in_chunks,
+)
 from dhkit.kinematics.closed_form.classify import FAMILIES
 from dhkit.kinematics.singularities import measures as singularity_measures
 from dhkit.kinematics.singularities import singular_configurations
 from dhkit.verification import random_states
 from ik_checks import FAMILY_A, FAMILY_B, FEW_JOINTS, SIX_JOINTS, along_plane, closure, gaps, measures
-from random_arms import elbow_arms, few_joint_arms, slide_arms, three_parallel_arms
+from random_arms import elbow_arms, few_joint_arms, slide_arms, states, three_parallel_arms
 
 CLOSES = 1e-12
 """Of family a, lengths over the reach."""
@@ -195,3 +202,34 @@ def test_any_arm_of_the_stanfords_family(law, arm):
 @given(arm=few_joint_arms())
 def test_any_arm_of_few_joints(law, arm):
     check_family(law, arm, [family.name for family in FAMILIES], OTHERS_CLOSE)
+
+
+@pytest.mark.parametrize("seed", [None, "one", "each"])
+@pytest.mark.parametrize("size", [1, 7, 100, 1000])
+def test_chunks_are_the_batch(size, seed):
+    arm = library_robot("puma560")
+    q = states(arm, 100)
+    q[::5, 4] = 0.0  # the wrist is straight: the seed decides
+    T = world_to_tool(arm, q)
+    seed = {None: None, "one": q[0], "each": q}[seed]
+    whole, seen = inverse_kinematics(arm, T, seed), []
+    for rows, found in inverse_kinematics_in_chunks(arm, T, size, seed):
+        seen.append(rows)
+        assert np.array_equal(found.q, whole.q[rows], equal_nan=True)
+        assert np.array_equal(found.status, whole.status[rows])
+        assert np.array_equal(found.valid, whole.valid[rows])
+    assert np.array_equal(np.concatenate([np.arange(100)[rows] for rows in seen]), np.arange(100))
+
+
+def test_chunks_of_what_cannot_be_are_refused_at_once():
+    arm = library_robot("puma560")
+    T = np.broadcast_to(np.eye(4), (10, 4, 4))
+    with pytest.raises(ValueError, match="size is 0"):
+        inverse_kinematics_in_chunks(arm, T, 0)
+    with pytest.raises(ValueError, match=r"T has shape \(4, 4\); expected \(N, 4, 4\)"):
+        inverse_kinematics_in_chunks(arm, np.eye(4))
+    with pytest.raises(ValueError, match=r"seed has shape \(3, 6\); expected \(6,\) or \(10, 6\)"):
+        inverse_kinematics_in_chunks(arm, T, 4, np.zeros((3, 6)))
+    with pytest.raises(ModelError, match=r"panda is .*; expected an arm with a closed form"):
+        inverse_kinematics_in_chunks(library_robot("panda"), T)
+    assert not list(inverse_kinematics_in_chunks(arm, T[:0]))

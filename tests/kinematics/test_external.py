@@ -162,5 +162,3 @@ def test_arguments_that_do_not_fit_are_said():
         inverse_kinematics(arm, np.eye(4), out=np.zeros((8, 6)))
     with pytest.raises(ValueError, match=r"T has shape \(3, 3\)"):
         solve_externally(arm, np.eye(3))
-    with pytest.raises(ValueError, match="threads is 0"):
-        solve_externally(arm, np.eye(4), threads=0)

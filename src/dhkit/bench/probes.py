@@ -191,6 +191,7 @@ def report_peak() -> None:
     """Print one call's bytes as JSON; the arguments are what :func:`peak_memory` passes."""
     robot, quantity, called, batch, threads = sys.argv[1:]
     workload = Workload.of(Arm.load(robot), int(batch), int(threads), seed=0)
+    workload.arm.compile()
     function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
     out = new_output(function, inputs) if called == "out=" else None
     warm = min(len(inputs[0]), 1024)

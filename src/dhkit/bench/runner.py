@@ -113,6 +113,8 @@ def run(
     try:
         with calm():
             workload = Workload.of(arm, batch, threads, seed)
+            tell("compiling")
+            arm.compile()
             for quantity in quantities:
                 _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, findings, tell)
             for quantity in quantities if probes else ():

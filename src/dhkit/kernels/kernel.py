@@ -6,15 +6,14 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import DhkitError
+from dhkit.kernels.threads import in_threads
 from dhkit.symbolic import Graph
 
 if TYPE_CHECKING:
@@ -84,16 +83,17 @@ class Kernel:
             interpreter = self._interpreter or self._interpreted()
             interpreter(parameters, inputs, outputs)
             return
-        shares = min(threads, count // SHARE)
-        if shares < 2:
+        shares = max(1, min(threads, count // SHARE))
+        if shares == 1:
             function(parameters, inputs, outputs)
             return
-        edges = np.linspace(0, count, shares + 1).astype(int)
-        parts = [([x[a:b] for x in inputs], [y[a:b] for y in outputs]) for a, b in pairwise(edges)]
-        pending = [_workers(shares - 1).submit(function, parameters, *part) for part in parts[1:]]
-        function(parameters, *parts[0])
-        for share in pending:
-            share.result()
+
+        def work(rows: slice) -> None:
+            function(parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
+
+        edges = [count * k // shares for k in range(shares + 1)]
+        for _ in in_threads(work, (slice(begin, end) for begin, end in pairwise(edges)), shares):
+            pass
 
     def compile(self) -> None:
         """Have machine code from now on: from the cache, or compiled now."""
@@ -168,7 +168,6 @@ MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
 """What llvmlite and the loader raise on a machine that they do not serve."""
 
 _kernels: dict[tuple[str, str], Kernel] = {}
-_pools: dict[int, ThreadPoolExecutor] = {}
 _lock = threading.RLock()
 """Held while programs are derived, compiled and loaded, which neither CasADi nor LLVM do in two threads at once."""
 
@@ -194,19 +193,10 @@ def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence
     return found
 
 
-def _workers(count: int) -> ThreadPoolExecutor:
-    """Return as many waiting threads, the same ones each time."""
-    with _lock:
-        if count not in _pools:
-            _pools[count] = ThreadPoolExecutor(count, thread_name_prefix="dhkit")
-        return _pools[count]
-
-
 def _after_fork() -> None:
-    """Threads do not survive a fork: the child makes its own."""
+    """Make a new lock: the child's only thread does not hold what it held in the parent."""
     global _lock
     _lock = threading.RLock()
-    _pools.clear()
 
 
 if hasattr(os, "register_at_fork"):

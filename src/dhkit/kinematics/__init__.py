@@ -4,7 +4,7 @@ from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
-from dhkit.kinematics.inverse import inverse_kinematics
+from dhkit.kinematics.inverse import inverse_kinematics, inverse_kinematics_in_chunks
 from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
 from dhkit.kinematics.kernels import kinematic_kernels
 from dhkit.kinematics.manipulability import (
@@ -55,6 +55,7 @@ __all__ = [
     "frames",
     "freedoms",
     "inverse_kinematics",
+    "inverse_kinematics_in_chunks",
     "isotropy",
     "jacobian",
     "jacobian_dot",

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
-from dhkit.kernels import check_whole, pose_rows
+from dhkit.kernels import pose_rows
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form import classify
@@ -32,7 +32,7 @@ SAME = 1e-6
 """rad: angles are told apart by more than this when solutions are put in order."""
 
 
-def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -> IKSolutions:
+def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that ssik finds, polished and checked by our own kinematics.
 
     For arms of six joints these are all solutions. An arm of seven joints has infinitely many, in curves; ssik
@@ -47,8 +47,6 @@ def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -
         The robot; six or seven revolute joints.
     T
         Poses of the tool in the world, shape (..., 4, 4).
-    threads
-        How many threads share the check.
 
     Returns
     -------
@@ -63,9 +61,8 @@ def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -
     ModelError
         The arm has prismatic joints, or not six or seven, or ssik is not installed.
     ValueError, TypeError
-        T has not shape (..., 4, 4), ``threads`` is below 1.
+        T has not shape (..., 4, 4), or is not numeric.
     """
-    check_whole("threads", threads, 1)
     poses = pose_rows(T)
     solver = _solver(description)
     posed = are_poses(poses)
@@ -74,7 +71,7 @@ def solve_externally(description: Description, T: ArrayLike, threads: int = 1) -
     counts = np.array([len(q) for q in found], dtype=int)
     owner = np.repeat(np.flatnonzero(posed), counts)
     q = np.concatenate([np.empty((0, n)), *found])
-    q, closed = _polished(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0), threads)
+    q, closed = _polished(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
     table = _ordered(q[closed], owner[closed], posed.size)
     B = table.shape[1]
     return collect(
@@ -125,9 +122,9 @@ def _solutions(solver: Any, goal: Array, n: int) -> Array:
     return np.array([solution.q for solution in found], dtype=float).reshape(-1, n)
 
 
-def _polished(description: Description, q: Array, goals: Array, threads: int) -> tuple[Array, NDArray[np.bool_]]:
+def _polished(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return joint values (K, n) with angles in (-pi, pi] after some steps of Newton, and which of them close."""
-    newton = Newton.of(description, position_only=False, limits=False, threads=threads)
+    newton = Newton.of(description, position_only=False, limits=False)
     with np.errstate(all="ignore"):
         q, error = descend(newton, goals, q, EXACT)
     return wrapped(q, ~description.numbers.prismatic), closes(error, CLOSES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,13 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.errors import ModelError
 from dhkit.kernels import Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
-__all__ = ["inverse_kinematics", "solver_of"]
+__all__ = ["inverse_kinematics", "inverse_kinematics_in_chunks", "solver_of"]
+
+CHUNK = 16_384
+"""Poses of a chunk: about 6 MB of joint values with eight branches, which the processor's cache holds."""
 
 
 def inverse_kinematics(
@@ -39,7 +44,7 @@ def inverse_kinematics(
     out
         Where to write the joint values, shape (..., B, n), float64, contiguous. Not with ssik.
     threads
-        How many threads share a large batch.
+        How many threads share a large batch. Not with ssik.
 
     Returns
     -------
@@ -58,7 +63,7 @@ def inverse_kinematics(
     poses = pose_rows(T)
     solver = solver_of(description)
     if solver is None:
-        return _solved_externally(description, poses, out, threads)
+        return _solved_externally(description, poses, out)
     fit = solver.fit
     batch = poses.shape[:-2]
     B, n = len(fit.branches), description.n
@@ -94,13 +99,62 @@ def inverse_kinematics(
     )
 
 
-def _solved_externally(description: Description, T: Array, out: Array | None, threads: int) -> IKSolutions:
+def inverse_kinematics_in_chunks(
+    description: Description, T: ArrayLike, size: int = CHUNK, seed: ArrayLike | None = None, threads: int = 1
+) -> Iterator[tuple[slice, IKSolutions]]:
+    """Return an iterator over the solutions of many poses, ``size`` at a time, without memory for all of them.
+
+    A million poses of an arm with eight branches have 384 MB of joint values. Memory that is new to a process costs
+    page faults, up to ten times what solving does; chunks lie in memory that is used again.
+
+    Parameters
+    ----------
+    description
+        The robot; one whose inverse kinematics have a closed form of ours.
+    T
+        Poses of the tool in the world, shape (N, 4, 4).
+    size
+        Poses of a chunk.
+    seed, threads
+        As for :func:`inverse_kinematics`; ``seed`` of shape (n,) or (N, n).
+
+    Returns
+    -------
+    Iterator[tuple[slice, IKSolutions]]
+        Which poses, and their solutions. The joint values are overwritten by the next chunk: copy what is to be kept.
+
+    Raises
+    ------
+    ModelError, ValueError, TypeError
+        As for :func:`inverse_kinematics`; ``size`` is below 1.
+    """
+    check_whole("size", size, 1)
+    poses = pose_rows(T)
+    if poses.ndim != 3:
+        raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
+    starts = None if seed is None else joint_array(description, seed, "seed")
+    if starts is not None and starts.shape not in ((description.n,), (len(poses), description.n)):
+        raise ValueError(f"seed has shape {starts.shape}; expected {(description.n,)} or {(len(poses), description.n)}")
+    solver = solver_of(description)
+    if solver is None:
+        raise ModelError(f"{description.name} is {classify(description).words}; expected an arm with a closed form")
+    q = np.empty((min(size, len(poses)), len(solver.fit.branches), description.n))
+
+    def solve(begin: int) -> tuple[slice, IKSolutions]:
+        rows = slice(begin, min(begin + size, len(poses)))
+        near = starts if starts is None or starts.ndim == 1 else starts[rows]
+        return rows, inverse_kinematics(description, poses[rows], near, q[: rows.stop - rows.start], threads)
+
+    return map(solve, range(0, len(poses), size))
+
+
+def _solved_externally(description: Description, T: Array, out: Array | None) -> IKSolutions:
     from dhkit.kinematics.external import solve_externally
 
     if out is not None:
         words = classify(description).words
         raise ValueError(f"out is given, but {description.name} is {words}: how many branches there will be is open")
-    return solve_externally(description, T, threads=threads)
+    return solve_externally(description, T)
 
 
 def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:

@@ -31,10 +31,9 @@ class Newton:
     lower: Array
     """Limits that are kept, shape (n,), rad and m."""
     upper: Array
-    threads: int = 1
 
     @classmethod
-    def of(cls, description: Description, *, position_only: bool, limits: bool, threads: int = 1) -> Newton:
+    def of(cls, description: Description, *, position_only: bool, limits: bool) -> Newton:
         """Return the steps of an arm."""
         numbers, anywhere = description.numbers, np.full(description.n, np.inf)
         return cls(
@@ -43,7 +42,6 @@ class Newton:
             size=3 if position_only else 6,
             lower=numbers.lower if limits else -anywhere,
             upper=numbers.upper if limits else anywhere,
-            threads=threads,
         )
 
     @property
@@ -90,10 +88,10 @@ class Newton:
             Shape (N, 6) or (N, 3): the way to go over ``length``, then the rotation vector to turn by, rad, both in
             world axes.
         """
-        T = forward_kinematics(self.description, q, threads=self.threads).reshape(-1, 16)
+        T = forward_kinematics(self.description, q).reshape(-1, 16)
         error = np.empty((len(q), self.size))
         run = error_kernel(self.size)
-        run(np.array([self.length]), [T, goals], [error], self.threads)
+        run(np.array([self.length]), [T, goals], [error])
         return error
 
     def step(self, q: Array, error: Array, damping: Array) -> Array:
@@ -109,11 +107,11 @@ class Newton:
             What is added to the squares of the Jacobian's singular values, positive, shape (N,).
         """
         n = self.description.n
-        J = jacobian(self.description, q, threads=self.threads).reshape(-1, 6 * n)
+        J = jacobian(self.description, q).reshape(-1, 6 * n)
         new = np.empty_like(q)
         run = step_kernel(n, self.size)
         parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
-        run(parameters, [q, error, J, damping[:, None]], [new], self.threads)
+        run(parameters, [q, error, J, damping[:, None]], [new])
         return new
 
 

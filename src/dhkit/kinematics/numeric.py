@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import check_whole, pose_rows
+from dhkit.kernels import check_whole, in_threads, pose_rows
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
 from dhkit.kinematics.forward import forward_kinematics
@@ -24,6 +24,8 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 CHUNK = 8_192
 """Searches that run side by side: what they work on takes about 5 MB."""
+SHARE = 64
+"""Poses that a thread must have to itself."""
 CANDIDATES = 512
 """Random joint values at least among which starts are looked for."""
 SMOOTH = 1e-2
@@ -83,7 +85,7 @@ def solve_numerically(
     limits
         Whether joints are kept inside their limits. Otherwise a flag says where they are not.
     threads
-        How many threads share the kinematics of a large batch.
+        How many threads share a large batch.
     progress
         Called after every few thousand poses; an exception in it ends the work.
 
@@ -119,17 +121,21 @@ def solve_numerically(
         raise ValueError(f"tolerance is {tolerance}; expected a positive number")
     poses = pose_rows(T)
     batch, n = poses.shape[:-2], description.n
-    newton = Newton.of(description, position_only=position_only, limits=limits, threads=threads)
+    newton = Newton.of(description, position_only=position_only, limits=limits)
     starts = _first_starts(newton, q0, batch).reshape(-1, n)
     posed = are_poses(poses)
     q, distance = np.full((posed.size, n), np.nan), np.full(posed.size, np.nan)
     search = Search(newton, tolerance, restarts, seed)
     rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
-    for some in _chunks(len(rows), CHUNK):
+
+    def solve(some: slice) -> int:
         with np.errstate(all="ignore"):
             q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
+        return int(rows[some][-1]) + 1
+
+    for done in in_threads(solve, _chunks(len(rows), min(CHUNK, max(SHARE, -(-len(rows) // threads)))), threads):
         if progress is not None:
-            progress(int(rows[some][-1]) + 1, posed.size)
+            progress(done, posed.size)
     return collect(
         description,
         wrapped(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
