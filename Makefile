@@ -3,35 +3,49 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+TEST_READY := $(VENV)/.ready-test
+CHECK_READY := $(VENV)/.ready-check
 BENCH_READY := $(VENV)/.ready-bench
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadgroup -q
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: help demo test coverage check accept bench assets lowest format clean
+.PHONY: help demo test test-all coverage check accept bench assets lowest format clean
 
 help:  ## show this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --editable .
+	@touch $@
+
+$(TEST_READY): $(READY)
+	$(BIN)/python -m pip install --editable '.[test]'
+	@touch $@
+
+$(CHECK_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[test,check]'
 	@touch $@
 
 demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560/
 	$(BIN)/dhkit demo
 
-test: $(READY)  ## the tests, laws at a small sample size
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -q $(ARGS)
+test: $(TEST_READY)  ## the tests but those that take seconds, laws at a small sample size
+	$(PYTEST) -m 'not slow' $(ARGS)
 
-coverage: $(READY)  ## the same traced: which lines they run; 90 % at least
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -q --cov=dhkit --cov-report=term:skip-covered --cov-fail-under=90
+test-all: $(TEST_READY)  ## all tests, laws at a small sample size
+	$(PYTEST) $(ARGS)
 
-check: $(READY)  ## ruff, mypy --strict, import order
+coverage: $(TEST_READY)  ## the same traced: which lines they run; 90 % at least
+	$(PYTEST) --cov=dhkit --cov-report=term:skip-covered --cov-fail-under=90
+
+check: $(CHECK_READY)  ## ruff, mypy --strict, import order
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-accept: $(READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
+accept: $(TEST_READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
 
 bench: $(BENCH_READY)  ## kinematics and dynamics beside their peers; writes benchmarks/results/
@@ -52,7 +66,7 @@ lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	VIRTUAL_ENV=$(VENV)-lowest $(VENV)-lowest/bin/uv pip install --quiet --resolution lowest-direct --editable '.[test]'
 	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadgroup -q -W ignore::DeprecationWarning tests
 
-format: $(READY)  ## let ruff format the sources
+format: $(CHECK_READY)  ## let ruff format the sources
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

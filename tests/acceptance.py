@@ -1,6 +1,6 @@
 """Laws with a sample size: small in `make test`, full in `make accept`, which writes down what was seen.
 
-A test takes the fixture ``law``; ``law.samples(1000)`` is 1,000 under DHKIT_ACCEPT=1 and a twentieth of it otherwise;
+A test takes the fixture ``law``; ``law.samples(1000)`` is 1,000 under DHKIT_ACCEPT=1 and a fiftieth of it otherwise;
 ``law.holds("frames", seen, required)`` keeps the worst of each quantity and fails where it is too large.
 """
 
@@ -17,7 +17,7 @@ import pytest
 
 ACCEPTING = os.environ.get("DHKIT_ACCEPT") == "1"
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "acceptance.json"
-SHARE = 20
+SHARE = 50
 LEAST = 5
 
 
@@ -86,7 +86,7 @@ class Recorder:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows or not _is_whole(session.config):
             return
-        packages = ("numpy", "numba", "casadi", "pin", "yourdfpy", "eaik", "ssik", "hypothesis")
+        packages = ("numpy", "llvmlite", "casadi", "pin", "yourdfpy", "eaik", "ssik", "hypothesis")
         RESULTS.parent.mkdir(parents=True, exist_ok=True)
         RESULTS.write_text(
             json.dumps(

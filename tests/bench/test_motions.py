@@ -22,6 +22,7 @@ def once(monkeypatch):
     monkeypatch.setattr(motions, "BUILDS", 1)
 
 
+@pytest.mark.slow
 def test_a_report_has_all_contenders_at_both_speeds():
     pytest.importorskip("toppra")
     told = []
@@ -44,6 +45,7 @@ def test_a_report_has_all_contenders_at_both_speeds():
         assert report.machine.packages["toppra"] in text
 
 
+@pytest.mark.slow
 def test_without_toppra_it_goes_on(monkeypatch):
     def missing(description):
         raise UnavailableError("not installed")
@@ -55,6 +57,7 @@ def test_without_toppra_it_goes_on(monkeypatch):
     assert len(report.rows) == 4
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_reports_what_it_has_seen():
     def stop(line):
         if "pair 2" in line:

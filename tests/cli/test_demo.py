@@ -63,6 +63,7 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
     assert len(page) < 2_500_000
 
 
+@pytest.mark.slow
 def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(tmp_path, chromium):
     assert run("demo", "--quick", "--output", str(tmp_path)) == 0
     page = chromium.page()
@@ -118,6 +119,7 @@ def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
     assert (tmp_path / "taken").read_text() == "keep me"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["puma560", "planar2r", "panda"])
 def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, tmp_path, capsys, chromium):
     assert run("demo", "--robot", name, "--quick", "--output", str(tmp_path)) == 0
@@ -187,6 +189,7 @@ def test_without_a_line_the_tour_goes_through_the_configurations():
         assert np.abs(q - stop).max(axis=1).min() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
     arm = Arm.load(name)
@@ -209,6 +212,7 @@ def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
     assert np.all(np.abs(both.tau(t)) <= numbers.effort * (1 + KEPT))
 
 
+@pytest.mark.slow
 def test_the_page_of_the_plan_plays_without_a_jump(tmp_path, chromium):
     assert run("demo", "--robot", "planar2r", "--quick", "--output", str(tmp_path)) == 0
     page = chromium.page()

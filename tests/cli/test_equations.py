@@ -90,6 +90,7 @@ def test_bad_input_is_refused_in_one_line(dhkit, arguments, message):
     assert dhkit("planar2r", *arguments) == (2, "", f"dhkit: {message}\n")
 
 
+@pytest.mark.slow
 def test_what_is_too_long_to_read_names_the_alternatives(dhkit):
     status, out, err = dhkit("puma560", "--symbols", "inertial", "--what", "tau")
     assert (status, out) == (2, "")

@@ -76,6 +76,7 @@ def disagreement(arm, held, count=5):
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_library_robots_with_some_joints_held(name, law):
     arm = library_robot(name)
@@ -265,6 +266,7 @@ def symbolic_arms(draw):
     return with_uniform_links(arm)
 
 
+@pytest.mark.slow
 @settings(max_examples=sample_size(200))
 @given(symbolic_arms(), st.data())
 def test_a_locked_arm_of_symbols_can_be_written_and_its_parameters_changed(law, arm, data):

@@ -238,6 +238,7 @@ def test_an_interrupt_leaves_no_process_behind(tmp_path, stop):
     assert ends(int((tmp_path / "b").read_text()))
 
 
+@pytest.mark.slow
 @forking
 def test_who_is_slow_to_read_makes_nobody_late():
     def judge(path):

@@ -45,6 +45,7 @@ def test_no_wrong_answer_is_accepted_and_no_right_one_rejected(name):
     assert report.verdict.value == expected, str(report)
 
 
+@pytest.mark.slow
 def test_single_mistakes_are_named(law):
     """At least 90 % of the mistakes that are a derivation's are named as what they were."""
     single = [path for path in CORPUS.values() if len(label(path)[1]) == 1]

@@ -119,6 +119,7 @@ def test_what_is_missing_and_left_out_stands_in_every_form(tmp_path):
 # 3. Derivatives
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -241,6 +242,7 @@ def test_every_judgement_has_a_seed_of_its_own_and_can_be_replayed():
     assert again == first and again.entries[0].witness == first.entries[0].witness
 
 
+@pytest.mark.slow
 def test_what_is_not_proved_does_not_pass_where_proof_is_required():
     half = V.replace("s1 ", "2*tan(q1/2)/(1 + tan(q1/2)^2) ", 1)
     assert ARM.grade(V=half).verdict is Verdict.UNDECIDED and ARM.grade(V=half)
@@ -272,6 +274,7 @@ def test_what_reads_two_ways_is_asked_about(text, readings):
     assert all(one in entry.statement for one in readings), entry.statement
 
 
+@pytest.mark.slow
 def test_c12_of_an_arm_of_twelve_joints():
     rows = [(0, 0, 0.1, 0)] * 12
     arm = Arm.from_dh(rows, order=("theta", "d", "a", "alpha"), kinds="R" * 12)
@@ -433,6 +436,7 @@ LONG_PRODUCTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", LONG_PRODUCTS)
 def test_long_products_are_decided_soon(text, law):
     start = time.perf_counter()
@@ -689,12 +693,14 @@ def test_the_name_in_front_of_an_entry_is_the_entry(head):
     assert first.verdict is not Verdict.CORRECT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("large", ["10^400", "exp(900)", "10^30*exp(q1)", "10^100*exp(q1)", "10^190*exp(q1)"])
 def test_digits_that_cancel_are_worked_out_again(large):
     assert verdict(V=f"({V} + {large}) - {large}") is Verdict.UNDECIDED
     assert verdict(V=f"({V} + m1*q1*10^-20 + {large}) - {large}") is Verdict.WRONG
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden",
     [

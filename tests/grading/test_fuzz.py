@@ -21,6 +21,8 @@ from grading.data.layouts import matlab_file, python_file, tex_file, whole_texts
 from grading.data.rewriting import REWRITINGS, SLIPS, rewritten, slipped
 from grading.data.trees import DIGITS, NOTATIONS, Notation, evaluate, names_in, places, replaced, written
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parent / "data" / "robots"
 ARMS = ("planar2r", "polar_rp", "cart_pendulum", "double_pendulum", "gantry", "craig2r")
 QUANTITIES = ("M", "h", "g", "V", "K", "tau")

@@ -307,6 +307,7 @@ def test_the_same_change_in_several_formulas_is_one_mistake(name, changes, mista
     assert mistakes(judged) == [(mistake, None)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_formula_is_never_blamed(name):
     """Whatever stands for one joint, it alone is blamed."""
@@ -483,6 +484,7 @@ def test_a_formula_may_use_joints_that_are_found_before_it():
     assert mistakes(exchanged) == [("atan2_arguments", 0)]
 
 
+@pytest.mark.slow
 def test_the_search_for_mistakes_is_bounded():
     """Long formulas: a sum of 450 terms, squares nested 40 deep, 6 wrong formulas of a PUMA at once."""
     long = "+".join(f"{k}*px*py" for k in range(1, 450))

@@ -11,6 +11,8 @@ from dhkit.symbolic.ring import element_array
 from dhkit.symbolic.textbook import derive
 from grading_answers import ROBOTS, constants_dropped, corpus_robot, is_zero, named, written
 
+pytestmark = pytest.mark.slow
+
 DYNAMICS = ("M", "h", "g", "tau", "K", "V")
 
 

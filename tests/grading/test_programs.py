@@ -328,6 +328,7 @@ def test_the_programs_pass_without_insertions(tmp_path):
         assert set(report.quantities) == {"M", "V"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", ANY_NAME)
 def test_no_binding_of_a_name_in_python_passes_for_what_it_is_not(tmp_path, statement):
     rng = random.Random(statement)
@@ -997,6 +998,7 @@ def test_a_notebook_of_octave(read):
 # What dhkit itself writes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["planar2r", "polar_rp", "cart_pendulum", "cobra600", "planar3r", "puma560"])
 def test_equations_are_read_back(tmp_path, robot):
     description = library_robot(robot)

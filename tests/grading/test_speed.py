@@ -16,6 +16,8 @@ from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.textbook import _motion, _places, derive
 from grading_answers import SHEETS, written
 
+pytestmark = pytest.mark.slow
+
 DYNAMICS = ("M", "C", "g", "tau")
 
 

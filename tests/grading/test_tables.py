@@ -152,6 +152,7 @@ def reversed_z(rows, i):
     return rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar2r", "polar_rp", "stanford", "puma560", "ur5", "cobra600", "jaco"])
 @pytest.mark.parametrize("change", [turned_x, reversed_z])
 def test_reversed_axes_are_the_same_arm(name, change):
@@ -243,6 +244,7 @@ def test_other_frames_in_the_other_convention(name):
     assert frames(judgement) == ("q2 is counted from another zero: there the file's q2 is 90 degrees",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_another_length_is_another_arm(name):
     """Every length of every robot, changed by a tenth, is found out, whatever the frames."""

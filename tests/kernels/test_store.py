@@ -77,6 +77,7 @@ def damage(path, how):
     return whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["empty", "half", "one bit", "longer", "Python", "number", "folder", "unreadable"])
 def test_a_damaged_entry_is_made_anew(tmp_path, how):
     in_new_process(CALL, tmp_path)
@@ -223,11 +224,13 @@ print(*set(codes))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="fork of POSIX")
 def test_forks_while_another_thread_compiles_do_not_hang(tmp_path):
     assert in_new_process(FORK, tmp_path).stdout.strip() == "0"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="object files of ELF")
 def test_machine_code_needs_no_symbols_from_outside(tmp_path):
     """Cached code is linked into a process that may not have what the compiling one had."""

@@ -113,8 +113,9 @@ def test_an_obstacle_around_the_only_branch_of_a_pose():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [60.0, 2.0])
-def test_no_way_around_an_obstacle(seconds):
+def test_no_way_around_an_obstacle(law, seconds):
     """An arm in a plane cannot pass a wall from its base outwards: that is said, within the time limit."""
     arm = library_robot("planar2r")
     wall = [Obstacle.capsule(0.03, (0.2, 0, 0), (3.0, 0, 0), name="wall")]
@@ -123,7 +124,7 @@ def test_no_way_around_an_obstacle(seconds):
         r"^no motion found that keeps 10 mm clear of wall( within the time limit)?, in \d+ starts?",
         lambda: Planner(arm, intervals=24).solve([-0.8, 0.0], [0.8, 0.0], obstacles=wall, time_limit=seconds),
     )
-    assert time.perf_counter() - began < seconds + 5
+    law.takes("seconds beyond the time limit", time.perf_counter() - began - seconds, 5.0)
 
 
 def test_not_converged():

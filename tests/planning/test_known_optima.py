@@ -30,6 +30,7 @@ def test_double_integrator_with_a_speed_limit(law, limited):
     law.holds("bang, cruise, bang: d / v + v / a", relative(motion.duration, 0.7 / 0.5 + 0.5 / 2.0), 1e-4)
 
 
+@pytest.mark.slow
 def test_triple_integrator(law):
     motion = Planner(slide(), limits=Limits.of(slide(), jerk=3.0)).solve([0], [0.7])
     law.holds("limited jerk: (32 d / J)^(1/3)", relative(motion.duration, (32 * 0.7 / 3.0) ** (1 / 3)), 1e-4)
@@ -62,6 +63,7 @@ def test_bryson_denham(law, most):
     law.holds("height above the wall", motion.q(np.linspace(0, 1, 10_001)).max() - most, 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("most", "known"), [(1.0, 4.030018688), (1.5, 3.027339520), (2.0, 2.566590758), (5.0, 1.590961069)]
 )
@@ -71,6 +73,7 @@ def test_pendulum(law, most, known):
     law.holds("pendulum x'' = u - sin x from 0 to pi", relative(motion.duration, known), 2e-4)
 
 
+@pytest.mark.slow
 def test_luus(law):
     """Luus 2000, Iterative Dynamic Programming; the way there is by a bent elbow that the straight path has not."""
     arm = luus()

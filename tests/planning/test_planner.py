@@ -206,6 +206,7 @@ def test_the_tools_orientation():
 # Objectives
 
 
+@pytest.mark.slow
 def test_each_objective_is_best_at_what_it_asks_for():
     options = {"duration": 1.5}
     objectives = {"effort": Effort(), "jerk": Jerk(), "energy": Energy(regenerates=True, motor_constants=(2.0,))}
@@ -233,6 +234,7 @@ def own_cost(term, motion):
     return np.trapezoid(rate, t)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["effort", "jerk", "energy"])
 @pytest.mark.parametrize("duration", [1.5, 3.0])
 def test_smooth_motions_keep_limits_of_acceleration(objective, duration):
@@ -241,6 +243,7 @@ def test_smooth_motions_keep_limits_of_acceleration(objective, duration):
     kept(PUMA, motion, limits)
 
 
+@pytest.mark.slow
 def test_positions_are_kept_between_the_certificates_states():
     """Joint 5 of this motion touches its limit for a millisecond, between two states of the grid."""
     arm = library_robot("puma560_cao_printed")

@@ -14,6 +14,7 @@ ALLOWED = 1e-6
 """Of a limit."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "near"), [(1.0, 0.005), (3.0, 0.01)])
 def test_pairs(law, speed, near):
     pairs = random_pairs(PUMA, law.samples(100), seed=int(speed))
@@ -44,6 +45,7 @@ def test_pairs(law, speed, near):
     print(f"\n  toppra takes {100 * np.mean(gains):.2f} % longer on average, {100 * max(gains):.1f} % at most", end="")
 
 
+@pytest.mark.slow
 def test_a_mesh_counts_for_little():
     start, goal = random_pairs(PUMA, 1, seed=7)[0]
     motion = Planner(PUMA).solve(start, goal, compare=True)

@@ -12,6 +12,7 @@ FEW = ("planar2r", "cobra600", "panda")
 """In every run: the smallest, one with a slide, one with seven joints."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_every_robot(law, name):
     arm = library_robot(name)

@@ -9,6 +9,8 @@ from dhkit.planning import Floor, Obstacle, Planner, distance
 from dhkit.planning.obstacles import link_capsules
 from planning_reference import worst_excess
 
+pytestmark = pytest.mark.slow
+
 PUMA = library_robot("puma560")
 CLEARANCE = 0.02
 """m."""

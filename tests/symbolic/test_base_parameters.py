@@ -31,6 +31,7 @@ NOISE = 1e-9
 """Singular values and columns below this, of the largest, are roundings of 0: the smallest that count are 1e-4."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", dhkit.robots())
 def test_as_many_as_the_regressors_rank(name):
     description = library_robot(name)

@@ -327,6 +327,7 @@ def test_mistakes_are_checked():
 # Times
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sympy_rings")
 def test_exact_puma_without_flint_is_fast(law):
     law.samples(1)

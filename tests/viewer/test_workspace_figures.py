@@ -21,6 +21,7 @@ def drawn(figure):
     return figure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_every_robot_has_a_figure_of_its_workspace(name):
     space = workspace(library_robot(name), 2_000)

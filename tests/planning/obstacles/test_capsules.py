@@ -43,6 +43,7 @@ def depth(capsule, points):
     return capsule.radius - np.linalg.norm(points - capsule.start - share[:, None] * along, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_every_part_lies_in_its_links_capsules(name):
     arm = library_robot(name)
