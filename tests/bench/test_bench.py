@@ -34,6 +34,8 @@ from dhkit.bench.required import requirements
 from dhkit.bench.rounds import items_within
 from dhkit.cli import main
 
+pytestmark = pytest.mark.slow
+
 CLOSE = 1e-13
 """m and rotation entries: a chain of ten products of matrices whose entries are below 3."""
 PEERS = ("eaik", "py_opw_kinematics", "ssik", "roboticstoolbox", "ikpy")

@@ -15,6 +15,8 @@ from dhkit.bench.peers import casadi_map, dhkit_arm, pinocchio
 from dhkit.bench.peers.sympy_mechanics import lagranges_equations
 from dhkit.bench.required import requirements
 
+pytestmark = pytest.mark.slow
+
 DYNAMICS = ("inverse_dynamics", "mass_matrix", "forward_dynamics")
 QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders(), *casadi_map.contenders())
 

@@ -132,6 +132,7 @@ def test_every_format_of_trajectories_is_written(suffix, plan, tmp_path):
     assert np.abs(motion.q(motion.duration) - [1.0, 0.5]).max() < ENDS
 
 
+@pytest.mark.slow
 def test_what_people_read(plan):
     status, out, err = plan("puma560", "--to", "nominal", "--degrees", "--speed", "0.8", *COARSE)
     assert (status, err) == (0, "")
@@ -144,6 +145,7 @@ def test_what_people_read(plan):
     assert "-0.0000" not in out
 
 
+@pytest.mark.slow
 def test_a_payload_takes_time(facts):
     where = ("planar2r", "--from", "0.2", "0.4", "--to", "-1", "1", "--torque", "40", "12")
     _, empty = facts(*where)
@@ -216,6 +218,7 @@ def test_a_load_is_carried_along_a_line(facts):
     assert empty["duration"] < loaded["duration"]
 
 
+@pytest.mark.slow
 def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkeypatch):
     arm = Arm.load("planar3r")
     ball = Obstacle.sphere(0.1, (1.15, 0.0, 0.0))
@@ -332,6 +335,7 @@ def test_a_search_that_takes_long_says_how_far_it_is(monkeypatch, plan):
     assert re.search(r"iteration \d+: 0\.\d+ s, limits missed by \d\.\de[-+]\d+", err)
 
 
+@pytest.mark.slow
 def test_links_keep_away_from_each_other_and_from_the_floor(facts):
     where = ("planar3r", "--from", "0", "0.3", "0.3", "--to", "0.5", "1", "1")
     _, free = facts(*where)

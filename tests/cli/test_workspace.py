@@ -39,6 +39,7 @@ def test_it_says_what_is_reached_and_writes_a_picture_and_a_page(dhkit, tmp_path
     assert (tmp_path / "here" / "workspace.html").stat().st_size < 2_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_machines_are_told_the_same_as_python(dhkit, name):
     status, out, err = dhkit(name, "--samples", "500", "--seed", "3", "--json")
@@ -64,6 +65,7 @@ def test_what_is_assumed_is_said(dhkit, tmp_path):
     assert "a curved surface, which has no volume" in out
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_arm_among_its_points(dhkit, tmp_path, chromium):
     assert dhkit("puma560", "--samples", "20000")[0] == 0
     page = chromium.page()

@@ -122,6 +122,7 @@ def test_a_budget_is_shared():
     assert budget.left < 0
 
 
+@pytest.mark.slow
 def test_hostile_text_takes_no_time(law):
     """Each of these would run for minutes, or fill the memory, if it were worked out."""
     for text in (

@@ -16,6 +16,8 @@ from dhkit.grading.batch import GIGABYTE, Sheet, find_sheets, grade_all
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from grading.judged import REPORT
 
+pytestmark = pytest.mark.slow
+
 SHORT = 0.5  # seconds that a judge that hangs is given
 LONG = 30.0  # seconds that nothing here takes, unless something is wrong
 
@@ -238,7 +240,6 @@ def test_an_interrupt_leaves_no_process_behind(tmp_path, stop):
     assert ends(int((tmp_path / "b").read_text()))
 
 
-@pytest.mark.slow
 @forking
 def test_who_is_slow_to_read_makes_nobody_late():
     def judge(path):

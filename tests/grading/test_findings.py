@@ -467,6 +467,7 @@ def endless(q):
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes of their own")
 @pytest.mark.parametrize("function", [hangs, exits, leaves, starts, endless])
 def test_a_function_that_hangs_or_exits_ends_itself_alone(function, monkeypatch):

@@ -343,6 +343,7 @@ def test_no_binding_of_a_name_in_python_passes_for_what_it_is_not(tmp_path, stat
                 assert np.allclose(values[quantity], RIGHT[quantity], rtol=1e-12), text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", ONE_NAME)
 def test_no_change_of_a_value_in_python_passes_for_what_it_was(tmp_path, statement):
     for place in PLACES[".py"]:
@@ -355,6 +356,7 @@ def test_no_change_of_a_value_in_python_passes_for_what_it_was(tmp_path, stateme
                 assert np.allclose(values[quantity], RIGHT[quantity], rtol=1e-12), text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", MATLAB_ANY_NAME)
 def test_no_binding_of_a_name_in_matlab_passes(tmp_path, statement):
     rng = random.Random(statement)

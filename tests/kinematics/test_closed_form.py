@@ -204,6 +204,7 @@ def test_any_arm_of_few_joints(law, arm):
     check_family(law, arm, [family.name for family in FAMILIES], OTHERS_CLOSE)
 
 
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("seed", [None, "one", "each"])
 @pytest.mark.parametrize("size", [1, 7, 100, 1000])
 def test_chunks_are_the_batch(size, seed):

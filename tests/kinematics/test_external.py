@@ -90,6 +90,7 @@ def prepared():
     return folder is not None and folder.is_dir() and any(folder.iterdir())
 
 
+@pytest.mark.slow
 def test_the_jaco_has_the_solutions_that_ssik_counts(ssik, law):
     if not (acceptance.ACCEPTING or prepared() or "ssik" in os.environ.get("DHKIT_REQUIRE", "")):
         pytest.skip("ssik would derive a solver for a minute; `make accept` does")

@@ -195,6 +195,7 @@ def test_what_a_coarse_grid_misses_is_made_good(intervals, tool_motion):
     assert fine.duration < coarse.duration < 1.01 * fine.duration
 
 
+@pytest.mark.slow
 def test_a_grid_is_finer_where_the_joints_must_go_slowly():
     # The end is next to a singular wrist: there joints 4 and 6 turn 500 times as fast as on average.
     path = joint_path(PUMA, tool_line(*world_to_tool(PUMA, WRIST)), WRIST[0])

@@ -144,6 +144,7 @@ def test_a_duration_below_what_speeds_allow():
     )
 
 
+@pytest.mark.slow
 def test_a_duration_below_what_limits_allow():
     limits = Limits.of(PUMA, acceleration=5.0)
     refused(

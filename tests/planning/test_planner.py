@@ -113,6 +113,7 @@ def test_limits_of_one_motion(planner):
     assert motion.duration > 1.5 * planner.solve(START, GOAL).duration
 
 
+@pytest.mark.slow
 def test_jerk_limits():
     limits = Limits.of(PUMA, jerk=200.0, acceleration=20.0)
     motion = Planner(PUMA, limits=limits, intervals=24).solve(START, GOAL)
@@ -169,6 +170,7 @@ def test_the_tools_speed():
     assert speed.max() > 0.499
 
 
+@pytest.mark.slow
 def test_the_tools_acceleration():
     motion = Planner(PUMA, constraints=[ToolAcceleration(3.0)], intervals=24).solve(START, GOAL)
     a = np.linalg.norm(tool_motion(PUMA, motion)[1], axis=1)
@@ -176,6 +178,7 @@ def test_the_tools_acceleration():
     assert a.max() > 2.9
 
 
+@pytest.mark.slow
 def test_motors():
     effort, speed = PUMA.numbers.effort, PUMA.numbers.velocity
     motion = Planner(PUMA, constraints=[MotorPower(60.0)], intervals=24).solve(START, GOAL)
@@ -187,6 +190,7 @@ def test_motors():
     assert np.abs(inverse_dynamics(PUMA, q, qd, qdd) / effort + qd / (1.2 * speed)).max() <= 1 + ALLOWED
 
 
+@pytest.mark.slow
 def test_the_tools_orientation():
     arm = library_robot("ur5")
     start = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0])

@@ -109,6 +109,7 @@ def test_another_factorization_gives_the_same_torques_and_is_not_skew():
     assert not other.prove_skew_symmetry()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROVED)
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_the_difference_is_what_the_mistake_makes(name, mistake):

@@ -178,6 +178,7 @@ def test_pickled_members_are_never_read(tmp_path):
     refused(path, r"coefficients: found type float32; expected float64")
 
 
+@pytest.mark.slow
 def test_bombs_are_not_unpacked(tmp_path):
     path = tmp_path / "bomb.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:

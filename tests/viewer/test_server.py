@@ -215,6 +215,7 @@ def test_nonsense_from_a_page_gets_an_error_and_the_page_lives(server):
     assert run(babble()) == ["error"] * 3
 
 
+@pytest.mark.slow
 def test_a_page_hears_a_sign_of_life(server):
     async def listen():
         async with connect(server) as socket:

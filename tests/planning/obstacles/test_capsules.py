@@ -55,6 +55,7 @@ def test_every_part_lies_in_its_links_capsules(name):
         assert best > -OUTSIDE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_a_link_has_one_or_two_capsules(name):
     arm = library_robot(name)
