@@ -44,24 +44,32 @@ def cache_folder() -> Path | None:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         folder = folder.resolve()
-        foreign = next((level for level in (folder, *folder.parents) if _writable_by_others(level)), None)
+        levels = ((level, level != folder) for level in (folder, *folder.parents))
+        foreign = next((level for level, above in levels if _writable_by_others(level, sticky=above)), None)
     except OSError as error:
         log.info("kernels are not cached: %s: %s", folder, error.strerror)
         return None
     if foreign is not None:
-        log.warning("kernels are not cached: %s can be written by other users", foreign)
+        _warn_once(f"kernels are not cached: {foreign} can be written by other users")
         return None
     return folder if os.access(folder, os.W_OK | os.X_OK) else None
 
 
-def _writable_by_others(folder: Path) -> bool:
-    """Return whether somebody else than this user and the administrator could put another folder in its place."""
+@cache
+def _warn_once(message: str) -> None:
+    log.warning(message)
+
+
+def _writable_by_others(folder: Path, *, sticky: bool) -> bool:
+    """Return whether somebody else than this user and the administrator can change what lies in a folder.
+
+    With ``sticky`` a sticky folder, such as /tmp, will do: others can add to it, but not move what is ours.
+    """
     if not hasattr(os, "geteuid"):
         return False
     status = folder.stat()
-    # In a sticky folder, such as /tmp, nobody can move what is another's.
-    open_to_all = status.st_mode & 0o022 and not status.st_mode & stat.S_ISVTX
-    return status.st_uid not in (0, os.geteuid()) or bool(open_to_all)
+    kept = sticky and bool(status.st_mode & stat.S_ISVTX)
+    return status.st_uid not in (0, os.geteuid()) or (bool(status.st_mode & 0o022) and not kept)
 
 
 def digest(name: str, pattern: str) -> str:
@@ -100,7 +108,7 @@ def write(name: str, key: str, code: bytes) -> None:
             path.rename(path.with_suffix(f".{os.getpid()}.set-aside"))
         write_atomically(path, _seal(code) + code)
     except OSError as error:
-        log.warning("kernels are not cached: %s: %s", path, error.strerror)
+        _warn_once(f"kernels are not cached: {folder}: {error.strerror}")
 
 
 def _path(folder: Path, name: str, key: str) -> Path:
