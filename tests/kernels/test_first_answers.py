@@ -14,7 +14,7 @@ import json, sys
 import numpy as np, dhkit
 arm = dhkit.Arm.from_dh(
     [(0, 0.33, 0.01, "-pi/2"), (0, 0.02, 0, "pi/2"), (0, 0.32, 0.08, 1.3), (0, 0.01, -0.08, "-pi/2"),
-     (0, 0.38, 0, 1.2), (0, 0, 0.09, "pi/2"), (0, 0.11, 0, 0.3)], name="seven",
+     (0, 0.38, 0, 1.2), (0, 0, 0.09, "pi/2"), (0, 0.11, 0.05, 0.3)], name="seven",
 ).with_uniform_links([4, 3, 3, 2, 2, 1, 0.5])
 seen, q, qd = {}, np.full(7, 0.1), np.full(7, 0.2)
 def first(name, call):
