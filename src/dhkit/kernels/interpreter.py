@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import operator
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import nan
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels.elementary import EXACT_RANGE
+from dhkit.kernels.stages import Stage, Stages
 from dhkit.symbolic import Graph
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ class Interpreter:
         self._functions = {1: one, LANES: one.map("lanes", "serial", LANES, [0, 1], [])}
         self._inputs = [variable.size for variable in graph.inputs]
         self._outputs = [variable.size for variable in graph.outputs]
-        self._stages = _Stages()
+        self._stage = Stages(self._staged)
 
     def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Fill ``outputs``; all are arrays (N, size), as of :class:`dhkit.kernels.Kernel`."""
@@ -63,53 +62,17 @@ class Interpreter:
         for k in range(start, count):
             self._stage(1).work(parameters, [x[k] for x in inputs], [y[k] for y in outputs])
 
-    def _stage(self, lanes: int) -> _Stage:
-        """Return this thread's staging arrays for so many items."""
-        stage = self._stages.by_lanes.get(lanes)
-        if stage is None:
-            stage = self._stages.by_lanes[lanes] = _Stage.of(self._functions[lanes], lanes, self._inputs, self._outputs)
-        return stage
-
-
-@dataclass(frozen=True, slots=True)
-class _Stage:
-    """Arrays that a CasADi function reads and writes in place."""
-
-    parameters: Array
-    inputs: list[Array]
-    outputs: list[Array]
-    run: Callable[[], None]
-    kept: tuple[Any, ...]
-    """What ``run`` works with without holding it."""
-
-    @classmethod
-    def of(cls, function: casadi.Function, lanes: int, inputs: Sequence[int], outputs: Sequence[int]) -> _Stage:
+    def _staged(self, lanes: int) -> Stage:
         buffer: Any
-        buffer, run = function.buffer()
-        zero, parameters = np.zeros(1), np.zeros(inputs[0])
-        staged = [np.zeros((lanes, size)) for size in inputs[1:]]
-        results = [np.zeros((lanes, size)) for size in outputs]
-        for k, array in enumerate((zero, parameters, *staged)):
+        buffer, run = self._functions[lanes].buffer()
+        zero, parameters = np.zeros(1), np.zeros(self._inputs[0])
+        inputs = [np.zeros((lanes, size)) for size in self._inputs[1:]]
+        outputs: list[NDArray[Any]] = [np.zeros((lanes, size)) for size in self._outputs]
+        for k, array in enumerate((zero, parameters, *inputs)):
             buffer.set_arg(k, array.data)
-        for k, array in enumerate(results):
+        for k, array in enumerate(outputs):
             buffer.set_res(k, array.data)
-        return cls(parameters, staged, results, run, (buffer, function, zero))
-
-    def work(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
-        """Compute as many items as the stage has lanes."""
-        self.parameters[...] = parameters
-        for staged, array in zip(self.inputs, inputs, strict=True):
-            staged[...] = array
-        self.run()
-        for array, staged in zip(outputs, self.outputs, strict=True):
-            array[...] = staged
-
-
-class _Stages(threading.local):
-    """A thread's own stages, by how many items they take."""
-
-    def __init__(self) -> None:
-        self.by_lanes: dict[int, _Stage] = {}
+        return Stage(parameters, inputs, outputs, run, kept=(buffer, zero))
 
 
 def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:

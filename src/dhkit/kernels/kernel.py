@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import DhkitError
-from dhkit.kernels.threads import in_threads
+from dhkit.kernels.threads import all_in_threads
 from dhkit.symbolic import Graph
 
 if TYPE_CHECKING:
@@ -92,8 +92,7 @@ class Kernel:
             function(parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
 
         edges = [count * k // shares for k in range(shares + 1)]
-        for _ in in_threads(work, (slice(begin, end) for begin, end in pairwise(edges)), shares):
-            pass
+        all_in_threads(work, [slice(begin, end) for begin, end in pairwise(edges)])
 
     def compile(self) -> None:
         """Have machine code from now on: from the cache, or compiled now."""
@@ -104,11 +103,14 @@ class Kernel:
                 self._compile()
 
     def _function_for(self, count: int) -> CompiledFunction | None:
-        """Return the machine code for a batch, or None if it is to be interpreted."""
+        """Return the machine code for a batch, or None if it is to be interpreted.
+
+        Once there, it serves batches of any size; small ones never wait for it to be compiled or loaded.
+        """
         mode = kernel_mode()
-        if mode == "off" or (mode == "auto" and count < SMALL):
+        if mode == "off":
             return None
-        if self._function is None and not self._failed:
+        if self._function is None and not self._failed and (mode == "on" or count >= SMALL):
             self._items += count
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()

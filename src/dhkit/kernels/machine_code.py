@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels.llvm_source import BLOCK
+from dhkit.kernels.stages import Stage, Stages, address, aligned
 
 __all__ = ["CompiledFunction", "compiled", "processor"]
 
@@ -67,29 +68,46 @@ class CompiledFunction:
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine(*processor()))
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
-        address = self._engine.get_function_address("kernel")
-        if not address:
+        place = self._engine.get_function_address("kernel")
+        if not place:
             raise RuntimeError("object code without a function named kernel")
-        self._function = SIGNATURE(address)
+        self._function = SIGNATURE(place)
+        self._alone: Stages | None = None
+        """What single items pass through."""
 
     def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Fill ``outputs``; all are arrays (N, size), C-contiguous."""
-        arrays = (*inputs, *outputs)
-        count = len(arrays[0])
-        for array in (parameters, *arrays):
+        count = len(inputs[0])
+        if count == 1:
+            stages = self._alone or self._stages(parameters, inputs, outputs)
+            stages(1).work(parameters, inputs, outputs)
+            return
+        for array in (*inputs, *outputs):
             # The machine code trusts its pointers.
-            if not array.flags.c_contiguous or (array is not parameters and len(array) != count):
+            if not array.flags.c_contiguous or len(array) != count:
                 raise ValueError(f"a kernel was given an array of shape {array.shape} and strides {array.strides}")
-        columns = sum(array.shape[1] for array in arrays)
-        work = np.empty(columns * BLOCK + ALIGNMENT // 8)
-        start = -(-_address(work) // ALIGNMENT) * ALIGNMENT
-        addresses = np.array([_address(array) for array in arrays], dtype=np.uintp)
-        self._function(_address(parameters), _address(addresses), start, count)
+        self._call(np.ascontiguousarray(parameters), [*inputs, *outputs])()
 
+    def _stages(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> Stages:
+        """Return stages for single items of arrays such as these."""
+        sizes, kinds = [array.shape[1] for array in inputs], [(array.shape[1], array.dtype) for array in outputs]
 
-def _address(array: NDArray[Any]) -> int:
-    address: int = array.__array_interface__["data"][0]
-    return address
+        def staged(items: int) -> Stage:
+            own = np.zeros(parameters.shape)
+            read = [np.zeros((items, size)) for size in sizes]
+            written: list[NDArray[Any]] = [np.zeros((items, size), kind) for size, kind in kinds]
+            return Stage(own, read, written, self._call(own, [*read, *written]))
+
+        self._alone = Stages(staged)
+        return self._alone
+
+    def _call(self, parameters: Array, arrays: Sequence[NDArray[Any]]) -> Callable[[], object]:
+        """Return a call of the function with these arrays, which it keeps."""
+        work = aligned(sum(array.shape[1] for array in arrays) * BLOCK, ALIGNMENT)
+        addresses = np.array([address(array) for array in arrays], dtype=np.uintp)
+        kept = (parameters, arrays, addresses, work)
+        places = (address(parameters), address(addresses), address(work), len(arrays[0]))
+        return lambda function=self._function, kept=kept: function(*places)  # type: ignore[misc]
 
 
 @cache

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
 from typing import TypeVar
 
-__all__ = ["in_threads"]
+__all__ = ["all_in_threads", "in_threads"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -36,6 +36,15 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item], thread
     finally:
         for future in pending:
             future.cancel()
+
+
+def all_in_threads(function: Callable[[Item], object], items: Sequence[Item]) -> None:
+    """Call a function with all items at once, a thread each: with the first in the caller's own."""
+    first, *others = items
+    pending = [_pool(len(others)).submit(function, item) for item in others]
+    function(first)
+    for future in pending:
+        future.result()
 
 
 _pools: dict[int, ThreadPoolExecutor] = {}
