@@ -58,6 +58,21 @@ def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkey
         assert np.array_equal(bits, np.where(x[:, 2] > 1, 5, 2))
 
 
+@pytest.mark.parametrize("mode", ["on", "off"])
+def test_nothing_is_written_beside_the_results(mode, monkeypatch):
+    """Machine code trusts its pointers: what lies before and behind a result keeps its value, of no items too."""
+    monkeypatch.setenv("DHKIT_KERNELS", mode)
+    run = product_kernel()
+    for count in (*range(140), 1000):
+        x = np.random.default_rng(count).normal(size=(count, 3))
+        y, bits = np.full((count + 200, 1), 7.0), np.full((count + 200, 1), 7, dtype=np.uint8)
+        run(np.array([2.0]), [x], [y[100 : 100 + count], bits[100 : 100 + count]])
+        for whole in (y, bits):
+            assert np.all(whole[:100] == 7), count
+            assert np.all(whole[100 + count :] == 7), count
+        assert not np.any(bits[100 : 100 + count] == 7)
+
+
 def test_arrays_that_a_kernel_cannot_take_are_refused(compiled):
     run, x = product_kernel(), np.ones((100, 3))
     outputs = [np.empty((100, 1)), np.empty((100, 1), dtype=np.uint8)]
