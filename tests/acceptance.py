@@ -20,6 +20,9 @@ RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "acce
 SHARE = 50
 LEAST = 5
 
+only_accepting = pytest.mark.skipif(not ACCEPTING, reason="in make accept")
+"""For tests that take too long for every change."""
+
 
 def sample_size(full: int) -> int:
     """Return how many samples this run takes of a law stated with ``full``."""
@@ -121,7 +124,8 @@ def _is_whole(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what takes the fixture, so that -m law finds it."""
+    """Mark what takes the fixture, and what runs nowhere else, so that -m law finds it."""
     for item in items:
-        if "law" in getattr(item, "fixturenames", ()):
+        left = any(mark == only_accepting.mark for mark in item.iter_markers("skipif"))
+        if left or "law" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.law)

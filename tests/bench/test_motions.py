@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from acceptance import only_accepting
 from dhkit.bench import motions
 from dhkit.bench.contenders import UnavailableError
 from dhkit.bench.motions import compare_motions, holdable_pairs
@@ -22,6 +23,7 @@ def once(monkeypatch):
     monkeypatch.setattr(motions, "BUILDS", 1)
 
 
+@only_accepting
 @pytest.mark.slow
 def test_a_report_has_all_contenders_at_both_speeds():
     pytest.importorskip("toppra")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from acceptance import only_accepting
 from dhkit import Arm, Trajectory, robots
 from dhkit.cli import main
 from dhkit.cli.quickest import ends, race, there_and_back
@@ -120,7 +121,7 @@ def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["puma560", "planar2r", "panda"])
+@pytest.mark.parametrize("name", ["planar2r", *(pytest.param(x, marks=only_accepting) for x in ("puma560", "panda"))])
 def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, tmp_path, capsys, chromium):
     assert run("demo", "--robot", name, "--quick", "--output", str(tmp_path)) == 0
     page = chromium.page()

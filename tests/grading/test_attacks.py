@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 import acceptance
 import dhkit.grading
 import dhkit.symbolic
+from acceptance import only_accepting
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.grading import grade
@@ -207,6 +208,7 @@ def test_what_is_no_answer_is_refused(name):
     assert report.verdict is (Verdict.WRONG if name in TRIED else Verdict.UNREADABLE)
 
 
+@only_accepting
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_wrong_is_found_so_in_seconds(name):
     report = judged(lambda: grade_answers(PLANAR, {"V": WRONG[name]}))
@@ -214,6 +216,7 @@ def test_what_is_wrong_is_found_so_in_seconds(name):
     assert report.verdict in (Verdict.WRONG, Verdict.UNREADABLE)
 
 
+@only_accepting
 @pytest.mark.parametrize("name", SLOW)
 def test_what_is_right_and_slow_is_judged_or_refused(name):
     report = judged(lambda: grade_answers(PLANAR, {"V": SLOW[name]}))
@@ -283,6 +286,7 @@ def test_hostile_robots_are_refused_or_judged_by(folder, name):
     check(judged(lambda: grade(path)))
 
 
+@only_accepting
 @pytest.mark.parametrize("name", ENDLESS)
 def test_endless_robots_cost_their_sheet_alone(folder, name):
     text, answer = ENDLESS[name]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import library_robot, read_robot
 from dhkit.errors import AnswerError
@@ -436,6 +437,7 @@ LONG_PRODUCTS = [
 ]
 
 
+@only_accepting
 @pytest.mark.slow
 @pytest.mark.parametrize("text", LONG_PRODUCTS)
 def test_long_products_are_decided_soon(text, law):

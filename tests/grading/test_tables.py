@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acceptance import only_accepting
 from dhkit.description import Convention, from_dh, library_robot, robots
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
@@ -152,6 +153,7 @@ def reversed_z(rows, i):
     return rows
 
 
+@only_accepting
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar2r", "polar_rp", "stanford", "puma560", "ur5", "cobra600", "jaco"])
 @pytest.mark.parametrize("change", [turned_x, reversed_z])
@@ -244,6 +246,7 @@ def test_other_frames_in_the_other_convention(name):
     assert frames(judgement) == ("q2 is counted from another zero: there the file's q2 is 90 degrees",)
 
 
+@only_accepting
 @pytest.mark.slow
 @pytest.mark.parametrize("name", robots())
 def test_another_length_is_another_arm(name):

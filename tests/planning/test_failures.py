@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dhkit
+from acceptance import only_accepting
 from dhkit.description import library_robot, pose
 from dhkit.errors import DescriptionError, PlanningError, UnreachableError
 from dhkit.planning import MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
@@ -114,7 +115,7 @@ def test_an_obstacle_around_the_only_branch_of_a_pose():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [60.0, 2.0])
+@pytest.mark.parametrize("seconds", [pytest.param(60.0, marks=only_accepting), 2.0])
 def test_no_way_around_an_obstacle(law, seconds):
     """An arm in a plane cannot pass a wall from its base outwards: that is said, within the time limit."""
     arm = library_robot("planar2r")

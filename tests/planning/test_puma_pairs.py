@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acceptance import only_accepting
 from dhkit.description import library_robot
 from dhkit.planning import Planner
 from dhkit.trajectories import Limits
@@ -45,6 +46,7 @@ def test_pairs(law, speed, near):
     print(f"\n  toppra takes {100 * np.mean(gains):.2f} % longer on average, {100 * max(gains):.1f} % at most", end="")
 
 
+@only_accepting
 @pytest.mark.slow
 def test_a_mesh_counts_for_little():
     start, goal = random_pairs(PUMA, 1, seed=7)[0]
