@@ -11,12 +11,25 @@ from dhkit.errors import (
     ExpressionError,
     ModelError,
     PlanningError,
+    SimulationError,
     UnreachableError,
 )
 from dhkit.lazy import lazy_names
 
 if TYPE_CHECKING:
     from dhkit.arm import Arm
+    from dhkit.control import (
+        LQR,
+        PID,
+        ComputedTorque,
+        FeedForward,
+        FrictionCompensation,
+        PDGravity,
+        Push,
+        SimulationResult,
+        Sine,
+        Step,
+    )
     from dhkit.description import Description, pose, pose_parts, robots
     from dhkit.dynamics import Friction
     from dhkit.grading import GradeReport, grade
@@ -42,16 +55,21 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "LQR",
+    "PID",
     "AnswerError",
     "Arm",
+    "ComputedTorque",
     "Description",
     "DescriptionError",
     "DhkitError",
     "Effort",
     "Energy",
     "ExpressionError",
+    "FeedForward",
     "Floor",
     "Friction",
+    "FrictionCompensation",
     "GradeReport",
     "IKFlag",
     "IKSolutions",
@@ -61,8 +79,14 @@ __all__ = [
     "ModelError",
     "MotorPower",
     "Obstacle",
+    "PDGravity",
     "Payload",
     "PlanningError",
+    "Push",
+    "SimulationError",
+    "SimulationResult",
+    "Sine",
+    "Step",
     "Time",
     "ToolAcceleration",
     "ToolDirection",
@@ -83,6 +107,18 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "dhkit.arm": ("Arm",),
+        "dhkit.control": (
+            "LQR",
+            "PID",
+            "ComputedTorque",
+            "FeedForward",
+            "FrictionCompensation",
+            "PDGravity",
+            "Push",
+            "SimulationResult",
+            "Sine",
+            "Step",
+        ),
         "dhkit.description": (
             "Description",
             "pose",

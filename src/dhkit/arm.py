@@ -15,6 +15,7 @@ from dhkit.description import Array, Description, DHTable, Named
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
+    from dhkit.control import Controller, Push, Reference, SimulationResult
     from dhkit.description.table import Quantity
     from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
@@ -359,6 +360,64 @@ class Arm:
         from dhkit.symbolic import CasadiFunctions
 
         return CasadiFunctions(self._description)
+
+    # Control
+
+    def simulate(
+        self,
+        controller: Controller | None = None,
+        reference: Reference | Trajectory | ArrayLike | None = None,
+        duration: float | None = None,
+        q0: ArrayLike | None = None,
+        qd0: ArrayLike | None = None,
+        rate: float = 1000.0,
+        plant: Arm | None = None,
+        plant_rate: float | None = None,
+        *,
+        friction: bool | Friction = False,
+        restitution: float | None = 0.0,
+        pushes: Sequence[Push] = (),
+        saturation: bool = True,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> SimulationResult:
+        """Return how the arm moves under a controller; see :func:`dhkit.control.simulate`.
+
+        Parameters
+        ----------
+        controller, reference, duration, q0, qd0, rate, plant_rate, saturation, progress
+            As there.
+        plant
+            The arm that moves, where it differs from this one: another payload, other parameters, the same joints.
+        friction
+            Of the joints: True for a step with stiction, or a :class:`Friction` that is smooth.
+        restitution
+            Of the joint stops, 0 to 1; None for joints that pass their limits.
+        pushes
+            Wrenches on the tool or on links.
+        """
+        from dhkit.control import Plant, simulate
+        from dhkit.dynamics import Friction
+
+        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, tuple(pushes))
+        return simulate(
+            self._description,
+            controller,
+            reference,
+            duration,
+            q0,
+            qd0,
+            rate,
+            moved,
+            plant_rate,
+            saturation=saturation,
+            progress=progress,
+        )
+
+    def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return A (2n, 2n) and B (2n, n) of the arm near a state; see :func:`dhkit.control.linearize`."""
+        from dhkit.control import linearize
+
+        return linearize(self._description, q, qd)
 
     # Motions
 

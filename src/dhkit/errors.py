@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 __all__ = [
     "AnswerError",
     "DescriptionError",
@@ -9,6 +11,7 @@ __all__ = [
     "ExpressionError",
     "ModelError",
     "PlanningError",
+    "SimulationError",
     "UnreachableError",
 ]
 
@@ -35,6 +38,12 @@ class PlanningError(DhkitError):
 
 class UnreachableError(PlanningError):
     """A pose that the arm cannot reach, where one was required."""
+
+
+class SimulationError(DhkitError):
+    """A simulation that cannot go on: names the time; ``result`` is what was simulated until then, or None."""
+
+    result: Any = None
 
 
 class AnswerError(DhkitError):

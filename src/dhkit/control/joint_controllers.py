@@ -1,0 +1,116 @@
+"""Controllers of single joints: proportional, integral and derivative action."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.control.gains import Robot, description_of, effective_inertia, gain, pid_gains, positive
+from dhkit.control.references import Setpoint
+from dhkit.description import Array
+
+__all__ = ["PID"]
+
+
+class PID:
+    """Independent joints: tau = kp e + ki int(e) + kd de/dt, e = q_setpoint - q (Siciliano et al. 2009, section 8.3).
+
+    The rate of the error is taken from the measured rate, or with ``derivative="measurement"`` the setpoint's rate is
+    left out, so that a step of the setpoint does not kick. The integral stands still in a joint whose drive cannot give
+    more and would be asked for more (conditional integration: Astrom and Hagglund 2006, Advanced PID control, section
+    3.5).
+
+    Parameters
+    ----------
+    kp, ki, kd
+        Gains, N m/rad, N m/(rad s), N m s/rad (N/m ... for slides): a number for all joints, or shape (n,).
+    derivative
+        ``"error"`` or ``"measurement"``.
+    cutoff
+        rad/s: the derivative is filtered by 1 / (s / cutoff + 1); None for no filter.
+    limit
+        Largest torques, shape (n,) or a number, for the integral's sake; infinite unless given.
+
+    Raises
+    ------
+    ValueError
+        A gain that is negative or not finite, another derivative, a cutoff or limit that is not positive.
+    """
+
+    def __init__(
+        self,
+        kp: ArrayLike,
+        ki: ArrayLike = 0.0,
+        kd: ArrayLike = 0.0,
+        *,
+        derivative: str = "error",
+        cutoff: float | None = None,
+        limit: ArrayLike | None = None,
+    ) -> None:
+        self.kp, self.ki, self.kd = gain(kp, "kp"), gain(ki, "ki"), gain(kd, "kd")
+        if derivative not in ("error", "measurement"):
+            raise ValueError(f"derivative is {derivative!r}; expected 'error' or 'measurement'")
+        self.derivative = derivative
+        self.cutoff = None if cutoff is None else positive(cutoff, "cutoff")
+        self.limit = np.asarray(np.inf if limit is None else limit, dtype=float)
+        if not (self.limit > 0).all():
+            raise ValueError(f"limit is {self.limit.tolist()}; expected positive numbers")
+        self.reset()
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        bandwidth: float = 20.0,
+        damping: float = 1.0,
+        integral: float = 0.5,
+        q: ArrayLike | None = None,
+        derivative: str = "error",
+        cutoff: float | None = None,
+    ) -> PID:
+        """Return the controller whose joints have the poles of (s + a w) (s^2 + 2 z w s + w^2).
+
+        With the effective inertia m of a joint, kp = m w^2 (1 + 2 z a), ki = m a w^3, kd = m w (2 z + a). The drives'
+        limits are the arm's.
+
+        Parameters
+        ----------
+        robot
+            The arm, or its description.
+        bandwidth
+            w, rad/s.
+        damping
+            z.
+        integral
+            a: how fast the integral's pole is, over the bandwidth; 0 for PD.
+        q
+            Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
+        derivative, cutoff
+            As for the class.
+        """
+        description = description_of(robot)
+        m = effective_inertia(description, q)
+        kp, ki, kd = pid_gains(bandwidth, damping, integral)
+        limit = description.numbers.effort
+        return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=limit)
+
+    def reset(self) -> None:
+        """Forget the integral, the filter and the time."""
+        self._integral: Array | float = 0.0
+        self._rate: Array | None = None
+        self._time: float | None = None
+
+    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
+        """Return the torques, shape (n,)."""
+        error = setpoint.q - q
+        step = 0.0 if self._time is None else t - self._time
+        self._time = t
+        rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd
+        if self.cutoff is not None:
+            share = 1.0 if self._rate is None else 1 - np.exp(-self.cutoff * step)
+            rate = rate if self._rate is None else self._rate + share * (rate - self._rate)
+            self._rate = rate
+        tau: Array = self.kp * error + self.ki * self._integral + self.kd * rate
+        grows = (np.abs(tau) < self.limit) | (tau * error < 0)
+        self._integral = self._integral + np.where(grows, error * step, 0.0)
+        return tau

@@ -1,0 +1,200 @@
+"""The arm that is simulated: its accelerations under torques, friction, stops and pushes, at single states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.control.complementarity import bounded_forces
+from dhkit.control.pushes import Push
+from dhkit.description import Array, Description, require_bodies
+from dhkit.dynamics import Friction, bias, friction_torque, kinetic_energy, mass_matrix, potential_energy
+from dhkit.dynamics.programs import dynamics_kernel
+from dhkit.kernels import Kernel
+
+__all__ = ["Contact", "Plant"]
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """An arm as it moves.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    friction
+        How the joints' friction acts: None for none; of width 0 dry friction is a step with stiction.
+    restitution
+        Of the joint stops: the share of the rate that is left after an impact, 0 to 1; None for joints that pass
+        their limits.
+    pushes
+        Wrenches on the tool or on links, each over a time window.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body.
+    ValueError
+        A restitution that is not from 0 to 1.
+    """
+
+    description: Description
+    friction: Friction | None = None
+    restitution: float | None = 0.0
+    pushes: tuple[Push, ...] = ()
+    _single: tuple[Kernel, Array] = field(init=False)
+
+    def __post_init__(self) -> None:
+        require_bodies(self.description)
+        if self.restitution is not None and not 0 <= self.restitution <= 1:
+            raise ValueError(f"restitution is {self.restitution!r}; expected 0 to 1, or None for no stops")
+        object.__setattr__(self, "_single", dynamics_kernel("forward_dynamics", self.description))
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.description.n
+
+    @cached_property
+    def dry(self) -> NDArray[np.bool_]:
+        """Joints with dry friction that is a step, shape (n,)."""
+        none = np.zeros(self.n, dtype=bool)
+        if self.friction is None or self.friction.width:
+            return none
+        dry: NDArray[np.bool_] = np.any(self.description.numbers.coulomb != 0, axis=1)
+        return dry
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Where the stops are, shape (n,) each, rad and m; infinite without stops."""
+        numbers = self.description.numbers
+        free = np.full(self.n, np.inf)
+        return (-free, free) if self.restitution is None else (numbers.lower, numbers.upper)
+
+    @cached_property
+    def smooth(self) -> bool:
+        """Whether no joint has stiction."""
+        return not self.dry.any()
+
+    @cached_property
+    def stopped(self) -> bool:
+        """Whether a joint has a stop."""
+        return bool(np.isfinite(self.limits).any())
+
+    @cached_property
+    def nothing_holds(self) -> Contact:
+        """The contact of joints that nothing holds."""
+        return Contact.free(self.n)
+
+    def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
+        """Return forward dynamics at one state, shape (n,); ``tau`` holds all torques but the links' own."""
+        qdd: Array = np.empty((1, self.n))
+        run, parameters = self._single
+        run(parameters, [q[None], qd[None], tau[None]], [qdd])
+        return qdd.reshape(-1)
+
+    def resistance(self, qd: Array, directions: NDArray[np.int8]) -> Array:
+        """Return the torques that friction takes, shape (n,), of the sign of the motion.
+
+        Parameters
+        ----------
+        qd
+            Joint rates, shape (n,).
+        directions
+            Which way joints with dry friction go, or are about to go: 1, -1, or 0 for those that hold.
+        """
+        if self.friction is None:
+            return np.zeros(self.n)
+        if self.smooth:
+            return friction_torque(self.description, qd, self.friction)
+        numbers = self.description.numbers
+        dry = np.where(directions > 0, numbers.coulomb[:, 0], np.where(directions < 0, numbers.coulomb[:, 1], 0.0))
+        resisting: Array = numbers.viscous * qd + dry
+        return resisting
+
+    def pushed(self, pushes: Sequence[Push], q: Array) -> Array:
+        """Return the torques of some pushes, shape (n,)."""
+        total = np.zeros(self.n)
+        for push in pushes:
+            total += push.torque(self.description, q)
+        return total
+
+    def contact(self, q: Array, qd: Array, tau: Array, pushes: Sequence[Push] = ()) -> Contact:
+        """Return which joints hold, by friction or at a stop, and which way the others go.
+
+        Joints whose rate is exactly 0 hold if the torques that this takes are within the bounds of their friction; a
+        stop bears any torque towards it. All of them are decided at once, since each loads the others through the mass
+        matrix.
+        """
+        lower, upper = self.limits
+        directions = np.sign(qd).astype(np.int8)
+        at_rest = (qd == 0) & (self.dry | (q <= lower) | (q >= upper))
+        if not at_rest.any():
+            return Contact(directions, at_rest)
+        coulomb = np.where(self.dry[:, None], self.description.numbers.coulomb, 0.0)
+        most = np.where(q >= upper, np.inf, coulomb[:, 0])[at_rest]
+        least = np.where(q <= lower, -np.inf, coulomb[:, 1])[at_rest]
+        drive = tau + self.pushed(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
+        inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
+        _, side = bounded_forces(inverse[np.ix_(at_rest, at_rest)], (inverse @ drive)[at_rest], least, most)
+        holds = at_rest.copy()
+        holds[at_rest] = side == 0
+        directions[at_rest] = side
+        return Contact(directions, holds)
+
+    def moving(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
+        """Return the accelerations while the contact lasts, shape (n,): exactly 0 of joints that hold."""
+        net = tau - self.resistance(qd, contact.directions)
+        if pushes:
+            net += self.pushed(pushes, q)
+        if not contact.holds.any():
+            return self.accelerations(q, qd, net)
+        free = ~contact.holds
+        qdd = np.zeros(self.n)
+        if free.any():
+            M = mass_matrix(self.description, q)
+            qdd[free] = np.linalg.solve(M[np.ix_(free, free)], (net - bias(self.description, q, qd))[free])
+        return qdd
+
+    def held(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
+        """Return the resisting torques that hold the joints of a contact, shape (n,); 0 for the others."""
+        qdd = self.moving(q, qd, tau, contact, pushes)
+        net = tau + self.pushed(pushes, q) - self.resistance(qd, contact.directions)
+        needed = net - mass_matrix(self.description, q) @ qdd - bias(self.description, q, qd)
+        return np.where(contact.holds, needed, 0.0)
+
+    def after_impact(self, q: Array, qd: Array, joint: int, *, rebounds: bool) -> Array:
+        """Return the rates after a joint has hit its stop: an impulse along it through the inverse mass matrix."""
+        column = np.linalg.solve(mass_matrix(self.description, q), np.eye(self.n)[joint])
+        restitution = (self.restitution or 0.0) if rebounds else 0.0
+        after: Array = qd - column * ((1 + restitution) * qd[joint] / column[joint])
+        after[joint] = -restitution * qd[joint] + 0.0
+        return after
+
+    def kinetic_energy(self, q: Array, qd: Array) -> float:
+        """Return the kinetic energy, drives included, J."""
+        return float(kinetic_energy(self.description, q, qd))
+
+    def energy(self, q: Array, qd: Array) -> float:
+        """Return kinetic and potential energy, J."""
+        return self.kinetic_energy(q, qd) + float(potential_energy(self.description, q))
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """What joints with stiction and at stops do until something changes."""
+
+    directions: NDArray[np.int8]
+    """Which way each joint goes or is about to go: 1, -1, 0; shape (n,)."""
+    holds: NDArray[np.bool_]
+    """Which joints stay where they are, shape (n,)."""
+
+    @classmethod
+    def free(cls, n: int) -> Contact:
+        """Return that of joints that nothing holds."""
+        return cls(np.zeros(n, dtype=np.int8), np.zeros(n, dtype=bool))

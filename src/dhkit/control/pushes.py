@@ -1,0 +1,66 @@
+"""Wrenches from outside: on the tool or on a link, over a time window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description
+from dhkit.description.frames import carrying, number_array
+from dhkit.kinematics import forward_kinematics, frames
+
+__all__ = ["Push"]
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A force and a moment on the arm, constant in world axes from one time to another.
+
+    Raises
+    ------
+    ValueError
+        Shapes other than (3,), values that are not finite, a link below 1, or an end before the beginning.
+    """
+
+    force: ArrayLike
+    """N, world axes, shape (3,)."""
+    moment: ArrayLike = (0.0, 0.0, 0.0)
+    """N m, world axes, shape (3,)."""
+    link: int | None = None
+    """Which link is pushed, from 1; None for the tool."""
+    point: ArrayLike = (0.0, 0.0, 0.0)
+    """Where the force acts, m, in the link's DH frame or in the tool's, shape (3,)."""
+    begin: float = 0.0
+    """s."""
+    end: float = inf
+    """s; the push acts until just before."""
+
+    def __post_init__(self) -> None:
+        for name in ("force", "moment", "point"):
+            value = number_array(getattr(self, name), name, "(3,)")
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise ValueError(f"{name} is {getattr(self, name)!r}; expected three finite numbers")
+            object.__setattr__(self, name, value)
+        if self.link is not None and self.link < 1:
+            raise ValueError(f"link is {self.link}; expected 1 or more, or None for the tool")
+        if not self.begin <= self.end:
+            raise ValueError(f"the push ends at {self.end:g} s, before it begins at {self.begin:g} s")
+
+    def torque(self, description: Description, q: Array) -> Array:
+        """Return what the push does to the joints, shape (n,), N m and N."""
+        n = description.n
+        if self.link is not None and self.link > n:
+            raise ValueError(f"link is {self.link}; {description.name} has {n}")
+        force, moment, point = (np.asarray(x, dtype=float) for x in (self.force, self.moment, self.point))
+        T = frames(description, q)
+        frame = forward_kinematics(description, q) if self.link is None else T[self.link]
+        place = frame[:3, :3] @ point + frame[:3, 3]
+        moved = n if self.link is None else self.link
+        tau = np.zeros(n)
+        for i, axes in enumerate(carrying(description.convention, list(T))[:moved]):
+            turned = force if description.numbers.prismatic[i] else np.cross(place - axes[:3, 3], force) + moment
+            tau[i] = axes[:3, 2] @ turned
+        return tau

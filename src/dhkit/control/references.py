@@ -1,0 +1,160 @@
+"""What a controller is to follow: motions, held configurations, steps and sines, sampled in one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.description.frames import number_array
+from dhkit.kinematics import forward_kinematics
+from dhkit.trajectories import Trajectory
+
+__all__ = ["Held", "Reference", "Samples", "Setpoint", "Sine", "Step", "reference_of"]
+
+Samples: TypeAlias = tuple[Array, Array, Array]
+"""Joint values, rates and accelerations, shape (N, n) each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setpoint:
+    """What is asked for at one time: joint values, rates and accelerations, shape (n,), rad, m and seconds."""
+
+    description: Description
+    q: Array
+    qd: Array
+    qdd: Array
+
+    @cached_property
+    def T(self) -> Array:
+        """The tool's pose in the world, shape (4, 4)."""
+        return forward_kinematics(self.description, self.q)
+
+
+@runtime_checkable
+class Reference(Protocol):
+    """Anything that has joint values for times; after its ``duration`` it stays where it is."""
+
+    @property
+    def duration(self) -> float | None:
+        """In s; None where it has no end."""
+
+    def sampled(self, t: Array) -> Samples:
+        """Return joint values, rates and accelerations at times (N,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """One configuration."""
+
+    q: Array
+    duration: float | None = None
+
+    def sampled(self, t: Array) -> Samples:
+        """Return the configuration for each time."""
+        still = np.zeros((len(t), len(self.q)))
+        return still + self.q, still, still.copy()
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A configuration, and from a time on another one."""
+
+    before: ArrayLike
+    after: ArrayLike
+    time: float = 0.0
+    """s."""
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        _make_finite(self, "before", "after", "time")
+
+    def sampled(self, t: Array) -> Samples:
+        """Return one of the configurations for each time."""
+        q = np.where((t >= self.time)[:, None], np.asarray(self.after), np.asarray(self.before))
+        return q, np.zeros_like(q), np.zeros_like(q)
+
+
+@dataclass(frozen=True, eq=False)
+class Sine:
+    """Joint values centre + amplitude sin(2 pi frequency t + phase)."""
+
+    centre: ArrayLike
+    amplitude: ArrayLike
+    frequency: ArrayLike = 1.0
+    """Hz, for all joints or of each."""
+    phase: ArrayLike = 0.0
+    """rad."""
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        _make_finite(self, "centre", "amplitude", "frequency", "phase")
+
+    def sampled(self, t: Array) -> Samples:
+        """Return joint values and their derivatives."""
+        centre = np.asarray(self.centre)
+        rate = 2 * np.pi * np.broadcast_to(np.asarray(self.frequency), centre.shape)
+        amplitude = np.broadcast_to(np.asarray(self.amplitude), centre.shape)
+        angle = rate * t[:, None] + np.asarray(self.phase)
+        swing = amplitude * np.sin(angle)
+        return centre + swing, amplitude * rate * np.cos(angle), -(rate**2) * swing
+
+
+def _make_finite(reference: object, *names: str) -> None:
+    """Turn fields into arrays.
+
+    Raises
+    ------
+    ValueError
+        One that is not finite.
+    TypeError
+        One that is no numbers.
+    """
+    for name in names:
+        value = number_array(getattr(reference, name), name, "numbers")
+        if not np.isfinite(value).all():
+            raise ValueError(f"{type(reference).__name__}: {name} is {value.tolist()}; expected finite numbers")
+        object.__setattr__(reference, name, value)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A trajectory as a reference."""
+
+    motion: Trajectory
+
+    @property
+    def duration(self) -> float:
+        return self.motion.duration
+
+    def sampled(self, t: Array) -> Samples:
+        return self.motion.q(t), self.motion.qd(t), self.motion.qdd(t)
+
+
+def reference_of(description: Description, reference: Reference | Trajectory | ArrayLike) -> Reference:
+    """Return a reference, made of a trajectory or of a configuration where it is one.
+
+    Raises
+    ------
+    ValueError
+        A trajectory of another robot, or a configuration that is not (n,) and finite.
+    TypeError
+        Something else.
+    """
+    if isinstance(reference, Trajectory):
+        if reference.n != description.n or reference.description.kinds != description.kinds:
+            raise ValueError(
+                f"the reference is a motion of {reference.description.name} ({reference.n} joints); expected one of "
+                f"{description.name} ({description.n} joints)"
+            )
+        return _Motion(reference)
+    if isinstance(reference, Reference):
+        return reference
+    q = joint_array(description, reference, "reference")
+    if q.shape != (description.n,) or not np.isfinite(q).all():
+        raise ValueError(f"reference has shape {q.shape}; expected a motion, or ({description.n},) finite joint values")
+    return Held(q.copy())
