@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acceptance import only_accepting
 from conftest import require
+from dhkit import Arm
 from dhkit.errors import DhkitError
 from dhkit.kernels import store
 
@@ -131,6 +133,7 @@ def test_every_source_that_can_matter_is_in_the_key(tmp_path, monkeypatch):
 @pytest.mark.parametrize("level", ["kernels", "cache", "above"])
 @pytest.mark.parametrize("mode", [0o777, 0o770])
 def test_a_folder_that_others_can_write_is_not_used(tmp_path, monkeypatch, caplog, level, mode):
+    monkeypatch.setattr(store, "_own_group", lambda gid: False)
     cache = tmp_path / "above" / "cache"
     (cache / "kernels").mkdir(mode=0o700, parents=True)
     monkeypatch.setenv("DHKIT_CACHE_DIR", str(cache))
@@ -151,6 +154,10 @@ def test_a_user_that_does_not_exist_is_one_line(monkeypatch):
         DhkitError, match=r"^DHKIT_CACHE_DIR is '~nobody-of-this-name/x': there is no such user; expected a folder$"
     ):
         store.cache_folder()
+    arm, q = Arm.load("planar2r").with_tool(np.eye(4) + 0.07 * np.eye(4, k=3)), np.zeros((64, 2))
+    for _ in range(3):
+        with pytest.raises(DhkitError, match="there is no such user"):
+            arm.fk(q)
     command = [sys.executable, "-m", "dhkit", "workspace", "planar2r"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 2, done.stderr
@@ -160,6 +167,59 @@ def test_a_user_that_does_not_exist_is_one_line(monkeypatch):
 def test_an_unwritable_home_means_memory_only(tmp_path):
     (tmp_path / "file").write_text("")
     assert "compiling forward_kinematics" in in_new_process(CALL, tmp_path / "file").stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.parametrize("umask", ["000", "002", "022", "077"])
+def test_folders_and_entries_are_the_users_own_whatever_the_umask(tmp_path, umask):
+    home = tmp_path / "home"
+    home.mkdir(mode=0o700)
+    code = f"import os; os.umask(0o{umask}); import dhkit; dhkit.Arm.load('planar2r').compile()"
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("DHKIT_", "XDG_"))}
+    subprocess.run([sys.executable, "-c", code], env={**environment, "HOME": str(home)}, check=True, timeout=120)
+    entries = list(home.rglob("*.kernel"))
+    assert len(entries) > 10
+    for path in (*entries, *entries[0].parents[:3]):
+        assert path.stat().st_mode & 0o077 == 0, path
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+@pytest.mark.parametrize("what", ["writable by others", "a link", "a pipe"])
+def test_an_entry_that_somebody_else_may_have_written_is_not_run(tmp_path, monkeypatch, what):
+    monkeypatch.setenv("DHKIT_CACHE_DIR", str(tmp_path))
+    store.write("test", "key", b"code")
+    assert store.read("test", "key") == b"code"
+    (path,) = (tmp_path / "kernels").iterdir()
+    if what == "writable by others":
+        path.chmod(0o666)
+    else:
+        path.rename(tmp_path / "elsewhere")
+        os.mkfifo(path) if what == "a pipe" else path.symlink_to(tmp_path / "elsewhere")
+    assert store.read("test", "key") is None
+    store.write("test", "key", b"code")
+    assert store.read("test", "key") == b"code"
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_cache_that_cannot_be_written_can_be_read(tmp_path, monkeypatch):
+    monkeypatch.setenv("DHKIT_CACHE_DIR", str(tmp_path))
+    store.write("test", "key", b"code")
+    (tmp_path / "kernels").chmod(0o500)
+    try:
+        assert store.read("test", "key") == b"code"
+        store.write("test", "other", b"code")
+    finally:
+        (tmp_path / "kernels").chmod(0o700)
+
+
+def test_without_a_home_kernels_are_compiled_in_memory(monkeypatch):
+    monkeypatch.delenv("DHKIT_CACHE_DIR", raising=False)
+
+    def homeless(*_, **__):
+        raise RuntimeError("could not determine the home directory")
+
+    monkeypatch.setattr(store.platformdirs, "user_cache_dir", homeless)
+    assert store.cache_folder() is None
 
 
 FULL = """

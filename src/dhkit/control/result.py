@@ -28,7 +28,7 @@ class EnergyAudit:
     impacts: float
     """Lost at stops."""
     turnover: float
-    """What the drives did, gave and took counted alike: the measure of what remains."""
+    """What the drives gave and took, counted alike, and the largest kinetic energy: the measure of what remains."""
 
     @property
     def remains(self) -> float:
@@ -38,8 +38,7 @@ class EnergyAudit:
     @property
     def error(self) -> float:
         """What remains, over the energy that was turned over; 0 where none was."""
-        scale = max(self.turnover, abs(self.change), self.friction, self.impacts)
-        return abs(self.remains) / scale if scale > 0 else 0.0
+        return abs(self.remains) / self.turnover if self.turnover > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from dhkit.control.references import Held, Reference, Setpoint, reference_of
 from dhkit.control.result import EnergyAudit, SimulationResult
 from dhkit.control.steps import State, advanced
 from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics import kinetic_energy
 from dhkit.errors import SimulationError
 from dhkit.trajectories import Trajectory
 
@@ -227,13 +228,14 @@ class _Run:
 
     def _result(self, k: int, state: State) -> SimulationResult:
         rows = slice(0, k + 1)
+        moving = float(kinetic_energy(self.plant.description, self.q[rows], self.qd[rows]).max())
         audit = EnergyAudit(
             change=self.plant.energy(self.q[k], self.qd[k]) - self.energy,
             drives=self.work,
             pushes=state.push_work,
             friction=state.friction_work,
             impacts=state.impact_loss,
-            turnover=self.turnover,
+            turnover=self.turnover + moving,
         )
         return SimulationResult(
             description=self.plant.description,

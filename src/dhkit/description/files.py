@@ -32,8 +32,10 @@ def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes
     return content
 
 
-def write_atomically(path: Path, content: str | bytes) -> None:
+def write_atomically(path: Path, content: str | bytes, *, private: bool = False) -> None:
     """Write a file under a temporary name and rename it: it is there whole, or not at all.
+
+    With ``private`` nobody else may read or write it, whatever the umask.
 
     Raises
     ------
@@ -49,9 +51,10 @@ def write_atomically(path: Path, content: str | bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-        umask = os.umask(0)
-        os.umask(umask)
-        Path(temporary).chmod(0o666 & ~umask)
+        if not private:  # as which the temporary file was made
+            umask = os.umask(0)
+            os.umask(umask)
+            Path(temporary).chmod(0o666 & ~umask)
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

@@ -6,11 +6,16 @@ Remez exchange; they are numbers, the code is ours.
 
 from __future__ import annotations
 
-from math import nan
+from collections.abc import Callable
+from math import inf, nan
+from typing import Any, TypeAlias
 
 from dhkit.kernels.vectors import Vector, absolute, select
 
 __all__ = ["EXACT_RANGE", "atan2", "maximum", "minimum", "sincos"]
+
+Select: TypeAlias = Callable[[Any, Any, Any], Any]
+Absolute: TypeAlias = Callable[[Any], Any]
 
 EXACT_RANGE = 1e6
 """rad: sine and cosine are right up to here and NaN beyond, where a double says little about an angle."""
@@ -72,8 +77,11 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     return select(opposite | (quadrant < -0.125), -s, s), select(opposite | (quadrant > 0.125), -c, c)
 
 
-def atan2(y: Vector, x: Vector) -> Vector:
-    """Return the angle of (x, y) in (-pi, pi], to 4 units in the last place; 0 of (0, 0), NaN of NaN."""
+def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute) -> Any:
+    """Return the angle of (x, y) in (-pi, pi], to 4 units in the last place; 0 of (0, 0), NaN of NaN.
+
+    The values are vectors, or what has their operators; ``select`` and ``absolute`` belong to them.
+    """
     width, height = absolute(x), absolute(y)
     steep = height > width
     longer = select(steep, height, width)
@@ -99,4 +107,5 @@ def atan2(y: Vector, x: Vector) -> Vector:
     angle = select(steep, HALF_PI - angle, angle)
     angle = select(x < 0.0, PI - angle, angle)
     angle = select(y < 0.0, -angle, angle)
-    return select(x.differs(x) | y.differs(y), nan, angle)
+    # Whoever is NaN is equal to nothing, and so is the sum.
+    return select(absolute(x) + absolute(y) <= inf, angle, nan)

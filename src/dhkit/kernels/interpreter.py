@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.kernels.elementary import EXACT_RANGE
+from dhkit.kernels.elementary import EXACT_RANGE, atan2
 from dhkit.kernels.stages import Stage, Stages
 from dhkit.symbolic import Graph
 
@@ -30,7 +30,8 @@ class Interpreter:
     """A program as a function of batches with the rules of a compiled kernel: what is NaN, what small integers say.
 
     Elementary functions are the C library's, and products are not fused into sums: results agree with those of a
-    compiled kernel to rounding. Several threads may call at once: each has staging arrays of its own.
+    compiled kernel to rounding. Programs with small integers are rounded alike in both, so that both decide alike.
+    Several threads may call at once: each has staging arrays of its own.
     """
 
     def __init__(self, graph: Graph, types: Sequence[str]) -> None:
@@ -38,29 +39,29 @@ class Interpreter:
         self._functions = {1: one, LANES: one.map("lanes", "serial", LANES, [0, 1], [])}
         self._inputs = [variable.size for variable in graph.inputs]
         self._outputs = [variable.size for variable in graph.outputs]
-        self._stage = Stages(self._staged)
+        self._stages = Stages(self._staged)
 
     def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Fill ``outputs``; all are arrays (N, size), as of :class:`dhkit.kernels.Kernel`."""
         count = len(inputs[0])
         if count == 1:
-            self._stage(1).work(parameters, inputs, outputs)
+            self._stages.work(1, parameters, inputs, outputs)
             return
         start = 0
         while count - start >= LANES:
             rows = slice(start, start + LANES)
-            self._stage(LANES).work(parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
+            self._stages.work(LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
             start += LANES
         if count - start > FEW:
             rows = slice(start, count)
             padded = [np.concatenate([x[rows], np.zeros((start + LANES - count, x.shape[1]))]) for x in inputs]
             results = [np.empty((LANES, y.shape[1]), y.dtype) for y in outputs]
-            self._stage(LANES).work(parameters, padded, results)
+            self._stages.work(LANES, parameters, padded, results)
             for y, result in zip(outputs, results, strict=True):
                 y[rows] = result[: count - start]
             return
         for k in range(start, count):
-            self._stage(1).work(parameters, [x[k] for x in inputs], [y[k] for y in outputs])
+            self._stages.work(1, parameters, [x[k] for x in inputs], [y[k] for y in outputs])
 
     def _staged(self, lanes: int) -> Stage:
         buffer: Any
@@ -86,7 +87,7 @@ def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     zero = casadi.SX.sym("zero")
     inputs = [casadi.SX.sym(variable.name, variable.size) for variable in graph.inputs]
     entries = [casadi.vertsplit(x) if x.numel() else [] for x in inputs]
-    values = _values(graph, entries, zero)
+    values = _values(graph, entries, zero, alike="uint8" in types)
     missing = sum((x * zero for row in entries[1:] for x in row), casadi.SX(0))
     results = [
         casadi.vertcat(*(values[k] + missing if kind == "float64" else values[k] for k in places))
@@ -95,9 +96,13 @@ def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     return casadi.Function(graph.name, [zero, *inputs], [casadi.densify(casadi.SX(x)) for x in results])
 
 
-def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.SX) -> list[casadi.SX]:
-    """Return the value of every node."""
+def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.SX, *, alike: bool) -> list[casadi.SX]:
+    """Return the value of every node; ``alike`` with the arc tangent of compiled kernels, not the C library's."""
     import casadi
+
+    def arc_tangent(y: casadi.SX, x: casadi.SX) -> casadi.SX:
+        angle: casadi.SX = casadi.atan2(y + zero, x + zero)
+        return atan2(y, x, casadi.if_else, casadi.fabs) if alike else angle
 
     apply: Mapping[str, Callable[..., casadi.SX]] = {
         "add": operator.add,
@@ -108,7 +113,7 @@ def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.S
         "absolute": casadi.fabs,
         "floor": casadi.floor,
         "sqrt": casadi.sqrt,
-        "atan2": lambda y, x: casadi.atan2(y + zero, x + zero),
+        "atan2": arc_tangent,
         "minimum": lambda a, b: casadi.if_else(a < b, a, b),
         "maximum": lambda a, b: casadi.if_else(a > b, a, b),
         "less": operator.lt,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from dhkit.kernels.interpreter import Interpreter
     from dhkit.kernels.machine_code import CompiledFunction
 
-__all__ = ["COMPILE_AFTER", "SMALL", "Kernel", "kernel", "kernel_mode"]
+__all__ = ["COMPILE_AFTER", "SMALL", "Kernel", "kernel", "kernel_mode", "uncounted"]
 
 log = logging.getLogger(__name__)
 
@@ -95,8 +96,10 @@ class Kernel:
         all_in_threads(work, [slice(begin, end) for begin, end in pairwise(edges)])
 
     def compile(self) -> None:
-        """Have machine code from now on: from the cache, or compiled now."""
-        with _lock:
+        """Have machine code from now on: from the cache, or compiled now; unless ``DHKIT_KERNELS`` is ``off``."""
+        if kernel_mode() == "off":
+            return
+        with _compiling:
             if self._function is None and not self._failed:
                 self._look_up()
             if self._function is None and not self._failed:
@@ -110,12 +113,12 @@ class Kernel:
         mode = kernel_mode()
         if mode == "off":
             return None
-        if self._function is None and not self._failed and (mode == "on" or count >= SMALL):
+        if self._function is None and not self._failed and (mode == "on" or (count >= SMALL and _counting())):
             self._items += count
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()
             elif not self._looked_up:
-                with _lock:
+                with _compiling:
                     self._look_up()
         return self._function
 
@@ -123,7 +126,6 @@ class Kernel:
         """Take machine code from the cache, if it is there."""
         if self._looked_up:
             return
-        self._looked_up = True
         try:
             from dhkit.kernels import machine_code, store
 
@@ -132,6 +134,7 @@ class Kernel:
                 self._function = machine_code.CompiledFunction(code)
         except MACHINE_CODE_ERRORS as error:
             self._give_up(error)
+        self._looked_up = True
 
     def _compile(self) -> None:
         program = self._program()
@@ -153,25 +156,51 @@ class Kernel:
         log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
 
     def _interpreted(self) -> Interpreter:
-        with _lock:
+        program = self._program()
+        with _deriving:
             if self._interpreter is None:
                 from dhkit.kernels.interpreter import Interpreter
 
-                self._interpreter = Interpreter(self._program(), self._types)
+                self._interpreter = Interpreter(program, self._types)
             return self._interpreter
 
     def _program(self) -> Graph:
-        if self._graph is None:
-            self._graph = self._derive()
-        return self._graph
+        with _deriving:
+            if self._graph is None:
+                self._graph = self._derive()
+            return self._graph
 
 
 MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
 """What llvmlite and the loader raise on a machine that they do not serve."""
 
 _kernels: dict[tuple[str, str], Kernel] = {}
-_lock = threading.RLock()
-"""Held while programs are derived, compiled and loaded, which neither CasADi nor LLVM do in two threads at once."""
+_compiling = threading.RLock()
+"""Held while kernels are compiled and loaded. Who holds both locks took this one first."""
+_deriving = threading.RLock()
+"""Held while programs are derived: CasADi's expressions are not for two threads at once. A first answer that is
+interpreted waits for no compilation, only for this."""
+
+
+class _Uncounted(threading.local):
+    depth = 0
+
+
+_uncounted = _Uncounted()
+
+
+def _counting() -> bool:
+    return _uncounted.depth == 0
+
+
+@contextmanager
+def uncounted() -> Iterator[None]:
+    """Let this thread's batches not count towards compiling: those inside a call that a control loop may make."""
+    _uncounted.depth += 1
+    try:
+        yield
+    finally:
+        _uncounted.depth -= 1
 
 
 def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)) -> Kernel:
@@ -188,21 +217,29 @@ def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence
     """
     found = _kernels.get((name, pattern))
     if found is None:
-        with _lock:
+        with _deriving:
             found = _kernels.setdefault((name, pattern), Kernel(name, pattern, derive, types))
             while len(_kernels) > KEPT:
                 del _kernels[next(iter(_kernels))]
     return found
 
 
-def _after_fork() -> None:
-    """Make a new lock: the child's only thread does not hold what it held in the parent."""
-    global _lock
-    _lock = threading.RLock()
+def _before_fork() -> None:
+    """Wait for what is being compiled: LLVM's own locks would stay closed in the child."""
+    _compiling.acquire()
+    _deriving.acquire()
+
+
+def _after_fork_in_parent() -> None:
+    _deriving.release()
+    _compiling.release()
+
+
+def _after_fork_in_child() -> None:
+    """Make new locks: the child's only thread does not hold what it held in the parent."""
+    global _compiling, _deriving
+    _compiling, _deriving = threading.RLock(), threading.RLock()
 
 
 if hasattr(os, "register_at_fork"):
-    # A fork waits for what is being compiled: LLVM's own locks would stay closed in the child.
-    os.register_at_fork(
-        before=lambda: _lock.acquire(), after_in_parent=lambda: _lock.release(), after_in_child=_after_fork
-    )
+    os.register_at_fork(before=_before_fork, after_in_parent=_after_fork_in_parent, after_in_child=_after_fork_in_child)

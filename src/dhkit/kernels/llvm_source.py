@@ -9,7 +9,20 @@ from itertools import accumulate
 from typing import TypeAlias
 
 from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
-from dhkit.kernels.vectors import VECTOR, WIDTH, Body, Mask, Vector, absolute, constant, floor, select, sqrt
+from dhkit.kernels.vectors import (
+    EXACT,
+    FUSING,
+    VECTOR,
+    WIDTH,
+    Body,
+    Mask,
+    Vector,
+    absolute,
+    constant,
+    floor,
+    select,
+    sqrt,
+)
 from dhkit.symbolic import Graph
 
 __all__ = ["BLOCK", "FLOAT", "SMALL_INTEGER", "llvm_source"]
@@ -82,7 +95,8 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     types
         Of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
     """
-    layout, body = Layout(graph), Body()
+    # Where small integers are decided, every rounding is that of the interpreter, so that both decide alike.
+    layout, body = Layout(graph), Body(EXACT if SMALL_INTEGER in types else FUSING)
     results = _results(graph, layout, body, types)
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
     outputs = [f"%y{k}" for k in range(len(graph.outputs))]

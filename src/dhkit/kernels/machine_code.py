@@ -80,7 +80,7 @@ class CompiledFunction:
         count = len(inputs[0])
         if count == 1:
             stages = self._alone or self._stages(parameters, inputs, outputs)
-            stages(1).work(parameters, inputs, outputs)
+            stages.work(1, parameters, inputs, outputs)
             return
         for array in (*inputs, *outputs):
             # The machine code trusts its pointers.

@@ -37,18 +37,23 @@ class Stage:
 
 
 class Stages(threading.local):
-    """A thread's own stages, by how many items they take."""
+    """A thread's own stages, by how many items they take.
+
+    A stage is taken out while it works: a signal handler that calls the same kernel in between finds none, and gets one
+    of its own.
+    """
 
     def __init__(self, made: Callable[[int], Stage]) -> None:
         self._made = made
-        self._of_size: dict[int, Stage] = {}
+        self._idle: dict[int, Stage] = {}
 
-    def __call__(self, items: int) -> Stage:
-        """Return the stage for so many items."""
-        stage = self._of_size.get(items)
-        if stage is None:
-            stage = self._of_size[items] = self._made(items)
-        return stage
+    def work(self, items: int, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
+        """Compute so many items; see :meth:`Stage.work`."""
+        stage = self._idle.pop(items, None) or self._made(items)
+        try:
+            stage.work(parameters, inputs, outputs)
+        finally:
+            self._idle[items] = stage
 
 
 def aligned(size: int, alignment: int) -> Array:

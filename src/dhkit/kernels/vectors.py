@@ -6,20 +6,37 @@ import struct
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-__all__ = ["WIDTH", "Body", "Mask", "Number", "Vector", "absolute", "constant", "floor", "select", "sqrt"]
+__all__ = [
+    "EXACT",
+    "FUSING",
+    "MASK",
+    "VECTOR",
+    "WIDTH",
+    "Body",
+    "Mask",
+    "Number",
+    "Vector",
+    "absolute",
+    "constant",
+    "floor",
+    "select",
+    "sqrt",
+]
 
 WIDTH = 8
 """Doubles of one vector: a register of AVX-512, two of AVX, four of SSE and NEON."""
 VECTOR, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
 
-LIBERTIES = "contract nsz"
-"""What LLVM may do: fuse products into sums, and drop the sign of zero. NaN must survive, so nothing else."""
+FUSING, EXACT = "contract nsz", "nsz"
+"""What LLVM may do: fuse products into sums, and drop the sign of zero; or the latter alone, so that every operation is
+rounded as IEEE 754 says. NaN must survive, so nothing else."""
 
 
 @dataclass
 class Body:
     """The lines written so far; each defines one value."""
 
+    liberties: str = FUSING
     lines: list[str] = field(default_factory=list)
 
     def define(self, instruction: str) -> str:
@@ -42,24 +59,24 @@ class Vector:
         return self.body.define(f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}")
 
     def __add__(self, other: Number) -> Vector:
-        return Vector(self.body, self._with(f"fadd {LIBERTIES}", other))
+        return Vector(self.body, self._with(f"fadd {self.body.liberties}", other))
 
     def __sub__(self, other: Number) -> Vector:
-        return Vector(self.body, self._with(f"fsub {LIBERTIES}", other))
+        return Vector(self.body, self._with(f"fsub {self.body.liberties}", other))
 
     def __mul__(self, other: Number) -> Vector:
-        return Vector(self.body, self._with(f"fmul {LIBERTIES}", other))
+        return Vector(self.body, self._with(f"fmul {self.body.liberties}", other))
 
     def __truediv__(self, other: Number) -> Vector:
-        return Vector(self.body, self._with(f"fdiv {LIBERTIES}", other))
+        return Vector(self.body, self._with(f"fdiv {self.body.liberties}", other))
 
     __radd__, __rmul__ = __add__, __mul__
 
     def __rsub__(self, other: Number) -> Vector:
-        return Vector(self.body, self._with(f"fsub {LIBERTIES}", other, swapped=True))
+        return Vector(self.body, self._with(f"fsub {self.body.liberties}", other, swapped=True))
 
     def __neg__(self) -> Vector:
-        return Vector(self.body, self.body.define(f"fneg {LIBERTIES} {VECTOR} {self.name}"))
+        return Vector(self.body, self.body.define(f"fneg {self.body.liberties} {VECTOR} {self.name}"))
 
     # Ordered comparisons are false of NaN; ``differs`` is true of it.
 
@@ -83,7 +100,7 @@ class Vector:
     def call(self, intrinsic: str) -> Vector:
         """Return one of LLVM's functions of one number: fabs, sqrt or floor."""
         function = f"@llvm.{intrinsic}.v{WIDTH}f64({VECTOR} {self.name})"
-        return Vector(self.body, self.body.define(f"call {LIBERTIES} {VECTOR} {function}"))
+        return Vector(self.body, self.body.define(f"call {self.body.liberties} {VECTOR} {function}"))
 
 
 Number: TypeAlias = Vector | float
@@ -119,7 +136,7 @@ def _text(number: Number) -> str:
 def select(condition: Mask, true: Number, false: Number) -> Vector:
     """Return one of two values in each lane, without a branch."""
     body = condition.body
-    choice = f"select {LIBERTIES} {MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
+    choice = f"select {body.liberties} {MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
     return Vector(body, body.define(choice))
 
 

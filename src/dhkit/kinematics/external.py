@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
-from dhkit.kernels import pose_rows
+from dhkit.kernels import pose_rows, uncounted
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form import classify
@@ -125,7 +125,8 @@ def _solutions(solver: Any, goal: Array, n: int) -> Array:
 def _polished(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return joint values (K, n) with angles in (-pi, pi] after some steps of Newton, and which of them close."""
     newton = Newton.of(description, position_only=False, limits=False)
-    with np.errstate(all="ignore"):
+    # How many solutions a pose has must not start a compilation in a control loop.
+    with np.errstate(all="ignore"), uncounted():
         q, error = descend(newton, goals, q, EXACT)
     return wrapped(q, ~description.numbers.prismatic), closes(error, CLOSES)
 

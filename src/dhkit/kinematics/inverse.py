@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.errors import ModelError
-from dhkit.kernels import Kernel, check_whole, kernel, pose_rows, result_array
+from dhkit.kernels import EXACT_RANGE, Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_parameters
 from dhkit.kinematics.solutions import IKSolutions
@@ -166,7 +166,7 @@ def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, bat
         angles = np.broadcast_to(joints, (*batch, 2))
     except ValueError:
         raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None
-    return np.ascontiguousarray(np.where(np.isfinite(angles), angles, 0.0))
+    return np.ascontiguousarray(np.where(np.abs(angles) <= EXACT_RANGE, angles, 0.0))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, fields
 from typing import TypeAlias
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.kernels import check_whole, in_threads, pose_rows
+from dhkit.kernels import SMALL, check_whole, in_threads, pose_rows, uncounted
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
 from dhkit.kinematics.forward import forward_kinematics
@@ -128,8 +129,11 @@ def solve_numerically(
     search = Search(newton, tolerance, restarts, seed)
     rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
 
+    # A few poses are searched for from many starts: that must not start a compilation in a control loop.
+    few = uncounted if posed.size < SMALL else nullcontext
+
     def solve(some: slice) -> int:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), few():
             q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
         return int(rows[some][-1]) + 1
 

@@ -57,7 +57,7 @@ def _graph(
     if len(branches) != len(fit.branches):
         raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
 
-    valid = [ca.logic_and(is_pose, branch.miss == 0) for branch in branches]
+    valid = [ca.logic_and(is_pose, ca.logic_and(branch.miss == 0, _is_finite(branch))) for branch in branches]
     q = [[where(ok, x, np.nan) for x in branch.q] for ok, branch in zip(valid, branches, strict=True)]
     flags = [where(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
     some = reduce(ca.logic_or, valid)
@@ -76,6 +76,11 @@ def _graph(
             "status": where(is_pose, found, float(IKStatus.not_a_pose)),
         },
     )
+
+
+def _is_finite(branch: Branch) -> Any:
+    """Return whether no joint value is lost, as by the squares of coordinates above 1e150."""
+    return ca.fabs(sum(branch.q)) < 1e300
 
 
 def _is_pose(T: ca.SX) -> Any:
