@@ -14,18 +14,21 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 
+# Each stands for what it installs and for what those before it do, in one run of pip.
 $(READY): pyproject.toml
-	$(PYTHON) -m venv $(VENV)
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --editable .
 	@touch $@
 
-$(TEST_READY): $(READY)
+$(TEST_READY): pyproject.toml
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --editable '.[test]'
-	@touch $@
+	@touch $(READY) $@
 
-$(CHECK_READY): $(READY)
+$(CHECK_READY): pyproject.toml
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[test,check]'
-	@touch $@
+	@touch $(READY) $(TEST_READY) $@
 
 demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560/
 	$(BIN)/dhkit demo

@@ -29,6 +29,7 @@ class Blocked:
 sys.meta_path.insert(0, Blocked())
 import importlib, pkgutil
 import numpy as np
+import pytest
 import dhkit
 
 for module in pkgutil.walk_packages(dhkit.__path__, "dhkit."):
@@ -67,6 +68,7 @@ def test_importing_dhkit_takes_no_time(law):
     law.takes("seconds that import dhkit takes", sorted(seconds)[len(seconds) // 2], 0.3)
 
 
+@pytest.mark.slow
 def test_everything_but_the_reference_works_without_pinocchio():
     done = run(WITHOUT_PINOCCHIO)
     assert done.returncode == 0, done.stderr

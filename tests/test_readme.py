@@ -14,7 +14,9 @@ COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)
 FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [pytest.param(x, marks=pytest.mark.slow) if x.startswith("bench") else x for x in COMMANDS]
+)
 def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "answer.toml").write_text(

@@ -89,6 +89,7 @@ def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(tmp_path, c
         page.close()
 
 
+@pytest.mark.slow
 def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)

@@ -1,6 +1,7 @@
 """Controllers on a PUMA: what each is good for, gains as their formulas say, and one's own."""
 
 import numpy as np
+import pytest
 
 import dhkit
 from dhkit import LQR, PID, Arm, ComputedTorque, FeedForward, FrictionCompensation, PDGravity
@@ -29,6 +30,7 @@ def test_independent_joints_and_gravity(law):
     law.holds("rad, PD and gravity", peak(PDGravity.tuned(ARM)), 2e-2)
 
 
+@pytest.mark.slow
 def test_friction_is_compensated(law):
     law.samples(1)
     plain = peak(ComputedTorque.tuned(ARM), friction=True)

@@ -83,6 +83,7 @@ def test_smooth_friction_takes_its_work(law):
     law.holds("energy without account", abs(run.audit.remains) / run.audit.friction, SUDDEN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["puma560", "puma560_cao"])
 def test_dry_friction_brings_an_arm_to_rest_and_keeps_it_there(name, law):
     arm = library_robot(name)

@@ -90,6 +90,7 @@ def test_library_robots_with_some_joints_held(name, law):
             law.holds(key, error, AGREES, (name, held))
 
 
+@pytest.mark.slow
 @given(arms(least=2, most=6), st.data())
 def test_any_arm_with_some_joints_held(law, arm, data):
     law.samples(1000)

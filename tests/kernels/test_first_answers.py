@@ -97,6 +97,7 @@ def test_the_first_answer_of_each_kind(law, tmp_path):
     assert not list(tmp_path.rglob("*.kernel")), "single states started a compilation"
 
 
+@pytest.mark.slow
 def test_single_states_and_small_batches(law, tmp_path):
     law.samples(1)
     required = {"fk, a call": 6e-6, "inverse_dynamics, a call": 9e-6}
@@ -104,6 +105,7 @@ def test_single_states_and_small_batches(law, tmp_path):
         law.takes(f"seconds: {name}", seconds, required.get(name, 1.5e-6))
 
 
+@pytest.mark.slow
 def test_no_small_batch_waits_for_the_compiler(law, tmp_path):
     law.samples(1)
     law.takes("longest call beside a thread that compiles, s", measured(ARM + STALL, tmp_path)["longest"], 0.05)

@@ -169,6 +169,7 @@ def test_an_unwritable_home_means_memory_only(tmp_path):
     assert "compiling forward_kinematics" in in_new_process(CALL, tmp_path / "file").stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
 @pytest.mark.parametrize("umask", ["000", "002", "022", "077"])
 def test_folders_and_entries_are_the_users_own_whatever_the_umask(tmp_path, umask):

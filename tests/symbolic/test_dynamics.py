@@ -65,6 +65,7 @@ def test_library_robots(name, law):
     hold(law, arm, evaluated(arm, LAGRANGE | RECURSIVE, states), *states, "in CasADi")
 
 
+@pytest.mark.slow
 @settings(max_examples=ARMS)
 @given(tilted_arms())
 def test_any_arm(law, arm):
