@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description
 from dhkit.description.frames import number_array
 from dhkit.dynamics import mass_matrix
+from dhkit.verification import random_motions
 
 __all__ = ["Robot", "description_of", "effective_inertia", "gain", "pd_gains", "pid_gains"]
 
@@ -75,13 +76,7 @@ def effective_inertia(description: Description, q: ArrayLike | None = None) -> A
     q
         Where, shape (n,); the average over random configurations inside the limits unless given.
     """
-    if q is None:
-        numbers = description.numbers
-        span = np.where(numbers.prismatic, max(description.reach, 1e-3), np.pi)
-        lower = np.where(np.isfinite(numbers.lower), numbers.lower, -span)
-        upper = np.where(np.isfinite(numbers.upper), numbers.upper, span)
-        q = lower + (upper - lower) * np.random.default_rng(0).random((STATES, description.n))
-    M = mass_matrix(description, q)
+    M = mass_matrix(description, random_motions(description, STATES).q if q is None else q)
     diagonal: Array = np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, description.n).mean(axis=0)
     return diagonal
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.control.gains import Robot, description_of
 from dhkit.control.references import Setpoint
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_vector
 from dhkit.dynamics import bias, gravity_torque
 from dhkit.symbolic import CasadiFunctions
 
@@ -45,13 +45,8 @@ def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = Non
         A link without a body.
     """
     n = description.n
-    state = []
-    for name, given in (("q", q), ("qd", np.zeros(n) if qd is None else qd)):
-        value = joint_array(description, given, name)
-        if value.shape != (n,) or not np.isfinite(value).all():
-            raise ValueError(f"{name} has shape {value.shape}; expected ({n},), finite")
-        state.append(value)
-    tau = bias(description, state[0], state[1])
+    state = joint_vector(description, q), np.zeros(n) if qd is None else joint_vector(description, qd, "qd")
+    tau = bias(description, *state)
     by_q, by_qd, by_tau = (np.array(x) for x in _derivatives(description)(*state, tau))
     A = np.block([[np.zeros((n, n)), np.eye(n)], [by_q, by_qd]])
     return A, np.vstack([np.zeros((n, n)), by_tau])

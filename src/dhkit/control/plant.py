@@ -82,14 +82,24 @@ class Plant:
         return not self.dry.any()
 
     @cached_property
-    def stopped(self) -> bool:
-        """Whether a joint has a stop."""
-        return bool(np.isfinite(self.limits).any())
+    def undisturbed(self) -> bool:
+        """Whether no joint has stiction or a stop, so that nothing about the motion is sudden."""
+        return self.smooth and not np.isfinite(self.limits).any()
 
     @cached_property
     def nothing_holds(self) -> Contact:
         """The contact of joints that nothing holds."""
         return Contact.free(self.n)
+
+    def active_pushes(self, t: float) -> tuple[Push, ...]:
+        """Return the pushes that act at a time."""
+        return tuple(push for push in self.pushes if push.begin <= t < push.end)
+
+    def holding_bounds(self, q: Array) -> tuple[Array, Array]:
+        """Return between which resisting torques joints at rest hold, shape (n,) each; infinite at a stop."""
+        lower, upper = self.limits
+        coulomb = np.where(self.dry[:, None], self.description.numbers.coulomb, 0.0)
+        return np.where(q <= lower, -np.inf, coulomb[:, 1]), np.where(q >= upper, np.inf, coulomb[:, 0])
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """Return forward dynamics at one state, shape (n,); ``tau`` holds all torques but the links' own."""
@@ -131,14 +141,14 @@ class Plant:
         stop bears any torque towards it. All of them are decided at once, since each loads the others through the mass
         matrix.
         """
+        if self.undisturbed:
+            return self.nothing_holds
         lower, upper = self.limits
         directions = np.sign(qd).astype(np.int8)
         at_rest = (qd == 0) & (self.dry | (q <= lower) | (q >= upper))
         if not at_rest.any():
             return Contact(directions, at_rest)
-        coulomb = np.where(self.dry[:, None], self.description.numbers.coulomb, 0.0)
-        most = np.where(q >= upper, np.inf, coulomb[:, 0])[at_rest]
-        least = np.where(q <= lower, -np.inf, coulomb[:, 1])[at_rest]
+        least, most = (bound[at_rest] for bound in self.holding_bounds(q))
         drive = tau + self.pushed(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
         inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
         _, side = bounded_forces(inverse[np.ix_(at_rest, at_rest)], (inverse @ drive)[at_rest], least, most)

@@ -12,7 +12,7 @@ from dhkit.control.plant import Plant
 from dhkit.control.references import Held, Reference, Setpoint, reference_of
 from dhkit.control.result import EnergyAudit, SimulationResult
 from dhkit.control.steps import State, advanced
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_vector
 from dhkit.dynamics import kinetic_energy
 from dhkit.errors import SimulationError
 from dhkit.trajectories import Trajectory
@@ -132,12 +132,7 @@ def _step_counts(
 
 
 def _state(description: Description, given: ArrayLike | None, default: Array, name: str) -> Array:
-    if given is None:
-        return default.copy()
-    value = joint_array(description, given, name)
-    if value.shape != (description.n,) or not np.isfinite(value).all():
-        raise ValueError(f"{name} has shape {value.shape}; expected ({description.n},), finite")
-    return value.copy()
+    return (default if given is None else joint_vector(description, given, name)).copy()
 
 
 def _sampled(description: Description, reference: Reference, t: Array) -> tuple[Array, Array, Array]:
@@ -184,8 +179,7 @@ class _Run:
             times = [begin + (end - begin) * (i + 1) / substeps for i in range(substeps - 1)]
             q_before = state.q
             for until in _split([*times, end], begin, edges):
-                pushes = tuple(push for push in plant.pushes if push.begin <= state.t < push.end)
-                state = advanced(plant, state, tau, pushes, until)
+                state = advanced(plant, state, tau, plant.active_pushes(state.t), until)
             if not (np.isfinite(state.q).all() and np.isfinite(state.qd).all()):
                 self._fail(k, f"the arm's state is no longer finite after {end:g} s", state)
             given = tau * (state.q - q_before)
@@ -216,9 +210,8 @@ class _Run:
     def _keep(self, k: int, state: State, tau: Array) -> None:
         plant = self.plant
         self.q[k], self.qd[k], self.tau[k] = state.q, state.qd, tau
-        pushes = tuple(push for push in plant.pushes if push.begin <= state.t < push.end)
-        free = plant.smooth and not plant.stopped
-        contact = plant.nothing_holds if free else plant.contact(state.q, state.qd, tau, pushes)
+        pushes = plant.active_pushes(state.t)
+        contact = plant.contact(state.q, state.qd, tau, pushes)
         self.qdd[k] = plant.moving(state.q, state.qd, tau, contact, pushes)
 
     def _fail(self, k: int, message: str, state: State, cause: Exception | None = None) -> NoReturn:

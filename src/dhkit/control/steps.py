@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -75,22 +75,16 @@ def advanced(plant: Plant, state: State, tau: Array, pushes: Sequence[Push], end
     SimulationError
         More than a thousand impacts, stops and breakaways in one step.
     """
-    if plant.smooth and not plant.stopped:
-        return runge_kutta(plant, state, tau, plant.nothing_holds, pushes, end - state.t)
     for _ in range(MOST_EVENTS):
         contact = plant.contact(state.q, state.qd, tau, pushes)
         later = runge_kutta(plant, state, tau, contact, pushes, end - state.t)
-        event = _first_event(plant, state, later, tau, contact, pushes, end)
+        event = None if plant.undisturbed else _first_event(plant, state, later, tau, contact, pushes, end)
         if event is None:
-            return State(end, *_parts(later))
+            return replace(later, t=end)
         state = event
         if state.t >= end:
             return state
     raise SimulationError(f"more than {MOST_EVENTS} impacts and stops before {end:g} s, from {state.t:g} s on")
-
-
-def _parts(state: State) -> tuple[Array, Array, float, float, float]:
-    return state.q, state.qd, state.friction_work, state.push_work, state.impact_loss
 
 
 Measure = Callable[[State], float]
@@ -166,10 +160,7 @@ def _room(i: int, limit: float, side: float) -> Measure:
 
 def _margin(plant: Plant, state: State, tau: Array, contact: Contact, pushes: Sequence[Push]) -> Measure:
     """Return what is left of the bounds of the torques that hold joints."""
-    lower, upper = plant.limits
-    coulomb = np.where(plant.dry[:, None], plant.description.numbers.coulomb, 0.0)
-    most = np.where(state.q >= upper, np.inf, coulomb[:, 0])[contact.holds]
-    least = np.where(state.q <= lower, -np.inf, coulomb[:, 1])[contact.holds]
+    least, most = (bound[contact.holds] for bound in plant.holding_bounds(state.q))
 
     def measure(state: State) -> float:
         needed = plant.held(state.q, state.qd, tau, contact, pushes)[contact.holds]
@@ -183,7 +174,7 @@ def _stopped(joint: int, state: State) -> State:
     """Return the state with a joint's rate exactly 0."""
     qd = state.qd.copy()
     qd[joint] = 0.0
-    return State(state.t, state.q, qd, state.friction_work, state.push_work, state.impact_loss)
+    return replace(state, qd=qd)
 
 
 def _hit(plant: Plant, joint: int, limit: float, state: State) -> State:
@@ -199,4 +190,4 @@ def _hit(plant: Plant, joint: int, limit: float, state: State) -> State:
         i = int(np.argmax(np.where(into, np.abs(qd), -1.0)))
         qd = plant.after_impact(q, qd, i, rebounds=abs(qd[i]) * (plant.restitution or 0.0) > SLOWEST_REBOUND)
     loss = before - plant.kinetic_energy(q, qd)
-    return State(state.t, q, qd, state.friction_work, state.push_work, state.impact_loss + loss)
+    return replace(state, q=q, qd=qd, impact_loss=state.impact_loss + loss)

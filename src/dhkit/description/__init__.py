@@ -4,7 +4,7 @@ from dhkit.description.assets import asset
 from dhkit.description.bodies import require_bodies
 from dhkit.description.changes import with_base, with_parameters, with_payload, with_tool, with_uniform_links
 from dhkit.description.files import write_atomically
-from dhkit.description.frames import joint_array, link_transforms, world_to_frames, world_to_tool
+from dhkit.description.frames import joint_array, joint_vector, link_transforms, world_to_frames, world_to_tool
 from dhkit.description.library import library_robot, robots
 from dhkit.description.locking import lock
 from dhkit.description.named import Named
@@ -64,6 +64,7 @@ __all__ = [
     "from_dh",
     "from_toml",
     "joint_array",
+    "joint_vector",
     "library_robot",
     "link_transforms",
     "lock",

@@ -11,7 +11,15 @@ from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
 from dhkit.description.values import Convention
 
-__all__ = ["carrying", "joint_array", "link_transforms", "number_array", "world_to_frames", "world_to_tool"]
+__all__ = [
+    "carrying",
+    "joint_array",
+    "joint_vector",
+    "link_transforms",
+    "number_array",
+    "world_to_frames",
+    "world_to_tool",
+]
 
 Frames = TypeVar("Frames", Array, list[Any])
 """An array (n+1, ...), or a list of n+1 expressions."""
@@ -31,6 +39,22 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
     if array.ndim == 0 or array.shape[-1] != description.n:
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
     return array
+
+
+def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Array:
+    """Return the joint values of one state, shape (n,), finite.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a value that is not finite.
+    TypeError
+        Not numbers.
+    """
+    vector = joint_array(description, q, name)
+    if vector.shape != (description.n,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} has shape {vector.shape}; expected ({description.n},), finite values")
+    return vector
 
 
 def number_array(value: ArrayLike, name: str, shape: str) -> Array:

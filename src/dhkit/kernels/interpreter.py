@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels.elementary import EXACT_RANGE, atan2
+from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER
 from dhkit.kernels.stages import Stage, Stages
 from dhkit.symbolic import Graph
 
@@ -87,10 +88,10 @@ def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     zero = casadi.SX.sym("zero")
     inputs = [casadi.SX.sym(variable.name, variable.size) for variable in graph.inputs]
     entries = [casadi.vertsplit(x) if x.numel() else [] for x in inputs]
-    values = _values(graph, entries, zero, alike="uint8" in types)
+    values = _values(graph, entries, zero, alike=SMALL_INTEGER in types)
     missing = sum((x * zero for row in entries[1:] for x in row), casadi.SX(0))
     results = [
-        casadi.vertcat(*(values[k] + missing if kind == "float64" else values[k] for k in places))
+        casadi.vertcat(*(values[k] + missing if kind == FLOAT else values[k] for k in places))
         for places, kind in zip(graph.results, types, strict=True)
     ]
     return casadi.Function(graph.name, [zero, *inputs], [casadi.densify(casadi.SX(x)) for x in results])
@@ -100,9 +101,12 @@ def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.S
     """Return the value of every node; ``alike`` with the arc tangent of compiled kernels, not the C library's."""
     import casadi
 
-    def arc_tangent(y: casadi.SX, x: casadi.SX) -> casadi.SX:
-        angle: casadi.SX = casadi.atan2(y + zero, x + zero)
-        return atan2(y, x, casadi.if_else, casadi.fabs) if alike else angle
+    def library_atan2(y: casadi.SX, x: casadi.SX) -> casadi.SX:
+        return casadi.atan2(y + zero, x + zero)
+
+    def kernel_atan2(y: casadi.SX, x: casadi.SX) -> casadi.SX:
+        angle: casadi.SX = atan2(y, x, casadi.if_else, casadi.fabs)
+        return angle
 
     apply: Mapping[str, Callable[..., casadi.SX]] = {
         "add": operator.add,
@@ -113,7 +117,7 @@ def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.S
         "absolute": casadi.fabs,
         "floor": casadi.floor,
         "sqrt": casadi.sqrt,
-        "atan2": arc_tangent,
+        "atan2": kernel_atan2 if alike else library_atan2,
         "minimum": lambda a, b: casadi.if_else(a < b, a, b),
         "maximum": lambda a, b: casadi.if_else(a > b, a, b),
         "less": operator.lt,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_vector
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows
 from dhkit.kinematics.inverse import inverse_kinematics
@@ -102,11 +102,9 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
         The arm has no closed form, and ssik is not installed or does not take it.
     """
     poses = pose_rows(T)
-    q0 = joint_array(description, q0, "q0")
     if poses.ndim != 3:
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
-    if q0.shape != (description.n,) or not np.isfinite(q0).all():
-        raise ValueError(f"q0 has shape {q0.shape}; expected ({description.n},), finite values")
+    q0 = joint_vector(description, q0, "q0")
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.within if limits else solutions.valid
     jump = JUMP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
