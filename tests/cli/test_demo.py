@@ -45,6 +45,8 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
         r"plan +[\d.]+ s +0\.8\d+ s with torques up to 100 %, the quintic 1\.4\d+ s .*all limits kept", out
     )
     assert sorted(path.name for path in folder.iterdir()) == [
+        "control.html",
+        "control.png",
         "equations.html",
         "equations.tex",
         "index.html",
@@ -94,7 +96,7 @@ def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     assert run("demo", "--robot", "stanford", "--quick", "--json", "--output", str(tmp_path)) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["ok"]
-    stages = ["build", "verify", "equations", "figure", "ik", "plan", "page"]
+    stages = ["build", "verify", "equations", "figure", "ik", "plan", "control", "page"]
     assert [stage["stage"] for stage in report["stages"]] == stages
     assert re.fullmatch(
         r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches",

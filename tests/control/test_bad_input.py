@@ -26,7 +26,7 @@ BAD = {
     "a duration of years": (lambda: run(duration=1e9), r"1e\+09 s at 1000 Hz are 1e\+12 steps; expected at most"),
     "an endless duration": (lambda: run(duration=np.inf), "duration is inf"),
     "a duration of 0": (lambda: run(duration=0), "duration is 0"),
-    "a state that is no number": (lambda: run(q0=[0, np.nan]), r"q0 has shape \(2,\); expected \(2,\), finite"),
+    "a state that is no number": (lambda: run(q0=[0, np.nan]), "q0 has values that are not finite"),
     "a state of another arm": (lambda: run(q0=np.zeros(6)), r"q0 has shape \(6,\)"),
     "rates of another arm": (lambda: run(qd0=np.zeros(3)), r"qd0 has shape \(3,\)"),
     "a batch of states": (lambda: run(q0=np.zeros((3, 2))), r"q0 has shape \(3, 2\)"),
@@ -62,7 +62,7 @@ BAD = {
     "weights of another arm": (lambda: LQR(ARM, [0, 0], Q=np.ones(3)), r"Q has shape \(3, 3\)"),
     "weights that reward": (lambda: LQR(ARM, [0, 0], R=-np.ones(2)), "R positive definite"),
     "weights that are not symmetric": (lambda: LQR(ARM, [0, 0], R=[[1, 2], [0, 1]]), "R is not symmetric"),
-    "linear at no number": (lambda: ARM.linearize([0, np.inf]), "q has shape"),
+    "linear at no number": (lambda: ARM.linearize([0, np.inf]), "q has values that are not finite"),
 }
 
 
@@ -128,3 +128,12 @@ def test_progress_can_end_a_run():
 
     with pytest.raises(KeyboardInterrupt):
         run(duration=3.0, progress=stop)
+
+
+def test_a_relay_has_no_continuous_solution():
+    def relay(t, q, qd, setpoint):
+        return ARM.gravity_torque(q) + [20, 8] * np.sign(setpoint.q - q - 0.2 * qd)
+
+    with pytest.raises(SimulationError, match=r"more than 5,000 steps before .* expected a rate in Hz") as caught:
+        ARM.simulate(relay, [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
+    assert len(caught.value.result.t) >= 1

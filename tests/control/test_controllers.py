@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dhkit
-from dhkit import LQR, PID, Arm, ComputedTorque, FeedForward, FrictionCompensation, PDGravity
+from dhkit import LQR, PID, Arm, ComputedTorque, FeedForward, FrictionCompensation, PDGravity, Sensors, Step
 from dhkit.control.gains import effective_inertia
 
 ARM = Arm.load("puma560")
@@ -21,6 +21,51 @@ def test_computed_torque_follows_and_twice_the_rate_halves_its_error(law):
     law.holds("rad, computed torque at 1 kHz", once, 3e-5)
     law.holds("error at 2 kHz over that at 1 kHz, from a half", abs(twice / once - 0.5), 0.05)
     law.holds("rad, feed-forward", peak(FeedForward.tuned(ARM)), 1e-4)
+
+
+@pytest.mark.slow
+def test_continuous_controllers_follow_to_rounding(law):
+    law.samples(1)
+    for controller in (ComputedTorque.tuned(ARM), FeedForward.tuned(ARM)):
+        run = ARM.simulate(controller, MOTION, 0.5, rate=None, restitution=None)
+        law.holds("rad, continuous", run.peak_error.max(), 1e-9)
+        law.holds("energy without account", run.audit.error, 1e-9)
+
+
+def test_a_sampled_controller_tends_to_the_continuous_one(law):
+    law.samples(1)
+    step = Step(np.zeros(6), np.full(6, 0.05), 0.0105)
+    for pid in (PID.tuned(ARM, bandwidth=10), PID.tuned(ARM, bandwidth=10, cutoff=300.0)):
+        controller = FrictionCompensation(pid, ARM)
+        options = {"reference": step, "duration": 0.2, "q0": np.zeros(6), "restitution": None, "saturation": False}
+        exact = ARM.simulate(controller, rate=None, **options).q[-1]
+        slow, fast = (np.abs(ARM.simulate(controller, rate=rate, **options).q[-1] - exact).max() for rate in (2e3, 4e3))
+        law.holds("error at twice the rate over that at the rate, from a half", abs(fast / slow - 0.5), 0.1)
+
+
+def test_what_the_sensors_make_of_a_state():
+    rate = 1000.0
+    seen = []
+
+    def spy(t, q, qd, setpoint):
+        seen.append((q, qd))
+        return np.zeros(6)
+
+    start, speed = np.full(6, 0.1), np.full(6, 0.2)
+    options = {"q0": start, "qd0": speed, "duration": 0.05, "rate": rate, "restitution": None}
+    coarse = Sensors(resolution=1e-3, differences=True)
+    run = ARM.simulate(spy, sensors=coarse, **options)
+    q, qd = (np.array(x) for x in zip(*seen, strict=True))
+    assert np.allclose(q / 1e-3, np.round(q / 1e-3), atol=1e-9) and np.abs(q - run.q).max() <= 0.5001e-3
+    assert np.all(qd[0] == 0) and np.allclose(qd[1:], np.diff(q, axis=0) * rate)
+    seen.clear()
+    run = ARM.simulate(spy, sensors=Sensors(noise=1e-3, rate_noise=0.1, seed=5), **options)
+    q, qd = (np.array(x) for x in zip(*seen, strict=True))
+    assert 0.8e-3 < np.std(q - run.q) < 1.2e-3 and 0.08 < np.std(qd - run.qd) < 0.12
+    first = q.copy()
+    seen.clear()
+    ARM.simulate(spy, sensors=Sensors(noise=1e-3, rate_noise=0.1, seed=5), **options)
+    assert np.array_equal(np.array([x for x, _ in seen]), first)
 
 
 def test_independent_joints_and_gravity(law):

@@ -6,13 +6,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from dhkit.control import ComputedTorque, Plant, Push, simulate
-from dhkit.description import library_robot
-from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, potential_energy
+from acceptance import ACCEPTING
+from dhkit.control import PID, ComputedTorque, PDGravity, Plant, Push, Sine, simulate
+from dhkit.description import library_robot, robots
+from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, mass_matrix, potential_energy
 from dhkit.expressions import ZERO
 from dhkit.model import pinocchio_model
 
 PUMA = library_robot("puma560")
+ROBOTS = [name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)]
 START = np.array([0.1, 0.4, -0.6, 0.2, 0.5, -0.3])
 AUDIT = 1e-9
 """Of the energy turned over, where torques are held and nothing is sudden."""
@@ -55,24 +57,60 @@ def test_states_are_those_over_pinocchio(name, law):
         law.holds("rates after 0.1 s", np.abs(run.qd[-1] - rates).max() / scale, 1e-10)
 
 
-def test_the_method_is_of_order_four(law):
-    fine = simulate(PUMA, q0=START, duration=0.1, rate=16_000, plant=Plant(PUMA, restitution=None)).q[-1]
-    errors = [
-        np.abs(
-            simulate(PUMA, q0=START, duration=0.1, rate=rate, plant=Plant(PUMA, restitution=None)).q[-1] - fine
-        ).max()
-        for rate in (500, 1000)
-    ]
+@pytest.mark.parametrize("name", ROBOTS)
+def test_accelerations_along_a_motion_are_pinocchios(name, law):
+    arm = library_robot(name)
+    model = pinocchio_model(arm)
+    data = model.createData()
     law.samples(1)
-    law.holds("error at 2 ms over that at 1 ms, from 16", abs(errors[0] / errors[1] - 16), 2.0)
+    rng = np.random.default_rng(4)
+    wave = Sine(rng.normal(size=arm.n) * 0.2, np.full(arm.n, 0.1), 1.5)
+    run = simulate(arm, ComputedTorque.tuned(arm), wave, 0.1, plant=Plant(arm, restitution=None), saturation=False)
+    theirs = np.stack([pin.aba(model, data, *row) for row in zip(run.q, run.qd, run.tau, strict=True)])
+    M = mass_matrix(arm, run.q)
+    scale = np.abs(run.tau).max(axis=1) / np.diagonal(M, axis1=1, axis2=2).min(axis=1)
+    allowed = np.maximum(1e-12, 4 * np.finfo(float).eps * np.linalg.cond(M))
+    law.holds("accelerations over what is allowed", (np.abs(run.qdd - theirs).max(axis=1) / scale / allowed).max(), 1.0)
 
 
-def test_a_passive_swing_keeps_its_energy(law):
+@pytest.mark.parametrize("name", ROBOTS)
+def test_runge_and_kutta_are_of_order_four(name, law):
+    arm = library_robot(name)
+    plant = Plant(arm, restitution=None)
+    seen = 0
+    for seed in range(law.samples(20)):
+        q, qd = np.random.default_rng(seed).normal(size=(2, arm.n)) * 0.3
+        runs = [
+            simulate(arm, q0=q, qd0=qd, duration=0.1, plant=plant, **options)
+            for options in ({"rate": None, "tolerance": 1e-13}, {"rate": 500}, {"rate": 1000})
+        ]
+        exact, slow, fast = (np.concatenate([run.q[-1], run.qd[-1]]) for run in runs)
+        error = np.linalg.norm(slow - exact)
+        if error > 1e-11:
+            seen += 1
+            law.holds("error at 2 ms over that at 1 ms, from 16", abs(error / np.linalg.norm(fast - exact) - 16), 2.0)
+    assert seen or name in ("cobra600", "kuka_kr30_3", "puma560_akb"), "no error was large enough to be measured"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_passive_swing_keeps_its_energy(name, law):
+    arm = library_robot(name)
+    law.samples(1)
+    q = np.random.default_rng(1).normal(size=arm.n) * 0.3
+    run = simulate(arm, q0=q, duration=5.0, rate=None, plant=Plant(arm, restitution=None))
+    kinetic = kinetic_energy(arm, run.q, run.qd)
+    energy = kinetic + potential_energy(arm, run.q)
+    law.holds("drift over the largest kinetic energy", np.abs(energy - energy[0]).max() / kinetic.max(), 1e-10)
+    law.holds("energy without account", run.audit.error, AUDIT)
+
+
+def test_a_passive_swing_of_a_puma_keeps_its_energy_in_steps_of_a_millisecond(law):
     law.samples(1)
     run = simulate(PUMA, q0=START, duration=5.0, plant=Plant(PUMA, restitution=None))
-    energy = kinetic_energy(PUMA, run.q, run.qd) + potential_energy(PUMA, run.q)
-    largest = kinetic_energy(PUMA, run.q, run.qd).max()
-    law.holds("drift over the largest kinetic energy", np.abs(energy - energy[0]).max() / largest, 1e-10)
+    kinetic = kinetic_energy(PUMA, run.q, run.qd)
+    energy = kinetic + potential_energy(PUMA, run.q)
+    law.holds("drift over the largest kinetic energy", np.abs(energy - energy[0]).max() / kinetic.max(), 1e-10)
 
 
 def test_smooth_friction_takes_its_work(law):
@@ -84,17 +122,34 @@ def test_smooth_friction_takes_its_work(law):
 
 
 @pytest.mark.slow
+def test_narrow_friction_takes_shorter_steps_and_ends_no_run_in_a_limit_cycle(law):
+    law.samples(1)
+    plant = Plant(PUMA, Friction(1e-3), None)
+    assert plant.stiffness > 1000
+    run = simulate(PUMA, q0=START, duration=1.5, rate=500, plant=plant)
+    law.holds("energy without account", run.audit.error, AUDIT)
+    # At the end every joint creeps: none goes back and forth.
+    assert np.abs(np.diff(np.sign(run.qd[-50:]), axis=0)).max() == 0
+    with pytest.raises(ValueError, match=r"friction is too stiff: its rate of .* 1/s takes .* steps in 0.001 s"):
+        simulate(PUMA, q0=START, duration=0.1, plant=Plant(PUMA, Friction(1e-8), None))
+    with pytest.raises(ValueError, match="friction is too stiff"):
+        simulate(PUMA, q0=START, duration=10.0, rate=None, plant=Plant(PUMA, Friction(1e-8), None))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["puma560", "puma560_cao"])
 def test_dry_friction_brings_an_arm_to_rest_and_keeps_it_there(name, law):
     arm = library_robot(name)
     plant = Plant(arm, Friction())
     assert plant.dry.all()
     rng = np.random.default_rng(3)
-    for _ in range(max(1, law.samples(20) // 5)):
+    law.samples(4)
+    for _ in range(4 if ACCEPTING else 1):
         q = np.clip(rng.normal(size=arm.n) * 0.2, arm.numbers.lower, arm.numbers.upper)
-        run = simulate(arm, q0=q, duration=8.0, rate=500, plant=plant)
+        run = simulate(arm, q0=q, duration=16.0, rate=250, plant=plant, plant_rate=500)
         moves = np.flatnonzero((run.qd != 0).any(axis=1))
-        assert len(moves) and moves[-1] < 3000, "it did not come to rest"
+        assert len(moves) and run.t[moves[-1]] < 6, "it did not come to rest"
+        # Then it stays for the 10 s that are left.
         assert np.all(run.q[moves[-1] + 1 :] == run.q[-1])
         law.holds("energy without account", run.audit.error, SUDDEN)
 
@@ -143,6 +198,75 @@ def test_a_stop_leaves_the_share_of_the_rate_that_it_should(restitution, law):
         law.holds("energy lost by a perfect rebound over the kinetic energy", run.audit.impacts, 1e-12)
 
 
+@pytest.mark.parametrize("rate", [1000.0, None])
+def test_at_rest_against_a_stop_an_arm_stays(rate):
+    """Gravity lets the arm fall on its stops, where it stays, whatever it is pushed with against them."""
+    push = Push([0.0, 0.0, -30.0], begin=1.2)
+    run = simulate(PUMA, q0=START, duration=1.5, rate=rate, plant=Plant(PUMA, Friction(), 0.0, (push,)))
+    at_stop = (run.q[-1] == PUMA.numbers.lower) | (run.q[-1] == PUMA.numbers.upper)
+    assert at_stop.any()
+    late = run.t > 1.0
+    assert np.all(run.qd[late][:, at_stop] == 0) and np.all(run.q[late][:, at_stop] == run.q[-1][at_stop])
+
+
+@pytest.mark.slow
+def test_joints_that_throw_each_other_against_their_stops_come_to_rest(law):
+    """Two joints of al5d meet their stops together: each impact lifts the other off by some nrad/s."""
+    law.samples(1)
+    arm = library_robot("al5d")
+    q = np.random.default_rng(1).normal(size=4) * 0.3
+    for rate in (1000.0, None):
+        run = simulate(arm, q0=q, duration=2.0, rate=rate, plant=Plant(arm))
+        law.holds("energy without account", run.audit.error, SUDDEN)
+        assert run.audit.impacts > 0
+
+
+def test_a_joint_that_leaves_its_stop_and_is_back_within_the_step_comes_to_rest():
+    """After 1e-12 s the joint has not moved by a unit of rounding."""
+    arm = library_robot("ax12_arm")
+    q, qd, tau = np.zeros((3, arm.n))
+    q[-1], qd[-1], tau[-1] = arm.numbers.lower[-1], 1.2e-4, -arm.numbers.effort[-1]
+    run = simulate(arm, lambda *_: tau, q0=q, qd0=qd, rate=1e6, duration=5e-6, plant=Plant(arm, restitution=0.0))
+    assert np.all(run.qd[1:, -1] == 0) and np.all(run.q[:, -1] == q[-1])
+
+
+@pytest.mark.slow
+def test_any_run_accounts_for_its_energy(law):
+    """Robots, states, friction, stops, pushes and controllers at random.
+
+    The fastest joints, those of ax12_arm, cross the width of the narrowest friction in some 0.01 ms, which the plant's
+    steps must resolve: at 10 kHz the method's error is 3e-9 of the work there, and falls by its order.
+    """
+    rng = np.random.default_rng(17)
+    for trial in range(law.samples(250)):
+        arm = library_robot(str(rng.choice(ROBOTS)))
+        lower, upper = (np.clip(x, -np.pi, np.pi) for x in (arm.numbers.lower, arm.numbers.upper))
+        friction = (None, Friction(), Friction(0.1), Friction(0.01))[rng.integers(4)]
+        restitution = (None, 0.0, 0.4, 1.0)[rng.integers(4)]
+        push = Push(
+            rng.normal(size=3) * 10, rng.normal(size=3), begin=0.05 * rng.random(), end=0.1 + 0.1 * rng.random()
+        )
+        pushes = (push,) if rng.random() < 0.4 else ()
+        controller = (None, ComputedTorque.tuned(arm), PID.tuned(arm), PDGravity.tuned(arm))[rng.integers(4)]
+        run = simulate(
+            arm,
+            controller,
+            rng.uniform(lower, upper),
+            duration=0.3,
+            q0=rng.uniform(lower, upper),
+            qd0=rng.normal(size=arm.n) * rng.choice([0.0, 0.1, 2.0]),
+            rate=None if rng.random() < 0.2 else 1000.0,
+            plant_rate=40_000.0 if friction == Friction(0.01) else 10_000.0,
+            plant=Plant(arm, friction, restitution, pushes),
+        )
+        sudden = friction is not None and friction.width == 0
+        where = f"trial {trial}: {arm.name}, {friction}, restitution {restitution}"
+        law.holds(f"energy without account, stiction {sudden}", run.audit.error, SUDDEN if sudden else AUDIT, where)
+        if restitution is not None:
+            beyond = np.maximum(run.q - arm.numbers.upper, arm.numbers.lower - run.q).max()
+            law.holds("penetration, rad or m", beyond, 1e-9, where)
+
+
 def test_pushes_do_work(law):
     law.samples(1)
     push = Push([30.0, -10.0, 5.0], [1.0, 2.0, -3.0], begin=0.1003, end=0.3017)
@@ -162,3 +286,24 @@ def test_the_audit_closes_under_control(law):
         plant = Plant(PUMA, friction)
         run = simulate(PUMA, control, reference=START, q0=np.zeros(6), duration=1.0, plant=plant, plant_rate=rate)
         law.holds("energy without account", run.audit.error, required)
+
+
+@pytest.mark.slow
+def test_continuous_and_sampled_runs_meet(law):
+    """Without torques both integrate the same motion, through stiction, stops and pushes."""
+    law.samples(1)
+    push = Push([0.0, 40.0, 10.0], begin=0.1503, end=0.2517)
+    cases = {
+        "stiction": (Plant(PUMA, Friction(), None), START, 1.5),
+        "stops": (Plant(PUMA, restitution=0.5), START, 0.4),
+        "a push and stiction": (Plant(PUMA, Friction(), 0.0, (push,)), np.zeros(6), 0.5),
+    }
+    for name, (plant, q, duration) in cases.items():
+        continuous = simulate(PUMA, q0=q, duration=duration, rate=None, plant=plant)
+        sampled = simulate(PUMA, q0=q, duration=duration, plant_rate=4000, plant=plant)
+        law.holds(f"{name}: joint values", np.abs(continuous.q - sampled.q).max(), 1e-8)
+        law.holds(f"{name}: energy without account, continuous", continuous.audit.error, AUDIT)
+        law.holds(f"{name}: energy without account, sampled", sampled.audit.error, SUDDEN)
+        beyond = np.maximum(continuous.q - PUMA.numbers.upper, PUMA.numbers.lower - continuous.q).max()
+        if plant.restitution is not None:
+            law.holds(f"{name}: penetration, rad", beyond, 1e-9)

@@ -12,6 +12,7 @@ from dhkit.description import from_dh, library_robot, robots, with_payload
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic
 from dhkit.trajectories.archives import mat_bytes, npz_bytes
+from file_checks import check_damaged, check_refused
 from trajectories_reference import random_motion
 
 ARM, PUMA = library_robot("planar2r"), library_robot("puma560")
@@ -163,7 +164,7 @@ def test_a_cell_or_a_number_in_place_of_text_is_refused(tmp_path):
     for toml in (np.array([1, 2], dtype=object), 7.0, {"a": 1.0}):
         path = tmp_path / "bad.mat"
         path.write_bytes(mat_bytes(values(toml=toml)))
-        refused(path, r"toml: found (a matrix of class \d|numbers); expected")
+        refused(path, r"toml: found (a cell|a struct|numbers); expected")
 
 
 def test_pickled_members_are_never_read(tmp_path):
@@ -231,26 +232,8 @@ def test_other_suffixes_are_named(tmp_path):
 def test_no_damaged_byte_leads_anywhere_else(data, suffix, tmp_path_factory):
     folder = tmp_path_factory.mktemp("damaged")
     path = random_motion(ARM, pieces=2, duration=0.02).save(folder / f"motion{suffix}")
-    content = bytearray(path.read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path.write_bytes(content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content)
-    message = complaint_of(path)
-    assert "\n" not in message
-    assert len(message) < 700
-
-
-def complaint_of(path):
-    """Return why a file is refused, nothing if it is read; anything but a DescriptionError fails the test."""
-    try:
-        Trajectory.load(path)
-    except DescriptionError as error:
-        return str(error)
-    return ""
+    check_damaged(data.draw, Trajectory.load, path)
 
 
 def refused(path, complaint):
-    with pytest.raises(DescriptionError, match=complaint) as error:
-        Trajectory.load(path)
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
+    check_refused(Trajectory.load, path, complaint)

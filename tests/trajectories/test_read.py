@@ -44,6 +44,20 @@ def test_rates_and_accelerations_are_used_where_they_are(prefixes, tmp_path):
     )
 
 
+def test_columns_are_mapped(tmp_path):
+    text = "Time (s),axis A,axis B,q1\n0,10,20,7\n1,30,40,7\n"
+    motion = read(tmp_path, text, columns={"t": "Time (s)", "shoulder": "axis A", "q2": "AXIS B"})
+    assert motion == Trajectory.from_samples(ARM, [0, 1], [[10, 20], [30, 40]])
+    exchanged = read(tmp_path, "t,q1,q2\n0,20,10\n1,40,30\n", columns={"q1": "q2", "q2": "q1"})
+    assert exchanged == motion
+    with pytest.raises(DescriptionError, match=r"no column 'axis C': found Time \(s\), axis A"):
+        read(tmp_path, text, columns={"t": "Time (s)", "q1": "axis A", "q2": "axis C"})
+    with pytest.raises(ValueError, match=r"columns: found 'q'; expected each at most once of t, q1 ... q2"):
+        read(tmp_path, text, columns={"q": "axis A"})
+    with pytest.raises(ValueError, match=r"columns is given; expected none for .yaml"):
+        read(tmp_path, "", suffix=".yaml", columns={"q1": "axis A"})
+
+
 def test_degrees_are_those_of_angles_alone(tmp_path):
     motion = read(tmp_path, "t,q1,q2,q3,q4\n0,90,0,0.1,0\n1,180,0,0.2,0\n", COBRA, degrees=True)
     assert motion.q(0.0) == pytest.approx([np.pi / 2, 0, 0.1, 0])
@@ -174,7 +188,7 @@ def test_what_is_wrong_with_a_message_is_named(old, new, complaint, tmp_path):
 
 
 def test_archives_are_not_read_as_samples(tmp_path):
-    with pytest.raises(DescriptionError, match=r"found suffix '.npz'; expected one of .csv, .yaml, .yml"):
+    with pytest.raises(DescriptionError, match=r"found suffix '.npz'; expected one of .csv, .yaml, .yml, .mat"):
         Trajectory.read(tmp_path / "x.npz", ARM)
 
 

@@ -51,7 +51,7 @@ def test_a_motion_is_drawn_with_its_units_and_its_path():
 
 
 def test_unknown_types_are_named():
-    with pytest.raises(TypeError, match="no figure of dict; expected one of Description"):
+    with pytest.raises(TypeError, match="no figure of dict; expected one of Comparison, Description"):
         plot({})
 
 

@@ -59,6 +59,15 @@ class Machine:
     packages: dict[str, str]
     kernels: str
 
+    @property
+    def facts(self) -> tuple[str, str, str]:
+        """Lines of a report: processor, system, packages."""
+        return (
+            f"{self.processor}, {self.cores} cores, {' '.join(self.flags)}",
+            f"{self.system}, {self.python}, kernels {self.kernels}",
+            ", ".join(f"{name} {version}" for name, version in self.packages.items()),
+        )
+
     @classmethod
     def here(cls) -> Machine:
         """Return the facts of this machine."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Table, duration, listed_values, markdown_table, text_table
+from dhkit.bench.report import Missing, Table, duration, listed_values, report_markdown, report_text
 
 __all__ = ["MeshBuild", "MotionReport", "MotionRow"]
 
@@ -91,30 +91,15 @@ class MotionReport:
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
-        parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
-        for heading, columns, cells in self._tables:
-            parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
-        return "\n".join([*parts, MEANING, ""])
+        return report_markdown(self._title, self.machine.facts, self._tables, MEANING)
 
     def __str__(self) -> str:
-        parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
-        for heading, columns, cells in self._tables:
-            parts += [heading, *text_table(columns, cells), ""]
-        return "\n".join([*parts, MEANING])
+        return report_text(self._title, self.machine.facts, self._tables, MEANING)
 
     @property
     def _title(self) -> str:
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: motions in least time beside others, {self.pairs} random pairs, one core{ending}"
-
-    @property
-    def _facts(self) -> list[str]:
-        machine = self.machine
-        return [
-            f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
-            f"{machine.system}, {machine.python}, kernels {machine.kernels}",
-            ", ".join(f"{name} {version}" for name, version in machine.packages.items()),
-        ]
 
     @property
     def _tables(self) -> list[Table]:

@@ -21,8 +21,8 @@ __all__ = [
     "Table",
     "duration",
     "listed_values",
-    "markdown_table",
-    "text_table",
+    "report_markdown",
+    "report_text",
 ]
 
 BATCH = 100_000
@@ -96,6 +96,8 @@ class Requirement:
         What was seen; None where something did not take part.
     judged
         Whether it was measured under the conditions that it is asked under.
+    conditions
+        What these are.
     """
 
     quantity: str
@@ -105,6 +107,7 @@ class Requirement:
     measured: float | None
     judged: bool = True
     target: float | None = None
+    conditions: str = f"batches of {BATCH}, one thread"
 
     @property
     def met(self) -> bool | None:
@@ -124,7 +127,7 @@ class Requirement:
         target = f" (target {self.target:g})" if self.target else ""
         bound = f"at {'most' if self.at_most else 'least'} {self.required:g}{target}"
         measured = "not measured" if self.measured is None else f"{self.measured:.3g}"
-        unjudged = "" if self.measured is None else f"asked at batches of {BATCH}, one thread"
+        unjudged = "" if self.measured is None else f"asked at {self.conditions}"
         return (
             f"{self.quantity}: {self.what}",
             bound,
@@ -186,32 +189,16 @@ class BenchReport:
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
-        parts = [f"# {self._title}", *(f"- {fact}" for fact in self._facts), ""]
-        for heading, columns, cells in self._tables:
-            parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
-        return "\n".join([*parts, RATIO_MEANING, ""])
+        return report_markdown(self._title, self.machine.facts, self._tables, RATIO_MEANING)
 
     def __str__(self) -> str:
-        parts = [self._title, *(f"  {fact}" for fact in self._facts), ""]
-        for heading, columns, cells in self._tables:
-            parts += [heading, *text_table(columns, cells), ""]
-        return "\n".join([*parts, RATIO_MEANING])
+        return report_text(self._title, self.machine.facts, self._tables, RATIO_MEANING)
 
     @property
     def _title(self) -> str:
         threads = "1 thread" if self.threads == 1 else f"{self.threads} threads"
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: dhkit beside its peers, batches of {self.batch}, {threads}{ending}"
-
-    @property
-    def _facts(self) -> list[str]:
-        machine = self.machine
-        packages = ", ".join(f"{name} {version}" for name, version in machine.packages.items())
-        return [
-            f"{machine.processor}, {machine.cores} cores, {' '.join(machine.flags)}",
-            f"{machine.system}, {machine.python}, kernels {machine.kernels}",
-            packages,
-        ]
 
     @property
     def _tables(self) -> list[Table]:
@@ -266,6 +253,22 @@ def _ratio(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def report_text(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
+    """Return a report as text: what ran where, its tables, and what their columns mean."""
+    parts = [title, *(f"  {fact}" for fact in facts), ""]
+    for heading, columns, cells in tables:
+        parts += [heading, *text_table(columns, cells), ""]
+    return "\n".join([*parts, meaning])
+
+
+def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
+    """Return the same as Markdown."""
+    parts = [f"# {title}", *(f"- {fact}" for fact in facts), ""]
+    for heading, columns, cells in tables:
+        parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
+    return "\n".join([*parts, meaning, ""])
 
 
 def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:

@@ -19,7 +19,17 @@ if TYPE_CHECKING:
     from dhkit.planning import Floor, Objective, Obstacle, Payload
     from dhkit.trajectories import Limits
 
-__all__ = ["gathering", "joint_limits", "joint_values", "numbers", "objective", "obstacles", "payload", "target"]
+__all__ = [
+    "columns",
+    "gathering",
+    "joint_limits",
+    "joint_values",
+    "numbers",
+    "objective",
+    "obstacles",
+    "payload",
+    "target",
+]
 
 LARGEST = 10_000
 """Bytes of a file with a matrix at most."""
@@ -147,6 +157,22 @@ def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed
         turns = degrees and name != "torque"
         limits[name] = np.where(arm.description.numbers.prismatic | (not turns), values, np.radians(values))
     return Limits.of(arm.description, **limits).scaled(velocity=speed)
+
+
+def columns(text: str | None) -> dict[str, str] | None:
+    """Return what a file calls its columns, by our names: "t=tout q=yout".
+
+    Raises
+    ------
+    DescriptionError
+        Another form.
+    """
+    if text is None:
+        return None
+    pairs = [word.partition("=") for word in text.replace(",", " ").split()]
+    if not pairs or not all(ours and theirs for ours, _, theirs in pairs):
+        raise DescriptionError(f'--columns: found {text!r}; expected OURS=THEIRS ..., such as "t=tout q=yout"')
+    return {ours: theirs for ours, _, theirs in pairs}
 
 
 def payload(text: str | None) -> Payload | None:

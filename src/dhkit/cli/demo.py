@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,9 +14,12 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
+from dhkit.cli.outputs import write_figure
 from dhkit.cli.quickest import race, there_and_back
+from dhkit.cli.simulation_task import chosen_motion
 from dhkit.cli.straight import Branches, Line, branches, straight_line
 from dhkit.cli.tour import tour
+from dhkit.control import compare
 from dhkit.description import Array, write_atomically
 from dhkit.dynamics import dynamics_graph
 from dhkit.errors import DescriptionError, DhkitError
@@ -74,6 +76,7 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
     shown: list[Shown] = []
     stage("ik", lambda: _inverse(arm, shown))
     stage("plan", lambda: _plan(arm, folder, 16 if quick else None))
+    stage("control", lambda: _control(arm, folder))
     stage("page", lambda: _page(arm, shown[0], folder / "index.html"))
     ok = all(report.ok for report in reports)
     if json:
@@ -129,12 +132,7 @@ def _figure(arm: Arm, path: Path) -> str:
 
     configurations = arm.configurations
     shown = next((name for name in ("nominal", "ready", "zero") if name in configurations), None)
-    buffer = io.BytesIO()
-    plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)).savefig(
-        buffer, format="png", dpi=120
-    )
-    write_atomically(path, buffer.getvalue())
-    return str(path)
+    return str(write_figure(plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)), path))
 
 
 def _inverse(arm: Arm, shown: list[Shown]) -> str:
@@ -174,9 +172,7 @@ def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
     except (DhkitError, ValueError) as error:
         return f"skipped: {error}"
     best.save(folder / "plan.npz")
-    picture = io.BytesIO()
-    plot_uses({"least time": best, "quintic": quintic}).savefig(picture, format="png", dpi=120)
-    write_atomically(folder / "plan.png", picture.getvalue())
+    write_figure(plot_uses({"least time": best, "quintic": quintic}), folder / "plan.png")
     with arm.view() as view:
         view.play(there_and_back(best, quintic))
         view.save_html(folder / "plan.html")
@@ -186,6 +182,26 @@ def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
         f"{_worth(best)}, the quintic {_worth(quintic)}: {kept} in {certificate.states} states, by "
         f"{certificate.reference}; {folder / 'plan.html'}: there in least time, back by the quintic"
     )
+
+
+def _control(arm: Arm, folder: Path) -> str:
+    """Simulate independent joints and computed torque on one motion; write a figure, and a page of the first."""
+    from dhkit.viewer import plot_comparison
+
+    try:
+        motion, _ = chosen_motion(arm, None, None, None, None, False)
+        compared = compare(arm.description, motion, ("pid", "computed-torque"))
+    except (DhkitError, ValueError) as error:
+        return f"skipped: {error}"
+    if compared.failures:
+        return "; ".join(f"{name}: {reason}" for name, reason in compared.failures.items())
+    write_figure(plot_comparison(compared.results), folder / "control.png")
+    with arm.view() as view:
+        view.play(compared.results["pid"])
+        view.save_html(folder / "control.html")
+    errors = [f"{name} errs by {1000 * run.tool_norms.peak:.2g} mm" for name, run in compared.results.items()]
+    seconds = f"{motion.duration:.3g} s at 1 kHz"
+    return f"{seconds}: {', '.join(errors)}; {folder / 'control.html'}: pid, with the motion asked for as a ghost"
 
 
 def _worth(motion: Trajectory) -> str:

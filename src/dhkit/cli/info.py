@@ -43,7 +43,7 @@ def show(arm: Arm, json: bool) -> None:
     if description.parameters:
         say("parameters (SI): " + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.values.items()) + "\n")
     rows = [_joint_row(i, joint, description) for i, joint in enumerate(description.joints)]
-    print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "assumed"), rows)
+    print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "friction", "assumed"), rows)
     for i, joint in enumerate(description.joints, start=1):
         if len(joint.bodies) > 1:
             listed = (
@@ -96,8 +96,16 @@ def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...
         f"{numbers.effort[i]:.4g} {force}" if joint.effort is not None else "unlimited",
         "no body" if not joint.bodies else f"{numbers.mass[i]:.4g}",
         f"{numbers.armature[i]:.4g}",
+        _friction(numbers.viscous[i], *numbers.coulomb[i].tolist()),
         ", ".join(joint.assumed),
     )
+
+
+def _friction(viscous: float, forwards: float, backwards: float) -> str:
+    """Return a joint's viscous friction and dry friction in both directions, on the joint's side; empty for none."""
+    dry = f"{forwards:.3g}" if forwards == -backwards else f"{forwards:.3g}/{backwards:.3g}"
+    parts = [f"{viscous:.3g} qd" if viscous else "", f"±{dry}" if forwards == -backwards and forwards else dry]
+    return " ".join(part for part in parts if part and part != "0")
 
 
 def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:

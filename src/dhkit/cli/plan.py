@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import sys
-import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
-from dhkit.description import Array, write_atomically
+from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
+from dhkit.cli.patience import Patience
+from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import Floor, Objective, Obstacle, Payload, PlanReport, Progress, ToolSpeed
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
@@ -23,14 +22,10 @@ from dhkit.trajectories.files import ARCHIVES, TABLES
 
 __all__ = ["Files", "Task", "run"]
 
-PATIENCE = 1.0
-"""s: a search that takes longer shows how far it is."""
 SAMPLES = 801
 """By which a motion's largest rates and torques are told."""
 SEEN = 0.005
 """Share of the time from which on an active limit is told."""
-FIGURES = (".png", ".svg", ".pdf")
-PAGES = (".html", ".htm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +87,7 @@ class Files:
         DescriptionError
             Another suffix, or no such folder.
         """
-        suffixes = ((self.motion, (*ARCHIVES, *TABLES)), (self.page, PAGES), (self.figure, FIGURES))
-        for path, expected in suffixes:
-            if path is None:
-                continue
-            if path.suffix.lower() not in expected:
-                raise DescriptionError(f"{path}: ends in {path.suffix!r}; expected {', '.join(expected)}")
-            if not path.parent.is_dir():
-                raise DescriptionError(f"{path.parent}: no such folder")
+        check_outputs(((self.motion, (*ARCHIVES, *TABLES)), (self.page, PAGES), (self.figure, FIGURES)))
 
     def write(self, task: Task, motion: Trajectory) -> Iterator[Path]:
         """Write them, and yield each path."""
@@ -113,10 +101,7 @@ class Files:
         if self.figure is not None:
             from dhkit.viewer import plot
 
-            picture = io.BytesIO()
-            plot(_carrying(task, motion)).savefig(picture, format=self.figure.suffix[1:].lower(), dpi=120)
-            write_atomically(self.figure, picture.getvalue())
-            yield self.figure
+            yield write_figure(plot(_carrying(task, motion)), self.figure)
 
 
 def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> int:
@@ -131,7 +116,13 @@ def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> i
     """
     files.check()
     try:
-        with _Watch() as watch:
+        with Patience("making the program") as line_on_screen:
+
+            def watch(now: Progress) -> None:
+                line_on_screen.say(
+                    f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
+                )
+
             motion = _along_line(task, watch) if line else _anyhow(task, watch)
     except PlanningError as error:
         if json:
@@ -149,7 +140,7 @@ def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> i
     return 0
 
 
-def _anyhow(task: Task, watch: _Watch) -> Trajectory:
+def _anyhow(task: Task, watch: Callable[[Progress], None]) -> Trajectory:
     return task.arm.plan(
         task.start,
         task.goal,
@@ -163,7 +154,7 @@ def _anyhow(task: Task, watch: _Watch) -> Trajectory:
     )
 
 
-def _along_line(task: Task, watch: _Watch) -> Trajectory:
+def _along_line(task: Task, watch: Callable[[Progress], None]) -> Trajectory:
     """Return the best motion with the tool on a straight line.
 
     Raises
@@ -181,41 +172,6 @@ def _along_line(task: Task, watch: _Watch) -> Trajectory:
     path = joint_path(arm.description, tool_line(arm.fk(task.start), T_goal), task.start, task.limits)
     motion = arm.plan_path(path, progress=watch, **task.shared)
     return replace(motion, description=task.arm.description)
-
-
-class _Watch:
-    """A line on stderr that says how far a search is, once it takes long and someone is looking."""
-
-    def __init__(self) -> None:
-        self._timer = threading.Timer(PATIENCE, self._open)
-        self._timer.daemon = True
-        self._status: Any = None
-
-    def __call__(self, now: Progress) -> None:
-        if self._status is not None:
-            self._status.update(
-                f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
-            )
-
-    def __enter__(self) -> _Watch:
-        if sys.stderr.isatty():
-            self._timer.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._timer.cancel()
-        if self._timer.is_alive():
-            self._timer.join()
-        if self._status is not None:
-            self._status.stop()
-
-    def _open(self) -> None:
-        from rich.console import Console
-
-        self._status = Console(stderr=True).status("making the program")
-        self._status.start()
 
 
 def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,30 +12,14 @@ from dhkit.description.frames import number_array
 from dhkit.dynamics import mass_matrix
 from dhkit.verification import random_motions
 
-__all__ = ["Robot", "description_of", "effective_inertia", "gain", "pd_gains", "pid_gains"]
+__all__ = ["batch_of", "effective_inertia", "gain", "pd_gains", "pid_gains", "positive", "positive_each"]
 
-Robot = Any
-"""An arm, or its description."""
 STATES = 256
 """Random configurations over which effective inertias are averaged."""
 
 
-def description_of(robot: Robot) -> Description:
-    """Return the description of an arm, or itself.
-
-    Raises
-    ------
-    TypeError
-        Neither.
-    """
-    found = getattr(robot, "description", robot)
-    if not isinstance(found, Description):
-        raise TypeError(f"found {type(robot).__name__}; expected an arm or its description")
-    return found
-
-
 def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
-    """Return a gain of all joints, or of each, shape () or (n,).
+    """Return a gain of all joints, or of each, or of each and each run of a batch: shape (), (n,) or (B, n).
 
     Raises
     ------
@@ -46,11 +29,28 @@ def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
         Not numbers.
     """
     array = number_array(value, name, "a number, or one for each joint")
-    if array.ndim > 1 or (n is not None and array.ndim == 1 and array.shape != (n,)):
-        raise ValueError(f"{name} has shape {array.shape}; expected a number, or {'(n,)' if n is None else (n,)}")
+    if array.ndim == 2 and array.shape[1] == 1 and n is not None:
+        array = np.repeat(array, n, axis=1)
+    if array.ndim > 2 or (n is not None and array.ndim and array.shape[-1] != n):
+        each = "n" if n is None else str(n)
+        raise ValueError(f"{name} has shape {array.shape}; expected a number, ({each},), or (B, {each}) for a batch")
     if not (np.isfinite(array).all() and (array >= 0).all()):
         raise ValueError(f"{name} is {array.tolist()}; expected finite numbers, 0 or more")
     return array.copy()
+
+
+def batch_of(*gains: Array) -> tuple[int, ...]:
+    """Return (B,) of gains for the runs of a batch, () of gains for one.
+
+    Raises
+    ------
+    ValueError
+        Gains for batches of different sizes.
+    """
+    sizes = {len(gain) for gain in gains if gain.ndim == 2}
+    if len(sizes) > 1:
+        raise ValueError(f"gains are of batches of {', '.join(map(str, sorted(sizes)))}; expected one")
+    return tuple(sizes)
 
 
 def positive(value: float, name: str) -> float:
@@ -61,9 +61,26 @@ def positive(value: float, name: str) -> float:
     ValueError
         Not a positive, finite number.
     """
-    if not (isinstance(value, Real) and np.isfinite(value) and value > 0):
-        raise ValueError(f"{name} is {value!r}; expected a positive number")
+    if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0):
+        raise ValueError(f"{name} is {str(value)[:60]}; expected a positive number")
     return float(value)
+
+
+def positive_each(value: ArrayLike, name: str) -> Array:
+    """Return positive numbers: one, shape (), or one for each run of a batch as a column, shape (B, 1).
+
+    Raises
+    ------
+    ValueError
+        Another shape, or a number that is not positive and finite.
+    TypeError
+        Not numbers.
+    """
+    array = number_array(value, name, "a positive number, or one for each run")
+    if array.ndim > 1 or not (np.isfinite(array).all() and (array > 0).all()):
+        shown = str(array.tolist())[:60]
+        raise ValueError(f"{name} is {shown}; expected a positive number, or (B,) of them for a batch")
+    return array[:, None] if array.ndim else array
 
 
 def effective_inertia(description: Description, q: ArrayLike | None = None) -> Array:
@@ -81,15 +98,15 @@ def effective_inertia(description: Description, q: ArrayLike | None = None) -> A
     return diagonal
 
 
-def pd_gains(bandwidth: float, damping: float) -> tuple[float, float]:
-    """Return k_p = w^2 and k_d = 2 z w, for which an error decays as s^2 + 2 z w s + w^2 says."""
-    w, z = positive(bandwidth, "bandwidth"), positive(damping, "damping")
+def pd_gains(bandwidth: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
+    """Return k_p = w^2 and k_d = 2 z w, for which an error decays as s^2 + 2 z w s + w^2 says; shape () or (B, 1)."""
+    w, z = positive_each(bandwidth, "bandwidth"), positive_each(damping, "damping")
     return w * w, 2 * z * w
 
 
-def pid_gains(bandwidth: float, damping: float, integral: float) -> tuple[float, float, float]:
-    """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a being ``integral``."""
-    w, z = positive(bandwidth, "bandwidth"), positive(damping, "damping")
+def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tuple[Array, Array, Array]:
+    """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a being ``integral``; () or (B, 1)."""
+    w, z = positive_each(bandwidth, "bandwidth"), positive_each(damping, "damping")
     a = integral
     if not (np.isfinite(a) and a >= 0):
         raise ValueError(f"integral is {integral!r}; expected a number, 0 or more")

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from dhkit.control.gains import Robot, description_of, effective_inertia, gain, pid_gains, positive
+from dhkit.control.gains import batch_of, effective_inertia, gain, pid_gains, positive
 from dhkit.control.references import Setpoint
-from dhkit.description import Array
+from dhkit.description import Array, Robot, description_of
+from dhkit.description.frames import number_array
 
 __all__ = ["PID"]
+
+BAND = 0.01
+"""Share of the largest torque over which a continuous controller's integral fades out."""
 
 
 class PID:
@@ -52,17 +56,18 @@ class PID:
             raise ValueError(f"derivative is {derivative!r}; expected 'error' or 'measurement'")
         self.derivative = derivative
         self.cutoff = None if cutoff is None else positive(cutoff, "cutoff")
-        self.limit = np.asarray(np.inf if limit is None else limit, dtype=float)
+        self.limit = number_array(np.inf if limit is None else limit, "limit", "a number, or one for each joint")
         if not (self.limit > 0).all():
             raise ValueError(f"limit is {self.limit.tolist()}; expected positive numbers")
+        self.batch_shape = batch_of(self.kp, self.ki, self.kd)
         self.reset()
 
     @classmethod
     def tuned(
         cls,
         robot: Robot,
-        bandwidth: float = 20.0,
-        damping: float = 1.0,
+        bandwidth: ArrayLike = 20.0,
+        damping: ArrayLike = 1.0,
         integral: float = 0.5,
         q: ArrayLike | None = None,
         derivative: str = "error",
@@ -78,9 +83,9 @@ class PID:
         robot
             The arm, or its description.
         bandwidth
-            w, rad/s.
+            w, rad/s; or shape (B,) for the runs of a batch.
         damping
-            z.
+            z, likewise.
         integral
             a: how fast the integral's pole is, over the bandwidth; 0 for PD.
         q
@@ -100,8 +105,27 @@ class PID:
         self._rate: Array | None = None
         self._time: float | None = None
 
+    def initial_state(self, q: Array) -> Array:
+        """Return the integrals of the errors, and with a cutoff the filtered rates: 0, shape (n,) or (2n,)."""
+        return np.zeros(len(q) * (1 if self.cutoff is None else 2))
+
+    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+        """Return the torques (n,), and the derivatives of the integrals and of the filtered rates."""
+        n = len(q)
+        error = setpoint.q - q
+        rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd
+        filtered = rate if self.cutoff is None else state[n:]
+        tau = self._torques(error, state[:n], filtered)
+        # The integral fades out over the last hundredth of the torque: switched off at once, as the sampled controller
+        # does it, it would chatter at the limit without end.
+        left = (self.limit - np.abs(tau)) / np.where(np.isfinite(self.limit), BAND * self.limit, 1.0)
+        growth = np.where(tau * error < 0, error, error * np.clip(left, 0.0, 1.0))
+        change = growth if self.cutoff is None else np.concatenate([growth, self.cutoff * (rate - filtered)])
+        return tau, change
+
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,)."""
+        _require_joints(len(q) if q.ndim == 1 else q.shape[1], kp=self.kp, ki=self.ki, kd=self.kd)
         error = setpoint.q - q
         step = 0.0 if self._time is None else t - self._time
         self._time = t
@@ -110,7 +134,21 @@ class PID:
             share = 1.0 if self._rate is None else 1 - np.exp(-self.cutoff * step)
             rate = rate if self._rate is None else self._rate + share * (rate - self._rate)
             self._rate = rate
-        tau: Array = self.kp * error + self.ki * self._integral + self.kd * rate
-        grows = (np.abs(tau) < self.limit) | (tau * error < 0)
-        self._integral = self._integral + np.where(grows, error * step, 0.0)
+        tau = self._torques(error, self._integral, rate)
+        self._integral = self._integral + np.where(self._grows(tau, error), error * step, 0.0)
         return tau
+
+    def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
+        tau: Array = self.kp * error + self.ki * integral + self.kd * rate
+        return tau
+
+    def _grows(self, tau: Array, error: Array) -> NDArray[np.bool_]:
+        """Return in which joints the integral may change: those whose drives can give more, or are asked for less."""
+        grows: NDArray[np.bool_] = (np.abs(tau) < self.limit) | (tau * error < 0)
+        return grows
+
+
+def _require_joints(n: int, **gains: Array) -> None:
+    for name, values in gains.items():
+        if values.ndim and values.shape[-1] != n:
+            raise ValueError(f"{name} has {values.shape[-1]} gains; expected {n}, one for each joint")

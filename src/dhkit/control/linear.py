@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.gains import Robot, description_of
 from dhkit.control.references import Setpoint
-from dhkit.description import Array, Description, joint_vector
-from dhkit.dynamics import bias, gravity_torque
+from dhkit.description import Array, Description, Robot, description_of, joint_vector
+from dhkit.dynamics import bias, gravity_torque, require_inertia
 from dhkit.symbolic import CasadiFunctions
 
 if TYPE_CHECKING:
     import casadi
 
 __all__ = ["LQR", "linearize"]
+
+ERROR, RATE, ACCELERATION = 0.1, 1.0, 200.0
+"""Acceptable deviations, rad, rad/s and rad/s^2, or m."""
 
 
 def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
@@ -44,6 +46,7 @@ def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = Non
     DescriptionError
         A link without a body.
     """
+    require_inertia(description)
     n = description.n
     state = joint_vector(description, q), np.zeros(n) if qd is None else joint_vector(description, qd, "qd")
     tau = bias(description, *state)
@@ -72,14 +75,20 @@ class LQR:
     q
         Where it is linearized, shape (n,), at rest.
     Q
-        Weights of joint errors and rates, shape (2n,) or (2n, 2n); 1 for all unless given.
+        Weights of joint errors and rates, shape (2n,) or (2n, 2n).
     R
-        Weights of torques, shape (n,) or (n, n); 1e-4 for all unless given.
+        Weights of torques, shape (n,) or (n, n).
 
     Raises
     ------
     ValueError
         Weights of another shape or not positive (semi)definite; a state that is not (n,) and finite.
+
+    Notes
+    -----
+    Unless given, weights are the squares of 1 over an acceptable deviation (Bryson and Ho 1975, section 5.2): 0.1 rad
+    or m, 1 rad/s or m/s, and of torques the drives' limits, but at most what accelerates the joint by 200 rad/s^2 or
+    m/s^2 while the others swing freely: the fastest poles are then slow enough for a rate of 1 kHz.
     """
 
     def __init__(self, robot: Robot, q: ArrayLike, Q: ArrayLike | None = None, R: ArrayLike | None = None) -> None:
@@ -88,22 +97,33 @@ class LQR:
         self.description = description_of(robot)
         n = self.description.n
         self.A, self.B = linearize(self.description, q)
-        self.Q, self.R = _weights(Q, 2 * n, 1.0, "Q"), _weights(R, n, 1e-4, "R")
+        deviations = np.repeat([ERROR, RATE], n)
+        torques = np.minimum(self.description.numbers.effort, ACCELERATION / np.diagonal(self.B[n:]))
+        self.Q, self.R = _weights(Q, 1 / deviations**2, "Q"), _weights(R, 1 / torques**2, "R")
         if np.linalg.eigvalsh(self.Q).min() < 0 or np.linalg.eigvalsh(self.R).min() <= 0:
             raise ValueError("Q is to be positive semidefinite, and R positive definite")
-        self.P = solve_continuous_are(self.A, self.B, self.Q, self.R)
+        try:
+            self.P = solve_continuous_are(self.A, self.B, self.Q, self.R)
+        except np.linalg.LinAlgError as error:
+            raise ValueError(f"Q and R give no regulator: {error}") from None
         self.K = np.linalg.solve(self.R, self.B.T @ self.P)
+        slowest = float(np.linalg.eigvals(self.A - self.B @ self.K).real.max())
+        if slowest >= 0:
+            raise ValueError(
+                f"Q and R leave the arm unstable, with an eigenvalue of {slowest:.3g} 1/s; expected Q above 0"
+            )
         self._held = gravity_torque(self.description, q)
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,)."""
-        error = np.concatenate([q - setpoint.q, qd - setpoint.qd])
-        tau: Array = self._held - self.K @ error
+        error = np.concatenate([q - setpoint.q, qd - setpoint.qd], axis=-1)
+        tau: Array = self._held - error @ self.K.T
         return tau
 
 
-def _weights(given: ArrayLike | None, size: int, default: float, name: str) -> Array:
-    weights = np.asarray(np.full(size, default) if given is None else given, dtype=float)
+def _weights(given: ArrayLike | None, default: Array, name: str) -> Array:
+    size = len(default)
+    weights = np.asarray(default if given is None else given, dtype=float)
     weights = np.diag(weights) if weights.ndim == 1 else weights
     if weights.shape != (size, size) or not np.isfinite(weights).all():
         raise ValueError(f"{name} has shape {weights.shape}; expected ({size},) or ({size}, {size}), finite")

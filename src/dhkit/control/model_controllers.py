@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.gains import Robot, description_of, effective_inertia, gain, pd_gains
+from dhkit.control.controller import continuous_law, reset
+from dhkit.control.gains import batch_of, effective_inertia, gain, pd_gains
+from dhkit.control.law import Law, Symbols
 from dhkit.control.references import Setpoint
-from dhkit.description import Array, require_bodies
+from dhkit.description import Array, Robot, description_of, require_bodies
 from dhkit.dynamics import Friction, friction_torque, gravity_torque, inverse_dynamics
+from dhkit.symbolic import InertialTable, recursive_gravity, recursive_inverse_dynamics
+
+if TYPE_CHECKING:
+    import casadi
 
 __all__ = ["ComputedTorque", "FeedForward", "FrictionCompensation", "PDGravity"]
+
+REST = 1e-4
+"""rad/s or m/s: below it a setpoint's rate is taken as rest rather than as a direction."""
 
 
 class _Proportional:
@@ -23,6 +33,13 @@ class _Proportional:
         require_bodies(self.description)
         n = self.description.n
         self.kp, self.kd = gain(kp, "kp", n), gain(kd, "kd", n)
+        self.batch_shape = batch_of(self.kp, self.kd)
+
+    def _law(self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]) -> Law:
+        """Return a law whose gains are kp and kd of each joint."""
+        shape = (*self.batch_shape, self.description.n)
+        gains = [np.broadcast_to(gain, shape) for gain in (self.kp, self.kd)]
+        return Law(name, self.description, np.concatenate(gains, axis=-1), torques)
 
     def _correction(self, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         correction: Array = self.kp * (setpoint.q - q) + self.kd * (setpoint.qd - qd)
@@ -43,13 +60,22 @@ class ComputedTorque(_Proportional):
     """
 
     @classmethod
-    def tuned(cls, robot: Robot, bandwidth: float = 20.0, damping: float = 1.0) -> Self:
-        """Return the controller with kp = w^2 and kd = 2 z w for a bandwidth w (rad/s) and a damping z."""
+    def tuned(cls, robot: Robot, bandwidth: ArrayLike = 20.0, damping: ArrayLike = 1.0) -> Self:
+        """Return the controller with kp = w^2 and kd = 2 z w for a bandwidth w, rad/s, and a damping z."""
         return cls(robot, *pd_gains(bandwidth, damping))
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,)."""
         return inverse_dynamics(self.description, q, qd, setpoint.qdd + self._correction(q, qd, setpoint))
+
+    def law(self) -> Law:
+        """Return the same as an expression."""
+        return self._law(
+            "computed_torque",
+            lambda table, s, gains: recursive_inverse_dynamics(
+                table, s.q, s.qd, s.wanted_qdd + _correction_expression(s, gains)
+            ),
+        )
 
 
 class PDGravity(_Proportional):
@@ -59,7 +85,9 @@ class PDGravity(_Proportional):
     """
 
     @classmethod
-    def tuned(cls, robot: Robot, bandwidth: float = 20.0, damping: float = 1.0, q: ArrayLike | None = None) -> Self:
+    def tuned(
+        cls, robot: Robot, bandwidth: ArrayLike = 20.0, damping: ArrayLike = 1.0, q: ArrayLike | None = None
+    ) -> Self:
         """Return the controller with kp = m w^2 and kd = 2 z w m, m the effective inertia of each joint.
 
         Parameters
@@ -67,7 +95,7 @@ class PDGravity(_Proportional):
         robot
             The arm, or its description.
         bandwidth, damping
-            w, rad/s, and z.
+            w, rad/s, and z; or shape (B,) for the runs of a batch.
         q
             Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
         """
@@ -78,6 +106,12 @@ class PDGravity(_Proportional):
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,)."""
         return self._correction(q, qd, setpoint) + gravity_torque(self.description, q)
+
+    def law(self) -> Law:
+        """Return the same as an expression."""
+        return self._law(
+            "pd_gravity", lambda table, s, gains: _correction_expression(s, gains) + recursive_gravity(table, s.q)
+        )
 
 
 class FeedForward(PDGravity):
@@ -91,12 +125,28 @@ class FeedForward(PDGravity):
         ahead = inverse_dynamics(self.description, setpoint.q, setpoint.qd, setpoint.qdd)
         return ahead + self._correction(q, qd, setpoint)
 
+    def law(self) -> Law:
+        """Return the same as an expression."""
+        return self._law(
+            "feed_forward",
+            lambda table, s, gains: (
+                recursive_inverse_dynamics(table, s.wanted_q, s.wanted_qd, s.wanted_qdd)
+                + _correction_expression(s, gains)
+            ),
+        )
+
+
+def _correction_expression(s: Symbols, gains: casadi.SX) -> casadi.SX:
+    n = s.q.shape[0]
+    return gains[:n] * (s.wanted_q - s.q) + gains[n:] * (s.wanted_qd - s.qd)
+
 
 class FrictionCompensation:
     """Another controller's torques plus those that the arm's friction takes at the setpoint's rates.
 
     At the setpoint's rates and not at the measured ones: dry friction would otherwise be compensated in the wrong
-    direction whenever noise changes the sign of a small rate.
+    direction whenever noise changes the sign of a small rate. For the same reason the compensation changes its
+    direction smoothly, over 1e-4 rad/s or m/s: the rate of a setpoint at rest is 0 only up to rounding.
 
     Parameters
     ----------
@@ -105,7 +155,7 @@ class FrictionCompensation:
     robot
         Whose friction; that of ``inner`` unless given.
     friction
-        How dry friction changes with the direction; a step unless given.
+        How dry friction changes with the direction; ``Friction(1e-4)`` unless given.
     """
 
     def __init__(self, inner: Any, robot: Robot = None, friction: Friction | None = None) -> None:
@@ -114,17 +164,30 @@ class FrictionCompensation:
         found = robot if robot is not None else getattr(inner, "description", None)
         if found is None:
             raise ValueError("robot is not given, and the inner controller has none")
+        if friction is not None and not isinstance(friction, Friction):
+            raise TypeError(f"friction is {friction!r}; expected a Friction, or None")
         self.inner, self.description = inner, description_of(found)
-        self.friction = friction
+        self.batches: bool = getattr(inner, "batches", True)
+        self.batch_shape: tuple[int, ...] = getattr(inner, "batch_shape", ())
+        self.friction = Friction(REST) if friction is None else friction
 
     def reset(self) -> None:
         """Reset the inner controller."""
-        reset = getattr(self.inner, "reset", None)
-        if callable(reset):
-            reset()
+        reset(self.inner)
+
+    def initial_state(self, q: Array) -> Array:
+        """Return the inner controller's internal states at time 0."""
+        return continuous_law(self.inner, q)[0]
+
+    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+        """Return the torques (n,), and the derivatives of the inner controller's states."""
+        tau, change = continuous_law(self.inner, q)[1](t, q, qd, setpoint, state)
+        return np.asarray(tau, dtype=float) + self._loss(setpoint), change
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,)."""
-        loss = friction_torque(self.description, setpoint.qd, self.friction)
-        tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + loss
+        tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._loss(setpoint)
         return tau
+
+    def _loss(self, setpoint: Setpoint) -> Array:
+        return friction_torque(self.description, setpoint.qd, self.friction)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,12 +12,27 @@ from numpy.typing import NDArray
 
 from dhkit.control.complementarity import bounded_forces
 from dhkit.control.pushes import Push
-from dhkit.description import Array, Description, require_bodies
-from dhkit.dynamics import Friction, bias, friction_torque, kinetic_energy, mass_matrix, potential_energy
+from dhkit.control.step_kernel import StepKernel
+from dhkit.description import Array, Description
+from dhkit.dynamics import (
+    Friction,
+    bias,
+    friction_torque,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+    require_inertia,
+)
 from dhkit.dynamics.programs import dynamics_kernel
 from dhkit.kernels import Kernel
+from dhkit.verification import random_motions
 
-__all__ = ["Contact", "Plant"]
+__all__ = ["Contact", "Phase", "Plant"]
+
+log = logging.getLogger(__name__)
+
+STATES = 256
+"""Random configurations at which the stiffness of friction is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +54,7 @@ class Plant:
     Raises
     ------
     DescriptionError
-        A link without a body.
+        A link without a body, or a joint that carries no inertia.
     ValueError
         A restitution that is not from 0 to 1.
     """
@@ -50,7 +66,14 @@ class Plant:
     _single: tuple[Kernel, Array] = field(init=False)
 
     def __post_init__(self) -> None:
-        require_bodies(self.description)
+        require_inertia(self.description)
+        for push in self.pushes:
+            _require_push(push)
+            if push.link is not None and push.link > self.n:
+                raise ValueError(f"link is {push.link}; {self.description.name} has {self.n}")
+        numbers = self.description.numbers
+        if self.friction is not None and not (numbers.viscous.any() or numbers.coulomb.any()):
+            log.warning("%s has no friction in its file: friction changes nothing", self.description.name)
         if self.restitution is not None and not 0 <= self.restitution <= 1:
             raise ValueError(f"restitution is {self.restitution!r}; expected 0 to 1, or None for no stops")
         object.__setattr__(self, "_single", dynamics_kernel("forward_dynamics", self.description))
@@ -85,6 +108,30 @@ class Plant:
     def undisturbed(self) -> bool:
         """Whether no joint has stiction or a stop, so that nothing about the motion is sudden."""
         return self.smooth and not np.isfinite(self.limits).any()
+
+    @cached_property
+    def stiffness(self) -> float:
+        """How fast friction slows joints down near rest, 1/s: the largest over random configurations.
+
+        It is the largest eigenvalue of M^-1 D, D being the slope of friction over the rate where that is steepest.
+        """
+        if self.friction is None:
+            return 0.0
+        numbers = self.description.numbers
+        slope = numbers.viscous.copy()
+        if self.friction.width:
+            slope += np.abs(numbers.coulomb).max(axis=1) / self.friction.width
+        root = np.sqrt(slope)
+        q = random_motions(self.description, STATES).q
+        inverse = np.linalg.pinv(mass_matrix(self.description, q), hermitian=True)
+        return float(np.linalg.eigvalsh(root[:, None] * inverse * root).max())
+
+    @cached_property
+    def step_kernel(self) -> StepKernel | None:
+        """A step while nothing holds and nothing pushes, as one program; None where friction is a step."""
+        if self.friction is not None and not self.friction.width:
+            return None
+        return StepKernel.open([self.description], self.friction, 0.0)
 
     @cached_property
     def nothing_holds(self) -> Contact:
@@ -171,6 +218,11 @@ class Plant:
             qdd[free] = np.linalg.solve(M[np.ix_(free, free)], (net - bias(self.description, q, qd))[free])
         return qdd
 
+    def phase(self, q: Array, qd: Array, tau: Array, pushes: tuple[Push, ...] = ()) -> Phase:
+        """Return what holds from a state on, until something sudden happens."""
+        contact = self.contact(q, qd, tau, pushes)
+        return Phase(contact, pushes, self.moving(q, qd, tau, contact, pushes))
+
     def held(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
         """Return the resisting torques that hold the joints of a contact, shape (n,); 0 for the others."""
         qdd = self.moving(q, qd, tau, contact, pushes)
@@ -208,3 +260,18 @@ class Contact:
     def free(cls, n: int) -> Contact:
         """Return that of joints that nothing holds."""
         return cls(np.zeros(n, dtype=np.int8), np.zeros(n, dtype=bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """What stays the same from a state on, until something sudden happens."""
+
+    contact: Contact
+    pushes: tuple[Push, ...]
+    qdd: Array
+    """Accelerations at its beginning, shape (n,)."""
+
+
+def _require_push(push: object) -> None:
+    if not isinstance(push, Push):
+        raise TypeError(f"pushes has {type(push).__name__}; expected Push objects")

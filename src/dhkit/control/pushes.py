@@ -44,6 +44,8 @@ class Push:
             if value.shape != (3,) or not np.isfinite(value).all():
                 raise ValueError(f"{name} is {getattr(self, name)!r}; expected three finite numbers")
             object.__setattr__(self, name, value)
+        if self.link is not None and type(self.link) is not int:
+            raise TypeError(f"link is {self.link!r}; expected a whole number, or None for the tool")
         if self.link is not None and self.link < 1:
             raise ValueError(f"link is {self.link}; expected 1 or more, or None for the tool")
         if not self.begin <= self.end:

@@ -9,9 +9,10 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.control.tool_poses import joints_at_pose
+from dhkit.description import Array, Description, joint_vector
 from dhkit.description.frames import number_array
-from dhkit.kinematics import forward_kinematics
+from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.trajectories import Trajectory
 
 __all__ = ["Held", "Reference", "Samples", "Setpoint", "Sine", "Step", "reference_of"]
@@ -34,10 +35,24 @@ class Setpoint:
         """The tool's pose in the world, shape (4, 4)."""
         return forward_kinematics(self.description, self.q)
 
+    @cached_property
+    def twist(self) -> Array:
+        """The tool's velocity, shape (6,): of its origin, m/s, then angular, rad/s, world axes."""
+        return jacobian(self.description, self.q) @ self.qd
+
+    @cached_property
+    def acceleration(self) -> Array:
+        """The tool's acceleration, shape (6,): the time derivative of ``twist``, m/s^2 and rad/s^2."""
+        at_rest: Array = jacobian(self.description, self.q) @ self.qdd
+        return at_rest + jacobian_dot(self.description, self.q, self.qd) @ self.qd
+
 
 @runtime_checkable
 class Reference(Protocol):
-    """Anything that has joint values for times; after its ``duration`` it stays where it is."""
+    """Anything that has joint values for times; ``duration`` is how long a run lasts unless it is told otherwise.
+
+    Where it has an attribute ``jumps``, times (s) at which it or its derivatives jump, continuous runs pause there.
+    """
 
     @property
     def duration(self) -> float | None:
@@ -72,6 +87,11 @@ class Step:
 
     def __post_init__(self) -> None:
         _make_finite(self, "before", "after", "time")
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """When it jumps, s."""
+        return (float(self.time),)
 
     def sampled(self, t: Array) -> Samples:
         """Return one of the configurations for each time."""
@@ -119,6 +139,12 @@ def _make_finite(reference: object, *names: str) -> None:
         if not np.isfinite(value).all():
             raise ValueError(f"{type(reference).__name__}: {name} is {value.tolist()}; expected finite numbers")
         object.__setattr__(reference, name, value)
+    shapes = [np.shape(getattr(reference, name)) for name in names]
+    try:
+        np.broadcast_shapes(*shapes)
+    except ValueError:
+        listed = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
+        raise ValueError(f"{type(reference).__name__}: {listed} do not fit together") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,17 +157,35 @@ class _Motion:
     def duration(self) -> float:
         return self.motion.duration
 
+    @property
+    def jumps(self) -> Array:
+        return self.motion.breaks
+
     def sampled(self, t: Array) -> Samples:
         return self.motion.q(t), self.motion.qd(t), self.motion.qdd(t)
 
 
-def reference_of(description: Description, reference: Reference | Trajectory | ArrayLike) -> Reference:
-    """Return a reference, made of a trajectory or of a configuration where it is one.
+def reference_of(
+    description: Description, reference: Reference | Trajectory | ArrayLike, q0: ArrayLike | None = None
+) -> Reference:
+    """Return a reference, made of a trajectory, or of a configuration or a pose to hold where it is one.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    reference
+        A :class:`Reference`, a motion, joint values (n,), or a pose of the tool in the world (4, 4).
+    q0
+        Joint values, shape (n,), rad and m, to which those that hold a pose are nearest; the middle of the joint limits
+        unless given.
 
     Raises
     ------
     ValueError
-        A trajectory of another robot, or a configuration that is not (n,) and finite.
+        A trajectory of another robot, a matrix that is no pose, or a configuration that is not (n,) and finite.
+    UnreachableError
+        A pose that the arm does not reach inside its limits.
     TypeError
         Something else.
     """
@@ -152,9 +196,17 @@ def reference_of(description: Description, reference: Reference | Trajectory | A
                 f"{description.name} ({description.n} joints)"
             )
         return _Motion(reference)
+    if isinstance(reference, type):
+        raise TypeError(f"reference is the class {reference.__name__}; expected an object of it")
     if isinstance(reference, Reference):
         return reference
-    q = joint_array(description, reference, "reference")
-    if q.shape != (description.n,) or not np.isfinite(q).all():
-        raise ValueError(f"reference has shape {q.shape}; expected a motion, or ({description.n},) finite joint values")
-    return Held(q.copy())
+    array = number_array(reference, "reference", f"a motion, ({description.n},) or (4, 4)")
+    if array.shape == (4, 4):
+        near = None if q0 is None else joint_vector(description, q0, "q0")
+        return Held(joints_at_pose(description, array, near, "reference"))
+    if array.shape != (description.n,) or not np.isfinite(array).all():
+        raise ValueError(
+            f"reference has shape {array.shape}; expected a motion, ({description.n},) finite joint values, or a pose "
+            "(4, 4)"
+        )
+    return Held(array.copy())

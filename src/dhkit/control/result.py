@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Robot, description_of
 from dhkit.kinematics import forward_kinematics
 
-__all__ = ["EnergyAudit", "SimulationResult"]
+__all__ = ["EnergyAudit", "ErrorNorms", "SimulationResult"]
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,28 @@ class EnergyAudit:
         """The change of energy that nothing accounts for."""
         return self.change - (self.drives + self.pushes - self.friction - self.impacts)
 
+    def __str__(self) -> str:
+        parts = "change {change:.4g}, drives {drives:.4g}, pushes {pushes:.4g}, friction {friction:.4g}, impacts"
+        parts += " {impacts:.4g}"
+        return f"{parts.format(**vars(self))} J; {self.remains:.1e} J without account, {self.error:.1e} of the turnover"
+
     @property
     def error(self) -> float:
-        """What remains, over the energy that was turned over; 0 where none was."""
-        return abs(self.remains) / self.turnover if self.turnover > 0 else 0.0
+        """What remains, over the energy that was turned over; NaN of a run that failed, 0 where nothing moved."""
+        if not self.remains:
+            return 0.0
+        return abs(self.remains) / self.turnover if self.turnover != 0 else float("inf")
+
+
+class ErrorNorms(NamedTuple):
+    """How large an error over time is, in the error's unit."""
+
+    peak: float
+    """Largest."""
+    rms: float
+    """Root of the mean square over all states."""
+    final: float
+    """That of the last state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +82,11 @@ class SimulationResult:
     """What was to be followed, shape (N+1, n)."""
     reference_qd: Array
     audit: EnergyAudit
+    reference_poses: Array = field(default_factory=lambda: np.zeros((0, 12)), kw_only=True)
+    """The tool's poses that the reference asks for, their upper three rows, shape (N+1, 12), where the arm that the
+    reference and the controller know has another geometry than the one that moved; shape (0, 12) where not."""
+    controller: str = field(default="", kw_only=True)
+    """The controller's name, for figures; files do not keep it."""
     saturated: Array = field(default_factory=lambda: np.zeros(0))
     """Of each joint the share of steps in which its drive could not give what was asked, shape (n,)."""
 
@@ -94,14 +119,60 @@ class SimulationResult:
         return forward_kinematics(self.description, self.q)
 
     @cached_property
+    def reference_T(self) -> Array:
+        """The tool's poses in the world that the reference asks for, shape (N+1, 4, 4)."""
+        if not len(self.reference_poses):
+            return forward_kinematics(self.description, self.reference_q)
+        T = np.tile(np.eye(4), (len(self.reference_poses), 1, 1))
+        T[:, :3] = self.reference_poses.reshape(-1, 3, 4)
+        return T
+
+    @cached_property
     def tool_error(self) -> Array:
-        """How far the tool is from where it should be, shape (N+1,), m."""
-        wanted = forward_kinematics(self.description, self.reference_q)
-        distance: Array = np.linalg.norm(self.T[:, :3, 3] - wanted[:, :3, 3], axis=1)
+        """Distance of the tool from where the reference has it, shape (N+1,), m."""
+        distance: Array = np.linalg.norm(self.T[:, :3, 3] - self.reference_T[:, :3, 3], axis=1)
         return distance
+
+    @cached_property
+    def tool_rotation_error(self) -> Array:
+        """Angle of the rotation from the tool's orientation to that of the reference, shape (N+1,), rad, 0 to pi.
+
+        From both the sine and the cosine of the angle, so that small angles keep their digits.
+        """
+        R = np.swapaxes(self.T[:, :3, :3], 1, 2) @ self.reference_T[:, :3, :3]
+        skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+        angle: Array = np.arctan2(np.linalg.norm(skew, axis=1), np.trace(R, axis1=1, axis2=2) - 1)
+        return angle
+
+    @property
+    def tool_norms(self) -> ErrorNorms:
+        """Of :attr:`tool_error`, m."""
+        return _norms(self.tool_error)
+
+    @property
+    def tool_rotation_norms(self) -> ErrorNorms:
+        """Of :attr:`tool_rotation_error`, rad."""
+        return _norms(self.tool_rotation_error)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a file by its suffix and return its path; see :func:`dhkit.control.result_files.save_result`."""
+        from dhkit.control.result_files import save_result
+
+        return save_result(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path, robot: Robot = None) -> SimulationResult:
+        """Read a file of :meth:`save`; see :func:`dhkit.control.result_files.load_result`. A robot may be an arm."""
+        from dhkit.control.result_files import load_result
+
+        return load_result(path, None if robot is None else description_of(robot))
 
     def __repr__(self) -> str:
         return (
             f"<SimulationResult of {self.description.name}: {self.t[-1]:g} s in {len(self.t) - 1} steps, largest error "
             f"{self.peak_error.max(initial=0.0):.3g}>"
         )
+
+
+def _norms(error: Array) -> ErrorNorms:
+    return ErrorNorms(float(error.max()), float(np.sqrt(np.mean(error**2))), float(error[-1]))

@@ -10,7 +10,7 @@ from dhkit.description.locking import lock
 from dhkit.description.named import Named
 from dhkit.description.numbers import Array, Numbers
 from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, Robot, description_of
 from dhkit.description.robot_file import from_toml, read_robot
 from dhkit.description.table import DHTable, from_dh
 from dhkit.description.toml_writer import to_toml, write_robot
@@ -55,12 +55,14 @@ __all__ = [
     "Named",
     "Numbers",
     "Placement",
+    "Robot",
     "Shape",
     "Sphere",
     "Tool",
     "Units",
     "asset",
     "check_pose",
+    "description_of",
     "from_dh",
     "from_toml",
     "joint_array",

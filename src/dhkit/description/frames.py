@@ -52,8 +52,10 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
         Not numbers.
     """
     vector = joint_array(description, q, name)
-    if vector.shape != (description.n,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} has shape {vector.shape}; expected ({description.n},), finite values")
+    if vector.shape != (description.n,):
+        raise ValueError(f"{name} has shape {vector.shape}; expected ({description.n},)")
+    if not np.isfinite(vector).all():
+        raise ValueError(f"{name} has values that are not finite: {vector.tolist()}")
     return vector
 
 

@@ -15,7 +15,10 @@ from dhkit.expressions import Expression
 if TYPE_CHECKING:
     from dhkit.description.numbers import Numbers
 
-__all__ = ["Description"]
+__all__ = ["Description", "Robot", "description_of"]
+
+Robot = Any
+"""An arm, or its description."""
 
 
 @dataclass(frozen=True)
@@ -105,3 +108,17 @@ class Description:
     def __getstate__(self) -> dict[str, Any]:
         """Leave the hash out: that of text differs from process to process."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+
+def description_of(robot: Robot) -> Description:
+    """Return the description of an arm, or itself.
+
+    Raises
+    ------
+    TypeError
+        Neither.
+    """
+    found = getattr(robot, "description", robot)
+    if not isinstance(found, Description):
+        raise TypeError(f"found {type(robot).__name__}; expected an arm or its description")
+    return found

@@ -2,15 +2,17 @@
 
 from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
 from dhkit.dynamics.equations import bias, coriolis_matrix, gravity_torque, inverse_dynamics, mass_matrix
-from dhkit.dynamics.forward import forward_dynamics
+from dhkit.dynamics.forward import forward_dynamics, require_inertia
 from dhkit.dynamics.kernels import dynamic_kernels
 from dhkit.dynamics.loads import friction_torque, wrench_torque
 from dhkit.dynamics.programs import dynamics_graph
 from dhkit.dynamics.regressor import inertial_parameters, regressor
+from dhkit.dynamics.velocity_regressor import ParameterGrouping, parameter_grouping, velocity_regressor
 from dhkit.symbolic import Friction
 
 __all__ = [
     "Friction",
+    "ParameterGrouping",
     "bias",
     "coriolis_matrix",
     "dynamic_kernels",
@@ -22,8 +24,11 @@ __all__ = [
     "inverse_dynamics",
     "kinetic_energy",
     "mass_matrix",
+    "parameter_grouping",
     "potential_energy",
     "power",
     "regressor",
+    "require_inertia",
+    "velocity_regressor",
     "wrench_torque",
 ]

@@ -14,7 +14,7 @@ from dhkit.dynamics.programs import evaluate
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import SINGULAR, Friction
 
-__all__ = ["forward_dynamics"]
+__all__ = ["forward_dynamics", "require_inertia"]
 
 log = logging.getLogger(__name__)
 
@@ -69,8 +69,14 @@ def forward_dynamics(
     return qdd
 
 
-def _explain(description: Description, q: Array, qdd: Array) -> None:
-    """Raise or log where M is singular; other NaN come from states that are not finite, as everywhere."""
+def require_inertia(description: Description) -> None:
+    """Refuse an arm whose mass matrix is singular at every state, so that its joints have no accelerations.
+
+    Raises
+    ------
+    DescriptionError
+        A link without a body; joints that carry no inertia at any state: names them, and what would help.
+    """
     everywhere = _failing(mass_matrix(description, _random_states(description)))
     if np.all(everywhere >= 0):
         names = _named(description, np.unique(everywhere))
@@ -78,6 +84,11 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
             f"{description.name}: the mass matrix is singular: {names} no inertia; give the links behind a body with "
             "inertia, or the drive a rotor inertia"
         )
+
+
+def _explain(description: Description, q: Array, qdd: Array) -> None:
+    """Raise or log where M is singular; other NaN come from states that are not finite, as everywhere."""
+    require_inertia(description)
     lost = np.isnan(qdd).any(axis=-1)
     joints = _failing(mass_matrix(description, np.broadcast_to(q, qdd.shape)[lost]))
     if np.all(joints < 0):

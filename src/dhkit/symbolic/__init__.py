@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
     from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern
     from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+    from dhkit.symbolic.differentiable.velocity_regressor import velocity_regressor
     from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
     from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
     from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
@@ -99,6 +100,7 @@ __all__ = [
     "smooth_direction",
     "solve_for_acceleration",
     "table_pattern",
+    "velocity_regressor",
 ]
 
 __getattr__, __dir__ = lazy_names(
@@ -146,6 +148,7 @@ __getattr__, __dir__ = lazy_names(
             "recursive_gravity",
             "recursive_inverse_dynamics",
         ),
+        "dhkit.symbolic.differentiable.velocity_regressor": ("velocity_regressor",),
         "dhkit.symbolic.exact.base_parameters": (
             "BaseParameters",
             "base_parameters",

@@ -1,6 +1,7 @@
 """Motions over time: exact piecewise polynomials, their limits, files, and the classical ones of textbooks."""
 
 from dhkit.trajectories.cartesian import circle, straight_line
+from dhkit.trajectories.files import read_motion, written_by_dhkit
 from dhkit.trajectories.following import joint_path
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.paths import JointPath
@@ -25,10 +26,12 @@ __all__ = [
     "joint_path",
     "least_slowdown",
     "quintic",
+    "read_motion",
     "require_inside",
     "spline",
     "straight_line",
     "tool_circle",
     "tool_line",
     "trapezoidal",
+    "written_by_dhkit",
 ]

@@ -1,4 +1,4 @@
-"""Trajectories as NumPy and MATLAB archives: every number as it is, and the robot with them."""
+"""Archives of NumPy and MATLAB: every number as it is, and the robot with them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,58 @@ import numpy as np
 from numpy.lib import format as npy
 
 from dhkit.errors import DescriptionError
-from dhkit.trajectories.matlab import read_matrices
+from dhkit.trajectories.labels import TEXTS, FileKind
+from dhkit.trajectories.matlab import read_variables
 
-__all__ = ["MOST_BYTES", "mat_bytes", "npz_bytes", "read_mat", "read_npz"]
+__all__ = ["ARCHIVES", "archive_bytes", "archive_format", "mat_bytes", "npz_bytes", "read_archive"]
 
-MOST_BYTES = 200_000_000
-"""Of a file, and of what is in it."""
-KEYS = ("format", "robot", "digest", "toml", "breaks", "coefficients")
-TEXTS = KEYS[:4]
+ARCHIVES = (".npz", ".mat")
+MOST_FORMAT = 1_000
+"""Bytes of the text ``format``."""
+
+
+def archive_bytes(suffix: str, values: Mapping[str, Any]) -> bytes:
+    """Return an archive of texts and arrays, in the format that its suffix names."""
+    return npz_bytes(values) if suffix == ".npz" else mat_bytes(values)
+
+
+def read_archive(suffix: str, content: bytes, kind: FileKind) -> dict[str, Any]:
+    """Return an archive's texts and arrays by name, in the format that its suffix names.
+
+    From a ``.mat`` file arrays have two axes or more, and a trailing axis of length 1 may be missing.
+
+    Raises
+    ------
+    DescriptionError
+        Not such an archive; says what was found.
+    """
+    return read_npz(content, kind) if suffix == ".npz" else read_mat(content, kind)
+
+
+def archive_format(suffix: str, content: bytes, most: int) -> str:
+    """Return the text ``format`` of an archive, which says what dhkit wrote; empty in archives from elsewhere.
+
+    Parameters
+    ----------
+    suffix, content
+        The file.
+    most
+        Bytes that its variables may take unpacked.
+
+    Raises
+    ------
+    DescriptionError
+        A damaged ``.mat`` file.
+    """
+    if suffix == ".mat":
+        variable = read_variables(content, most).get("format")
+        return variable.value if variable is not None and isinstance(variable.value, str) else ""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            info = archive.getinfo("format.npy")
+            return str(_npy(archive.read(info), "format")) if info.file_size <= MOST_FORMAT else ""
+    except (KeyError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError, DescriptionError):
+        return ""
 
 
 def npz_bytes(values: Mapping[str, Any]) -> bytes:
@@ -38,22 +82,17 @@ def mat_bytes(values: Mapping[str, Any]) -> bytes:
     return file.getvalue()
 
 
-def read_npz(content: bytes) -> dict[str, Any]:
-    """Return texts and arrays by name; nothing is unpickled, and nothing unpacked beyond a bound.
-
-    Raises
-    ------
-    DescriptionError
-        Not such an archive; says what was found.
-    """
+def read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
+    """Return texts and arrays by name; nothing is unpickled, and nothing unpacked beyond a bound."""
+    keys = (*TEXTS, *kind.arrays)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-            _require_keys(members)
-            size = sum(members[key].file_size for key in KEYS)
-            if size > MOST_BYTES:
-                raise DescriptionError(f"unpacks to {size / 1e6:.0f} MB; expected at most {MOST_BYTES / 1e6:g} MB")
-            return {key: _npy(archive.read(members[key]), key) for key in KEYS}
+            _require_keys(members, kind)
+            size = sum(members[key].file_size for key in keys)
+            if size > kind.most:
+                raise DescriptionError(f"unpacks to {size / 1e6:.0f} MB; expected at most {kind.most / 1e6:g} MB")
+            return {key: _npy(archive.read(members[key]), key) for key in keys}
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, MemoryError, OSError, ValueError) as error:
         raise DescriptionError(f"damaged, or no .npz file: {_line(error)}") from None
 
@@ -78,28 +117,23 @@ def _npy(data: bytes, key: str) -> Any:
     return np.frombuffer(rest, dtype).reshape(shape, order="F" if fortran else "C").astype(float)
 
 
-def read_mat(content: bytes) -> dict[str, Any]:
-    """Return texts and arrays by name, as :func:`read_npz`; a trailing axis of length 1 may be missing.
-
-    Raises
-    ------
-    DescriptionError
-        Not such an archive; says what was found.
-    """
-    found = read_matrices(content, KEYS, MOST_BYTES)
-    _require_keys(found)
-    for key in KEYS:
-        if isinstance(found[key], str) != (key in TEXTS):
+def read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
+    """Return texts and arrays by name, as :func:`read_npz`."""
+    variables = read_variables(content, kind.most)
+    _require_keys(variables, kind)
+    found = {key: variables[key].value for key in (*TEXTS, *kind.arrays)}
+    for key, value in found.items():
+        if isinstance(value, str) != (key in TEXTS):
             expected = "text" if key in TEXTS else "numbers"
             raise DescriptionError(f"{key}: found {'text' if key not in TEXTS else 'numbers'}; expected {expected}")
     return found
 
 
-def _require_keys(found: Mapping[str, Any]) -> None:
-    missing = [key for key in KEYS if key not in found]
+def _require_keys(found: Mapping[str, Any], kind: FileKind) -> None:
+    missing = [key for key in (*TEXTS, *kind.arrays) if key not in found]
     if missing:
-        names = ", ".join(sorted(map(str, found)))[:80] or "nothing"
-        raise DescriptionError(f"no {missing[0]} in it: found {names}; expected a trajectory that dhkit saved")
+        names = " ".join(", ".join(sorted(found)).split())[:80] or "nothing"
+        raise DescriptionError(f"no {missing[0]} in it: found {names}; expected a {kind.noun} that dhkit saved")
 
 
 def _line(error: Exception) -> str:

@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dhkit.description import Array, Description, from_toml, library_robot, robots, to_toml, write_atomically
-from dhkit.description.files import read_bounded
+from dhkit.description import Array, Description, write_atomically
 from dhkit.errors import DescriptionError
-from dhkit.trajectories.archives import MOST_BYTES, mat_bytes, npz_bytes, read_mat, read_npz
+from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
+from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
+from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
 from dhkit.trajectories.ros_yaml import parse_message, trajectory_text
-from dhkit.trajectories.tables import read_table, select_columns, table_text
+from dhkit.trajectories.tables import check_columns, read_table, select_columns, table_text
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["load_trajectory", "read_samples", "save_trajectory"]
+__all__ = [
+    "ARCHIVES",
+    "TABLES",
+    "load_trajectory",
+    "read_motion",
+    "read_samples",
+    "save_trajectory",
+    "written_by_dhkit",
+]
 
-ARCHIVES, TABLES = (".npz", ".mat"), (".csv", ".yaml", ".yml")
-FORMAT = "dhkit trajectory"
-VERSION = f"{FORMAT} 1"
+TABLES = (".csv", ".yaml", ".yml")
+SAMPLES = (*TABLES, ".mat")
+"""What samples from elsewhere may come in."""
+TRAJECTORY = FileKind(
+    "trajectory",
+    arrays=("breaks", "coefficients"),
+    most=200_000_000,
+    otherwise="; samples from elsewhere are read by Trajectory.read",
+)
+FIRST_LINE = 200
+"""Bytes in which the first line of a table is looked for."""
 RATE = 1000.0
 """Samples a second where none are asked for."""
 SECOND = 1_000_000_000
 """In ns."""
-EXPECTED = "a trajectory"
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None = None) -> Path:
@@ -49,22 +66,14 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
         The file cannot be written.
     """
     path = Path(path)
-    suffix = _suffix(path)
-    description = trajectory.description
+    suffix = checked_suffix(path, ARCHIVES + TABLES)
     if suffix in ARCHIVES:
         if rate is not None:
             raise ValueError(f"rate is {rate!r}: {suffix} holds no samples; expected no rate")
-        values = {
-            "format": VERSION,
-            "robot": description.name,
-            "digest": description.digest,
-            "toml": to_toml(description),
-            "breaks": trajectory.breaks,
-            "coefficients": trajectory.coefficients,
-        }
-        write_atomically(path, npz_bytes(values) if suffix == ".npz" else mat_bytes(values))
+        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients}
+        write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
         return path
-    comments = (FORMAT, f"robot: {description.name} {description.digest}")
+    comments = TRAJECTORY.comments(trajectory.description)
     times = trajectory.sample_times(RATE if rate is None else rate)
     write_atomically(path, (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments))
     return path
@@ -89,51 +98,113 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
         One line: the file cannot be read, is damaged, is no trajectory, or is one of another robot.
     """
     path = Path(path)
-    try:
-        suffix = _suffix(path)
-    except ValueError as error:
-        raise DescriptionError(str(error)) from None
-    content = read_bounded(path, MOST_BYTES, EXPECTED)
+    suffix, content = TRAJECTORY.read(path, ARCHIVES + TABLES)
     try:
         if suffix in ARCHIVES:
-            return _from_archive(read_npz(content) if suffix == ".npz" else read_mat(content), description)
-        text = _text(content)
-        robot = _robot_named(*_label(text), description)
+            return _from_archive(read_archive(suffix, content, TRAJECTORY), description)
+        text = decoded(content)
+        robot = TRAJECTORY.robot_of_table(text, description)
         samples = _table_samples(text, robot) if suffix == ".csv" else _message_samples(text, robot)
         return samples.trajectory(robot)
     except (DescriptionError, ValueError, TypeError) as error:
         raise DescriptionError(f"{path}: {error}") from None
 
 
-def read_samples(path: str | Path, description: Description, *, degrees: bool = False) -> Trajectory:
+def written_by_dhkit(path: str | Path) -> str:
+    """Return what a file says that dhkit wrote, such as ``dhkit trajectory``; empty where it came from elsewhere.
+
+    Raises
+    ------
+    DescriptionError
+        The file cannot be read, is damaged, or has another suffix.
+    """
+    path = Path(path)
+    suffix, content = TRAJECTORY.read(path, ARCHIVES + TABLES)
+    if suffix in ARCHIVES:
+        try:
+            return archive_format(suffix, content, TRAJECTORY.most).rpartition(" ")[0]
+        except DescriptionError as error:
+            raise DescriptionError(f"{path}: {error}") from None
+    first = content[:FIRST_LINE].partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip()
+    return first.removeprefix("# ") if first.startswith("# dhkit ") else ""
+
+
+def read_motion(
+    path: str | Path,
+    description: Description,
+    *,
+    degrees: bool = False,
+    columns: Mapping[str, str] | None = None,
+) -> Trajectory:
+    """Read a motion of a robot: one that dhkit wrote, or samples from elsewhere, as the file itself says.
+
+    Parameters
+    ----------
+    path
+        As for :func:`load_trajectory` and :func:`read_samples`.
+    description
+        The robot that moves so.
+    degrees, columns
+        Of samples from elsewhere, as for :func:`read_samples`.
+
+    Raises
+    ------
+    DescriptionError
+        One line: what is wrong in the file.
+    """
+    title = written_by_dhkit(path)
+    if title not in ("", TRAJECTORY.title):
+        raise DescriptionError(f"{path}: a {title}; expected a trajectory")
+    if title:
+        return load_trajectory(path, description)
+    return read_samples(path, description, degrees=degrees, columns=columns)
+
+
+def read_samples(
+    path: str | Path,
+    description: Description,
+    *,
+    degrees: bool = False,
+    columns: Mapping[str, str] | None = None,
+) -> Trajectory:
     """Read samples that something else wrote, as :meth:`Trajectory.from_samples` takes them.
 
     Parameters
     ----------
     path
         A ``.csv`` whose header names its columns: t or time, ``q1`` ... ``qn`` or the joints' names, and if they are
-        there rates and accelerations, ``qd1`` or ``dq1``, ``qdd1`` or ``ddq1``. Or a ``.yaml`` of a ROS
-        JointTrajectory, its joints in any order.
+        there rates and accelerations, ``qd1`` or ``dq1``, ``qdd1`` or ``ddq1``. A ``.yaml`` of a ROS JointTrajectory,
+        its joints in any order. Or a ``.mat`` of arrays, saved in MATLAB by ``save(..., '-v7')`` or older: a vector
+        ``t``, ``time`` or ``tout``, and either vectors of the same names as columns or a matrix ``q``, shape (N, n),
+        with ``qd`` and ``qdd`` if they are there; a matrix of n+1 columns has the times in its first.
     description
         The robot that moves so.
     degrees
         Whether angles are in degrees.
+    columns
+        What the file calls its columns or variables, by our names: ``t``, ``q1``, ``qd1``, ``qdd1`` and so on, a
+        joint's name for its values, and in a ``.mat`` ``q``, ``qd`` and ``qdd`` for matrices. Others keep their names.
 
     Raises
     ------
     DescriptionError
-        One line: the file cannot be read, or what is wrong in which line.
+        One line: the file cannot be read, or what is wrong in which line or variable.
+    ValueError, TypeError
+        ``columns`` has other names, or is given for a ``.yaml``.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> names = {"t": "Time", "shoulder": "axis A", "elbow": "axis B"}
+    >>> read_samples("log.csv", library_robot("planar2r"), degrees=True, columns=names)  # doctest: +SKIP
     """
     path = Path(path)
-    if path.suffix.lower() not in TABLES:
-        raise DescriptionError(f"{path}: found suffix {path.suffix!r}; expected one of {', '.join(TABLES)}")
-    text_of = read_bounded(path, MOST_BYTES, "samples of a motion")
+    suffix, content = TRAJECTORY.read(path, SAMPLES)
+    names = check_columns(description, columns, MATRICES if suffix == ".mat" else ())
+    if names and suffix not in (".csv", ".mat"):
+        raise ValueError(f"columns is given; expected none for {suffix}, whose joint_names say which joint is which")
     try:
-        text = _text(text_of)
-        if text.startswith(f"# {FORMAT}"):
-            _robot_named(*_label(text), description)
-        is_csv = path.suffix.lower() == ".csv"
-        samples = _table_samples(text, description) if is_csv else _message_samples(text, description)
+        samples = _samples(suffix, content, description, names)
         return samples.in_radians(description).trajectory(description) if degrees else samples.trajectory(description)
     except (DescriptionError, ValueError, TypeError) as error:
         raise DescriptionError(f"{path}: {error}") from None
@@ -156,62 +227,14 @@ class _Read:
         return Trajectory.from_samples(description, self.times, *self.arrays)
 
 
-def _suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    if suffix not in ARCHIVES + TABLES:
-        raise ValueError(f"{path}: found suffix {path.suffix!r}; expected one of {', '.join(ARCHIVES + TABLES)}")
-    return suffix
-
-
-def _text(content: bytes) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise DescriptionError(f"byte {error.start} is not UTF-8; expected text") from None
-
-
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
-    if values["format"] != VERSION:
-        raise DescriptionError(f"format is {values['format'][:40]!r}; expected {VERSION!r}")
-    own = from_toml(values["toml"], file="its robot")
-    if own.digest != values["digest"] or own.name != values["robot"]:
-        raise DescriptionError(f"its robot is not the {values['robot'][:40]!r} that it names; the file is damaged")
+    robot = TRAJECTORY.robot_of_archive(values, description)
     breaks, coefficients = values["breaks"], values["coefficients"]
-    if own.n == 1 and coefficients.ndim == 2:
+    if robot.n == 1 and coefficients.ndim == 2:
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
         breaks = breaks.ravel()
-    if description is None:
-        # The library's robot knows where its meshes are.
-        known = own.name in robots() and library_robot(own.name).digest == own.digest
-        return Trajectory(library_robot(own.name) if known else own, breaks, coefficients)
-    Trajectory(own, breaks, coefficients).require(description)
-    return Trajectory(description, breaks, coefficients)
-
-
-def _label(text: str) -> tuple[str, str]:
-    """Return the robot's name and digest that the comments say."""
-    lines = text[:1000].splitlines()[:2]
-    words = lines[1].removeprefix("# robot: ").split() if len(lines) == 2 else []
-    if not lines or lines[0] != f"# {FORMAT}" or len(words) != 2 or not lines[1].startswith("# robot: "):
-        raise DescriptionError(
-            f"does not begin with '# {FORMAT}' and '# robot: NAME DIGEST'; samples from elsewhere are read by"
-            " Trajectory.read"
-        )
-    return words[0], words[1]
-
-
-def _robot_named(name: str, digest: str, description: Description | None) -> Description:
-    if description is not None:
-        if description.digest != digest:
-            raise DescriptionError(
-                f"a trajectory of {name[:40]} ({digest[:12]}); expected one of {description.name}"
-                f" ({description.digest})"
-            )
-        return description
-    if name not in robots() or library_robot(name).digest != digest:
-        raise DescriptionError(f"its robot {name[:40]} ({digest[:12]}) is not the library's; give the robot")
-    return library_robot(name)
+    return Trajectory(robot, breaks, coefficients)
 
 
 def _csv(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
@@ -230,8 +253,19 @@ def _yaml(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> st
     return trajectory_text(names, nanoseconds, trajectory.q(t), trajectory.qd(t), trajectory.qdd(t), comments)
 
 
-def _table_samples(text: str, description: Description) -> _Read:
-    return _Read(*select_columns(description, read_table(text)))
+def _samples(suffix: str, content: bytes, description: Description, columns: Mapping[str, str]) -> _Read:
+    """Return the samples of a file from elsewhere; a table of dhkit's own has to be one of the robot."""
+    if suffix == ".mat":
+        table = matlab_table(description, content, TRAJECTORY.most, columns)
+        return _Read(*select_columns(description, table))
+    text = decoded(content)
+    if text.startswith(f"# {TRAJECTORY.title}"):
+        TRAJECTORY.robot_of_table(text, description)
+    return _table_samples(text, description, columns) if suffix == ".csv" else _message_samples(text, description)
+
+
+def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _Read:
+    return _Read(*select_columns(description, read_table(text), columns))
 
 
 def _message_samples(text: str, description: Description) -> _Read:

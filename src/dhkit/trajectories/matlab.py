@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["read_matrices"]
+__all__ = ["ARRAY_EXPORT", "Variable", "read_variables"]
 
 HEADER, TAG = 128, 8
 MATRIX, COMPRESSED = 14, 15
@@ -20,10 +20,22 @@ MATRIX, COMPRESSED = 14, 15
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """Types that a matrix of doubles may be stored as: MATLAB takes the shortest that is exact."""
 CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CHARACTERS, DOUBLES = 4, 6
-"""Classes of matrices (table 1-3)."""
+CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse matrix", "double", "single"), start=1)) | {
+    **{8 + k: f"{'u' if k % 2 else ''}int{8 << k // 2}" for k in range(8)},
+    16: "function",
+}
+"""MATLAB's classes (table 1-3)."""
+OBJECT, CHARACTERS, OPAQUE = 3, 4, 17
+"""Classes with a layout of their own; an opaque variable is an object of a class of MATLAB's own, as timeseries is."""
+REAL = range(6, 16)
+"""Classes of full matrices of numbers."""
 COMPLEX = 0x0800
 MOST_AXES, LONGEST_NAME = 8, 63
+HDF5 = b"\x89HDF\r\n\x1a\n"
+USER_BLOCK = 512
+"""Bytes before the HDF5 signature of a file of format 7.3."""
+ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
+"""What to do in MATLAB in place of what is not read."""
 
 
 @dataclass(frozen=True)
@@ -32,57 +44,104 @@ class _Element:
     data: bytes
 
 
-def read_matrices(content: bytes, names: Collection[str], most: int) -> dict[str, Any]:
-    """Return the texts and arrays of these names.
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a file, whose content is read when asked for."""
+
+    name: str
+    kind: str
+    """MATLAB's class, such as ``double``, ``char``, ``struct`` or ``timeseries``; ``complex`` for complex numbers."""
+    parts: tuple[_Element, ...]
+    """Dimensions and real part; none for what is neither real numbers nor text."""
+    order: str
+    """Byte order, ``<`` or ``>``."""
+
+    @property
+    def readable(self) -> bool:
+        """Whether it holds real numbers or text."""
+        return bool(self.parts)
+
+    @property
+    def value(self) -> Any:
+        """A text, or an array of float64 with two axes or more.
+
+        Raises
+        ------
+        DescriptionError
+            Neither, or the file is damaged there; names the variable.
+        """
+        if not self.parts:
+            raise DescriptionError(f"{self.name}: found a {self.kind}; expected real numbers or text")
+        dimensions, body = self.parts
+        if not 0 < len(dimensions.data) <= 4 * MOST_AXES or len(dimensions.data) % 4:
+            raise _damaged()
+        shape = struct.unpack(f"{self.order}{len(dimensions.data) // 4}i", dimensions.data)
+        read = _text if self.kind == CLASSES[CHARACTERS] else _array
+        return read(self.name, body, shape, self.order)
+
+
+def read_variables(content: bytes, most: int) -> dict[str, Variable]:
+    """Return a file's variables by name.
 
     Parameters
     ----------
     content
         A file of format 5, compressed or not.
-    names
-        Of the matrices; others are passed over.
     most
         Bytes that may be unpacked altogether.
 
     Raises
     ------
     DescriptionError
-        Another format, damage, or a matrix that is neither real nor text; says which.
+        Another format, or damage; says which.
     """
+    if content.startswith(b"MATLAB 7.3 MAT-file") or HDF5 in (content[:8], content[USER_BLOCK : USER_BLOCK + 8]):
+        raise DescriptionError(f"a .mat file of format 7.3 (HDF5), which is not read; {ARRAY_EXPORT}")
     order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
     if order is None:
-        raise DescriptionError("no .mat file of format 5 (save -v7 in MATLAB); format 7.3 is HDF5 and not read")
-    found: dict[str, Any] = {}
+        raise DescriptionError(f"no .mat file of format 5; {ARRAY_EXPORT}")
+    found: dict[str, Variable] = {}
+    left = most
     for element in _elements(content[HEADER:], order):
+        inner = [element]
         if element.kind == COMPRESSED:
-            unpacked = _unpacked(element.data, most)
-            most -= len(unpacked)
+            unpacked = _unpacked(element.data, left, most)
+            left -= len(unpacked)
             inner = list(_elements(unpacked, order))
-        else:
-            inner = [element]
         for matrix in inner:
-            if matrix.kind == MATRIX:
-                _add_matrix(matrix.data, order, names, found)
+            if matrix.kind != MATRIX:
+                continue
+            variable = _variable(matrix.data, order)
+            if variable.name in found:
+                raise DescriptionError(f"{variable.name}: stands there twice")
+            if variable.name:  # objects keep their content in one without a name
+                found[variable.name] = variable
     return found
 
 
-def _add_matrix(data: bytes, order: str, names: Collection[str], found: dict[str, Any]) -> None:
+def _variable(data: bytes, order: str) -> Variable:
     parts = _elements(data, order)
-    flags, dimensions, label = (_next(parts) for _ in range(3))
-    name = label.data.decode("latin-1")[:LONGEST_NAME]
-    if name not in names:
-        return
-    if name in found:
-        raise DescriptionError(f"{name}: stands there twice")
-    if len(flags.data) < 4 or not 0 < len(dimensions.data) <= 4 * MOST_AXES or len(dimensions.data) % 4:
+    flags = _next(parts)
+    if len(flags.data) < 4:
         raise _damaged()
     word = struct.unpack(f"{order}I", flags.data[:4])[0]
-    shape = struct.unpack(f"{order}{len(dimensions.data) // 4}i", dimensions.data)
-    kind = word & 0xFF
-    if kind not in (CHARACTERS, DOUBLES) or word & COMPLEX:
-        raise DescriptionError(f"{name}: found a matrix of class {kind}; expected real numbers or text")
-    body = _next(parts)
-    found[name] = _text(name, body, order) if kind == CHARACTERS else _array(name, body, shape, order)
+    code = word & 0xFF
+    if code == OPAQUE:
+        name, _, kind = (_name(_next(parts)) for _ in range(3))
+        return Variable(name, kind, (), order)
+    dimensions, name = _next(parts), _name(_next(parts))
+    if code == OBJECT:
+        return Variable(name, _name(_next(parts)), (), order)
+    if code not in REAL and code != CHARACTERS:
+        return Variable(name, CLASSES.get(code, f"matrix of class {code}"), (), order)
+    if word & COMPLEX:
+        return Variable(name, "complex matrix", (), order)
+    return Variable(name, CLASSES[code], (dimensions, _next(parts)), order)
+
+
+def _name(element: _Element) -> str:
+    name = element.data[:LONGEST_NAME].decode("latin-1")
+    return name if name.isprintable() else ascii(name)[1:-1]  # messages are one line, whatever the file
 
 
 def _array(name: str, body: _Element, shape: tuple[int, ...], order: str) -> Any:
@@ -96,7 +155,7 @@ def _array(name: str, body: _Element, shape: tuple[int, ...], order: str) -> Any
     return np.frombuffer(body.data, dtype).reshape(shape, order="F").astype(float)
 
 
-def _text(name: str, body: _Element, order: str) -> str:
+def _text(name: str, body: _Element, _shape: tuple[int, ...], order: str) -> str:
     code = CODES.get(body.kind, "")
     try:
         return body.data.decode(
@@ -134,14 +193,15 @@ def _next(parts: Iterator[_Element]) -> _Element:
     return part
 
 
-def _unpacked(data: bytes, most: int) -> bytes:
+def _unpacked(data: bytes, left: int, most: int) -> bytes:
+    """Return what a compressed element holds, of which ``left`` bytes of ``most`` may still be unpacked."""
     unpacker = zlib.decompressobj()
     try:
-        unpacked = unpacker.decompress(data, max(most, 1))
+        unpacked = unpacker.decompress(data, max(left, 1))
     except zlib.error as error:
         raise DescriptionError(f"damaged: {error}") from None
-    if len(unpacked) >= most:
-        raise DescriptionError("unpacks to more than a trajectory takes, 200 MB")
+    if len(unpacked) >= left:
+        raise DescriptionError(f"unpacks to more than the {most / 1e6:g} MB that are read")
     if not unpacker.eof:
         raise _damaged()
     return unpacked

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+from typing import Any
+
 import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
 
-__all__ = ["Table", "read_table", "select_columns", "table_text"]
+__all__ = [
+    "PREFIXES",
+    "TIMES",
+    "Table",
+    "check_columns",
+    "joint_columns",
+    "place_of_name",
+    "read_table",
+    "select_columns",
+    "table_text",
+]
 
 MOST_COLUMNS = 1000
-TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp")
+TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
+"""Names of a column of times; the last is Simulink's."""
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
 """What columns of values, rates and accelerations begin with, before a joint's number, or end with, behind its name."""
 
@@ -62,25 +76,84 @@ def read_table(text: str) -> Table:
     return names, np.array(rows)
 
 
-def select_columns(description: Description, table: Table) -> tuple[Array, list[Array]]:
+def check_columns(
+    description: Description, columns: Mapping[str, str] | None, matrices: Collection[str] = ()
+) -> dict[str, str]:
+    """Return a mapping from our names of columns to a file's, with ``q1`` ... in place of the joints' names.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    columns
+        Our names are ``t``, ``q1``, ``qd1``, ``qdd1`` and so on, a joint's name for its values, and those of matrices.
+    matrices
+        Names for all joints at once, where a file may have them.
+
+    Raises
+    ------
+    ValueError
+        Another of our names, or one that is there twice.
+    TypeError
+        No mapping of texts to texts.
+    """
+    given: Any = {} if columns is None else columns
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for item in given.items() for name in item):
+        raise TypeError(f"columns is {columns!r:.60}; expected a mapping of our names to those of the file")
+    joints = [joint.name for joint in description.joints]
+    own = {name: f"q{i}" for i, name in enumerate(joints, start=1)}
+    own |= {f"{prefixes[0]}{i}": f"{prefixes[0]}{i}" for prefixes in PREFIXES for i in range(1, len(joints) + 1)}
+    own |= {name: name for name in ("t", *matrices)}
+    checked: dict[str, str] = {}
+    for ours, theirs in given.items():
+        if ours not in own or own[ours] in checked:
+            expected = ", ".join(("t", *matrices, f"q1 ... q{len(joints)}", "qd1 ...", "qdd1 ...", *joints))
+            raise ValueError(f"columns: found {ours!r}; expected each at most once of {expected}")
+        checked[own[ours]] = theirs
+    return checked
+
+
+def place_of_name(wanted: str, names: Collection[str], what: str = "column") -> str:
+    """Return that of a file's names that is the wanted one; capitals count as small letters if none is equal.
+
+    Raises
+    ------
+    DescriptionError
+        There is none; says what was found.
+    """
+    alike = [name for name in names if name.lower() == wanted.lower()]
+    if wanted not in alike and len(alike) != 1:
+        raise DescriptionError(f"no {what} {wanted[:40]!r}: found {', '.join(names)[:80] or 'none'}")
+    return wanted if wanted in alike else alike[0]
+
+
+def select_columns(
+    description: Description, table: Table, columns: Mapping[str, str] | None = None
+) -> tuple[Array, list[Array]]:
     """Return times (N,) and one to three arrays (N, n): values, rates and accelerations as far as they are there.
 
     Columns are t or time, then for joint i ``q1``, ``qd1`` or ``dq1``, ``qdd1`` or ``ddq1``; or the joints' names,
     with ``_velocity`` or ``_vel`` and ``_acceleration`` or ``_acc`` behind. Capitals count as small letters; columns
-    of other names are left out.
+    of other names are left out. ``columns`` gives, for our names, those of the file: see :func:`check_columns`.
 
     Raises
     ------
     DescriptionError
         A column is missing; names it.
     """
-    names = {name.lower(): k for k, name in enumerate(table[0])}
+    # Capitals count as small letters, but a name that is there as it is goes first.
+    names = {name.lower(): k for k, name in reversed(list(enumerate(table[0])))}
+    names |= {name: k for k, name in enumerate(table[0])}
+    names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
     time = next((names[name] for name in TIMES if name in names), None)
     if time is None:
         raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
     chosen: list[Array] = []
     for order, prefixes in enumerate(PREFIXES):
-        places = [_place(names, i, joint.name, order, prefixes) for i, joint in enumerate(description.joints, start=1)]
+        places = [
+            next((names[name] for name in candidates if name in names), None)
+            for candidates in joint_columns(description, order)
+        ]
         known = [place is not None for place in places]
         if not any(known) and order:
             break
@@ -92,11 +165,15 @@ def select_columns(description: Description, table: Table) -> tuple[Array, list[
     return table[1][:, time], chosen
 
 
-def _place(names: dict[str, int], number: int, joint: str, order: int, prefixes: tuple[str, ...]) -> int | None:
-    wanted = [f"{prefix}{joiner}{number}" for prefix in prefixes for joiner in ("", "_")]
-    wanted += [f"{joint.lower()}_{prefix}" for prefix in prefixes]
-    wanted += [joint.lower()] if not order else []
-    return next((names[name] for name in wanted if name in names), None)
+def joint_columns(description: Description, order: int) -> list[list[str]]:
+    """Return for each joint the names that a column of its values (order 0), rates or accelerations may have."""
+    found = []
+    for i, joint in enumerate(description.joints, start=1):
+        name = joint.name.lower()
+        candidates = [f"{prefix}{joiner}{i}" for prefix in PREFIXES[order] for joiner in ("", "_")]
+        candidates += [f"{name}_{prefix}" for prefix in PREFIXES[order]]
+        found.append(candidates + ([name] if not order else []))
+    return found
 
 
 def _is_number(text: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.frames import number_array
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
@@ -267,18 +268,24 @@ class Trajectory:
         return save_trajectory(self, path, rate)
 
     @classmethod
-    def load(cls, path: str | Path, description: Description | None = None) -> Trajectory:
-        """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`."""
+    def load(cls, path: str | Path, robot: Robot = None) -> Trajectory:
+        """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm."""
         from dhkit.trajectories.files import load_trajectory
 
-        return load_trajectory(path, description)
+        return load_trajectory(path, None if robot is None else description_of(robot))
 
     @classmethod
-    def read(cls, path: str | Path, description: Description, degrees: bool = False) -> Trajectory:
-        """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`."""
+    def read(
+        cls,
+        path: str | Path,
+        robot: Robot,
+        degrees: bool = False,
+        columns: Mapping[str, str] | None = None,
+    ) -> Trajectory:
+        """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`. A robot may be an arm."""
         from dhkit.trajectories.files import read_samples
 
-        return read_samples(path, description, degrees=degrees)
+        return read_samples(path, description_of(robot), degrees=degrees, columns=columns)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Trajectory):

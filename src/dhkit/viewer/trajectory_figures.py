@@ -3,50 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dhkit.description import Array, Description
 from dhkit.trajectories import Samples, Trajectory
-from dhkit.viewer.figures import CURVE_COLORS, GRID_COLOR, draw_path, plot, space
+from dhkit.viewer.figures import draw_path, plot, space
+from dhkit.viewer.panels import (
+    LIMIT_STYLE,
+    SHARED_COLOR,
+    Panel,
+    draw_curves,
+    draw_panel,
+    kinds_of_joints,
+    name_joints,
+    percent_panel,
+    torque_panel,
+)
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["plot_trajectory", "plot_uses"]
 
 SAMPLES = 401
 """Spread evenly; breaks, where accelerations jump, are drawn from both sides."""
-LIMIT_STYLE: dict[str, Any] = {"ls": (0, (5, 3)), "lw": 1.0, "alpha": 0.75}
 EDGE = 0.06
 """Room beside the tool's path for its numbers, of its width."""
-SHARED_COLOR = "#5b6472"
-"""Of a limit that several joints have."""
-ROOM = 0.12
-"""Above and below curves, of what they span."""
-NEAR = 0.35
-"""A limit farther from its joint's curve than this share of what all curves span is left out: it would flatten them."""
 WHOLE = 112.0
 """%: what is shown where the limits are the frame."""
-STYLES = ("-", "-.", ":")
-"""Of joints behind the seventh colour."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Panel:
-    """One diagram over time."""
-
-    label: str
-    joints: NDArray[np.intp]
-    values: Array
-    """Shape (N, joints)."""
-    lower: Array
-    """Limits, shape (joints,)."""
-    upper: Array
 
 
 @plot.register(Trajectory)
@@ -74,11 +59,11 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
     for row, panel in enumerate(panels):
         axes = figure.add_subplot(grid[row, 0], sharex=first)
         first = first or axes
-        _draw(axes, panel, samples.times)
+        draw_panel(axes, panel, samples.times)
         axes.tick_params(labelbottom=row == len(panels) - 1)
         axes.set_xlim(0.0, trajectory.duration)
     axes.set_xlabel("time [s]")
-    _name_joints(figure, description)
+    name_joints(figure, description)
     draw_path(space(figure, grid[:, 1]), description, samples.q)
     return figure
 
@@ -117,7 +102,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
         row[0].set_title(f"{name}: {motion.duration:.3f} s", fontsize=11, fontweight="bold", loc="left")
         shares = {"rate": samples.qd / numbers.velocity, "torque": samples.tau / numbers.effort}
         for axes, (what, values) in zip(row, shares.items(), strict=True):
-            _curves(axes, _share(f"{what} / limit [%]", np.arange(description.n), values), samples.times)
+            draw_curves(axes, percent_panel(f"{what} / limit [%]", np.arange(description.n), values), samples.times)
             largest = f"up to {100 * float(np.abs(values).max()):.0f} %"
             axes.set_title(largest, fontsize=10, color=SHARED_COLOR, loc="right")
             if motion.duration < end:
@@ -128,20 +113,8 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     grid[0, 0].set_ylim(-WHOLE, WHOLE)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
-    _name_joints(figure, description)
+    name_joints(figure, description)
     return figure
-
-
-def _name_joints(figure: Figure, description: Description) -> None:
-    names = [joint.name for joint in description.joints]
-    figure.legend(
-        handles=[_handle(i, name) for i, name in enumerate(names)],
-        loc="outside lower center",
-        ncols=min(len(names), 7),
-        frameon=False,
-        fontsize=9,
-        handlelength=1.6,
-    )
 
 
 def _samples(trajectory: Trajectory) -> Samples:
@@ -158,69 +131,21 @@ def _samples(trajectory: Trajectory) -> Samples:
     return Samples(trajectory.description, times, q, qd, qdd)
 
 
-def _panels(trajectory: Trajectory, samples: Samples) -> list[_Panel]:
+def _panels(trajectory: Trajectory, samples: Samples) -> list[Panel]:
     numbers = trajectory.description.numbers
-    kinds = [
-        (~numbers.prismatic, 180 / np.pi, "angle [deg]", "rate [deg/s]"),
-        (numbers.prismatic, 1.0, "offset [m]", "rate [m/s]"),
+    kinds = kinds_of_joints(trajectory.description)
+    panels = [
+        Panel(label, i, unit * samples.q[:, i], unit * numbers.lower[i], unit * numbers.upper[i])
+        for i, unit, label, _ in kinds
     ]
-    kinds = [kind for kind in kinds if kind[0].any()]
-    panels = []
-    for chosen, unit, label, _ in kinds:
-        i = np.flatnonzero(chosen)
-        panels.append(_Panel(label, i, unit * samples.q[:, i], unit * numbers.lower[i], unit * numbers.upper[i]))
-    everyone = np.arange(trajectory.n)
     if len(kinds) > 1 and np.isfinite(numbers.velocity).all():
-        panels.append(_share("rate / limit [%]", everyone, samples.qd / numbers.velocity))
+        panels.append(percent_panel("rate / limit [%]", np.arange(trajectory.n), samples.qd / numbers.velocity))
     else:
-        for chosen, unit, _, label in kinds:
-            i, limit = np.flatnonzero(chosen), unit * numbers.velocity[chosen]
-            panels.append(_Panel(label, i, unit * samples.qd[:, i], -limit, limit))
+        limits = [unit * numbers.velocity[i] for i, unit, _, _ in kinds]
+        panels += [
+            Panel(label, i, unit * samples.qd[:, i], -limit, limit)
+            for (i, unit, _, label), limit in zip(kinds, limits, strict=True)
+        ]
     if not np.isfinite(numbers.mass).all():
         return panels
-    if np.isfinite(numbers.effort).all():
-        return [*panels, _share("torque / limit [%]", everyone, samples.tau / numbers.effort)]
-    unit_name = "N m, N" if numbers.prismatic.any() else "N m"
-    return [*panels, _Panel(f"torque [{unit_name}]", everyone, samples.tau, -numbers.effort, numbers.effort)]
-
-
-def _share(label: str, joints: NDArray[np.intp], shares: Array) -> _Panel:
-    hundred = np.full(len(joints), 100.0)
-    return _Panel(label, joints, 100.0 * shares, -hundred, hundred)
-
-
-def _draw(axes: Axes, panel: _Panel, times: Array) -> None:
-    low, high = float(panel.values.min()), float(panel.values.max())
-    span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
-    _curves(axes, panel, times)
-    own = (panel.values.min(axis=0) - NEAR * span, panel.values.max(axis=0) + NEAR * span)
-    near = [
-        (float(limits[k]), i)
-        for limits in (panel.lower, panel.upper)
-        for k, i in enumerate(panel.joints)
-        if own[0][k] <= limits[k] <= own[1][k]
-    ]
-    shared = [limit for limit, _ in near]
-    for limit, i in near:
-        axes.axhline(limit, color=SHARED_COLOR if shared.count(limit) > 1 else _color(i), **LIMIT_STYLE)
-    low, high = min([low, *(limit for limit, _ in near)]), max([high, *(limit for limit, _ in near)])
-    room = ROOM * max(high - low, span)
-    axes.set_ylim(low - room, high + room)
-
-
-def _curves(axes: Axes, panel: _Panel, times: Array) -> None:
-    for k, i in enumerate(panel.joints):
-        axes.plot(times, panel.values[:, k], STYLES[i // len(CURVE_COLORS) % 3], color=_color(i), lw=1.8)
-    axes.set_ylabel(panel.label)
-    axes.grid(color=GRID_COLOR, lw=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _handle(i: int, name: str) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], color=_color(i), ls=STYLES[i // len(CURVE_COLORS) % 3], lw=1.8, label=name)
-
-
-def _color(i: int) -> str:
-    return CURVE_COLORS[i % len(CURVE_COLORS)]
+    return [*panels, torque_panel(trajectory.description, samples.tau)]

@@ -11,7 +11,7 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
 from dhkit.description import Convention, Description
 
-__all__ = ["contenders"]
+__all__ = ["contenders", "toolbox_robot"]
 
 CONVERGED = 1e-20
 """Where ik_LM stops: its default of 1e-6, half a squared error, leaves the tool a millimetre off."""
@@ -38,32 +38,32 @@ def contenders() -> tuple[Contender, ...]:
 
 
 def _fkine(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     return Task(one_by_one(robot.fkine, list(workload.q)), lambda k: [robot.fkine(q).A for q in workload.q[:k]])
 
 
 def _fkine_batch(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     return Task(_on_slices(robot.fkine, workload), lambda k: [T.A for T in robot.fkine(workload.q[:k])])
 
 
 def _eval(workload: Workload) -> Task:
-    ets = _robot(workload.arm.description).ets()
+    ets = toolbox_robot(workload.arm.description).ets()
     return Task(one_by_one(ets.eval, list(workload.q)), lambda k: [ets.eval(q) for q in workload.q[:k]])
 
 
 def _eval_batch(workload: Workload) -> Task:
-    ets = _robot(workload.arm.description).ets()
+    ets = toolbox_robot(workload.arm.description).ets()
     return Task(_on_slices(ets.eval, workload), lambda k: list(ets.eval(workload.q[:k])))
 
 
 def _jacob0(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     return Task(one_by_one(robot.jacob0, list(workload.q)), lambda k: [robot.jacob0(q) for q in workload.q[:k]])
 
 
 def _ets_jacob0(workload: Workload) -> Task:
-    ets = _robot(workload.arm.description).ets()
+    ets = toolbox_robot(workload.arm.description).ets()
     return Task(one_by_one(ets.jacob0, list(workload.q)), lambda k: [ets.jacob0(q) for q in workload.q[:k]])
 
 
@@ -83,7 +83,7 @@ def _analytic_ik(workload: Workload) -> Task:
     if not has_spherical_wrist(joint_axes(workload.arm.description)):
         raise UnavailableError("derives its equations for minutes where there is no spherical wrist")
     import_peer("sympy")
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     if workload.arm.n != 6 or workload.arm.description.convention is not Convention.STANDARD:
         raise UnavailableError("takes 6 joints in the standard convention")
     try:
@@ -94,24 +94,24 @@ def _analytic_ik(workload: Workload) -> Task:
 
 
 def _ik_LM(workload: Workload) -> Task:
-    ets = _robot(workload.arm.description).ets()
+    ets = toolbox_robot(workload.arm.description).ets()
     solve = partial(ets.ik_LM, joint_limits=False, tol=CONVERGED)
     return Task(one_by_one(solve, list(workload.T)), lambda k: [_found(solve(T)) for T in workload.T[:k]])
 
 
 def _rne(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     states = list(zip(workload.q, workload.qd, workload.qdd, strict=True))
     return Task(one_by_one(robot.rne, states), lambda k: [np.ravel(robot.rne(*state)) for state in states[:k]])
 
 
 def _inertia(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description)
+    robot = toolbox_robot(workload.arm.description)
     return Task(one_by_one(robot.inertia, list(workload.q)), lambda k: [robot.inertia(q) for q in workload.q[:k]])
 
 
 def _accel(workload: Workload) -> Task:
-    robot = _robot(workload.arm.description).nofriction()
+    robot = toolbox_robot(workload.arm.description).nofriction()
     states = list(zip(workload.q, workload.qd, workload.tau, strict=True))
     return Task(one_by_one(robot.accel, states), lambda k: [robot.accel(*state) for state in states[:k]])
 
@@ -130,7 +130,14 @@ def _on_slices(function: Any, workload: Workload) -> Any:
     return prepare
 
 
-def _robot(description: Description) -> Any:
+def toolbox_robot(description: Description) -> Any:
+    """Return the toolbox's DHRobot of a description, without friction.
+
+    Raises
+    ------
+    UnavailableError
+        The toolbox is not installed.
+    """
     toolbox, SE3 = import_peer("roboticstoolbox"), import_peer("spatialmath").SE3
     numbers = description.numbers
     ending = "DH" if description.convention is Convention.STANDARD else "MDH"

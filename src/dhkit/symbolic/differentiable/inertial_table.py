@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention, Description, require_bodies
 from dhkit.symbolic.differentiable.bodies import Moments, regrouped
@@ -51,14 +52,15 @@ class InertialTable:
         return cls._filled(description, _numbers(description).tolist())
 
     @classmethod
-    def parametric(cls, description: Description) -> tuple[InertialTable, casadi.SX]:
-        """Return a table of symbols, and the symbols; their values are ``inertial_pattern(description)[1]``."""
+    def parametric(cls, *descriptions: Description) -> tuple[InertialTable, casadi.SX]:
+        """Return a table of symbols, and the symbols; their values are those of :func:`inertial_pattern`."""
         import casadi
 
-        numbers = _numbers(description)
-        symbols = casadi.SX.sym("parameter", int(np.sum(~np.isin(numbers, FOLDED))))
+        numbers, folded = _folded(descriptions)
+        symbols = casadi.SX.sym("parameter", int(np.sum(~folded)))
         waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
-        return cls._filled(description, [x if x in FOLDED else next(waiting) for x in numbers.tolist()]), symbols
+        entries = [x if fold else next(waiting) for x, fold in zip(numbers[0].tolist(), folded, strict=True)]
+        return cls._filled(descriptions[0], entries), symbols
 
     @classmethod
     def _filled(cls, description: Description, entries: Sequence[Scalar]) -> InertialTable:
@@ -97,17 +99,36 @@ class InertialTable:
         return replace(self, links=links, potential=self.potential + potential)
 
 
-def inertial_pattern(description: Description) -> tuple[str, Array]:
+def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
     """Return what a parametric table's expressions depend on, as text, and the values of its symbols.
+
+    Parameters
+    ----------
+    descriptions
+        An arm, or several of the same kinds of joints that are to share a table.
+
+    Returns
+    -------
+    tuple[str, Array]
+        The pattern, and the values: shape (symbols,) of one arm, (B, symbols) of several.
 
     Raises
     ------
     DescriptionError
         A link without a body.
     """
-    numbers = _numbers(description)
-    codes = np.select([numbers == x for x in FOLDED], list("0+-"), "p")
-    return f"{description.kinds} {''.join(codes)}", numbers[codes == "p"]
+    numbers, folded = _folded(descriptions)
+    codes = np.where(folded, np.select([numbers[0] == x for x in FOLDED], list("0+-"), "p"), "p")
+    values: Array = numbers[:, ~folded]
+    return f"{descriptions[0].kinds} {''.join(codes)}", values[0] if len(descriptions) == 1 else values
+
+
+def _folded(descriptions: Sequence[Description]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return all numbers, a row for each arm, and which of them are 0, 1 or -1 in all arms alike."""
+    rows = {id(description): _numbers(description) for description in {id(x): x for x in descriptions}.values()}
+    numbers = np.stack([rows[id(description)] for description in descriptions])
+    folded: NDArray[np.bool_] = np.isin(numbers[0], FOLDED) & (numbers == numbers[0]).all(axis=0)
+    return numbers, folded
 
 
 def _numbers(description: Description) -> Array:

@@ -1,0 +1,72 @@
+"""roboticstoolbox-python's ``fdyn``: SciPy's steps over the toolbox's ``accel``, for the robot of our own table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dhkit.bench.contenders import import_peer
+from dhkit.bench.peers.roboticstoolbox import toolbox_robot
+from dhkit.control import ComputedTorque, Reference
+from dhkit.description import Array, Description
+
+__all__ = ["Fdyn", "own_puma_accelerations"]
+
+
+class Fdyn:
+    """One arm that the toolbox simulates.
+
+    Parameters
+    ----------
+    description
+        The robot, of which a DHRobot without friction is made.
+    options
+        Of SciPy's integrator RK45, such as ``rtol``; its defaults unless given.
+
+    Raises
+    ------
+    UnavailableError
+        The toolbox is not installed.
+    """
+
+    def __init__(self, description: Description, options: Mapping[str, float] | None = None) -> None:
+        self.robot = toolbox_robot(description)
+        self._options = dict(options or {})
+
+    def swing(self, q0: Array, duration: float) -> tuple[Array, Array]:
+        """Return joint values and rates, shape (N, n) each, of an arm let go at rest at joint values (n,)."""
+        found = self.robot.fdyn(duration, q0, solver_args=self._options)
+        return found.q, found.qd
+
+    def controlled(
+        self, controller: ComputedTorque, reference: Reference, q0: Array, qd0: Array, duration: float
+    ) -> tuple[Array, Array]:
+        """Return the same under a computed torque with a controller's gains, by the toolbox's own ``rne``."""
+        kp, kd = controller.kp, controller.kd
+
+        def torque(robot: Any, t: float, q: Array, qd: Array) -> Array:
+            wanted_q, wanted_qd, wanted_qdd = (rows[0] for rows in reference.sampled(np.array([t])))
+            tau: Array = robot.rne(q, qd, wanted_qdd + kd * (wanted_qd - qd) + kp * (wanted_q - q))
+            return tau
+
+        found = self.robot.fdyn(duration, q0, torque, qd0=qd0, solver_args=self._options)
+        return found.q, found.qd
+
+    def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
+        """Return accelerations of states (N, n), shape (N, n)."""
+        return np.asarray(self.robot.accel(q, qd, tau))
+
+
+def own_puma_accelerations(q: Array, qd: Array, tau: Array) -> Array:
+    """Return accelerations of the toolbox's own PUMA 560 without friction, states and result of shape (N, 6).
+
+    Raises
+    ------
+    UnavailableError
+        The toolbox is not installed.
+    """
+    import_peer("roboticstoolbox")
+    puma = import_peer("roboticstoolbox.models.DH").Puma560().nofriction(coulomb=True, viscous=True)
+    return np.asarray(puma.accel(q, qd, tau))

@@ -1,0 +1,141 @@
+"""`dhkit simulate`: an arm under a controller."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.arm import Arm
+from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
+from dhkit.cli.patience import Patience
+from dhkit.cli.simulation_task import Task
+from dhkit.control import SimulationResult
+from dhkit.errors import SimulationError
+
+__all__ = ["Files", "facts_of", "run"]
+
+ACCOUNTED = 1e-6
+"""Share of the energy without account above which the steps are too long."""
+RESULTS = (".npz", ".mat", ".csv")
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is to be written."""
+
+    result: Path | None = None
+    page: Path | None = None
+    figure: Path | None = None
+
+    def check(self) -> None:
+        """Refuse what could not be written, before anybody waits for it."""
+        check_outputs(((self.result, RESULTS), (self.page, PAGES), (self.figure, FIGURES)))
+
+    def write(self, arm: Arm, result: SimulationResult) -> Iterator[Path]:
+        """Write them, and yield each path."""
+        if self.result is not None:
+            yield result.save(self.result)
+        if self.page is not None:
+            with arm.view() as view:
+                view.play(result)
+                yield view.save_html(self.page)
+        if self.figure is not None:
+            from dhkit.viewer import plot
+
+            yield write_figure(plot(result), self.figure)
+
+
+def run(task: Task, files: Files, *, degrees: bool, json: bool) -> int:
+    """Simulate, print the errors and write files; return 0, or 1 where the run did not get to its end."""
+    files.check()
+    name = task.controllers[0]
+    controller = task.controller(name)
+    begin = time.perf_counter()
+    failure, result = "", None
+    try:
+        with Patience("simulating") as line:
+            result = task.arm.simulate(
+                controller,
+                task.motion,
+                plant=task.plant,
+                progress=lambda k, n: line.say(f"simulating: {100 * k // n} %"),
+                **task.options,
+            )
+    except SimulationError as error:
+        failure, result = str(error), error.result
+    seconds = time.perf_counter() - begin
+    written = [] if result is None else [str(path) for path in files.write(task.arm, result)]
+    if json:
+        facts = {} if result is None else facts_of(result)
+        print_json({"robot": task.arm.name, "controller": name, "failure": failure or None, **facts, "files": written})
+    else:
+        if result is not None:
+            _print(task, name, result, seconds, degrees=degrees)
+        if written:
+            say("\n" + "\n".join(f"wrote {path}" for path in written))
+    if failure:
+        sys.stderr.write(f"dhkit: {' '.join(failure.split())}\n")
+    return 1 if failure else 0
+
+
+def _print(task: Task, name: str, result: SimulationResult, seconds: float, *, degrees: bool) -> None:
+    description = result.description
+    say(f"{task.arm.name}: {name}, {task.rate}", "bold")
+    say(f"{task.about}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
+    unit = _units(description.numbers.prismatic, degrees)
+    torque = np.abs(result.tau).max(axis=0)
+    norms = (result.peak_error, result.rms_error, result.final_error)
+    rows = []
+    for i, joint in enumerate(description.joints):
+        limit = description.numbers.effort[i]
+        share = f"{100 * torque[i] / limit:.0f}" if np.isfinite(limit) else "no limit"
+        errors = [f"{x[i] * unit[i][1]:.3g}" for x in norms]
+        rows.append((joint.name, *errors, unit[i][0], share, f"{100 * result.saturated[i]:.0f}"))
+    headings = (
+        "joint",
+        "largest error",
+        "RMS",
+        "at the end",
+        "",
+        "largest torque [% of limit]",
+        "saturated [% of time]",
+    )
+    print_table(headings, rows)
+    peak, rms, final = (f"{1000 * x:.3g} mm" for x in result.tool_norms)
+    say(f"\ntool: largest error {peak}, RMS {rms}, at the end {final}")
+    audit = result.audit
+    say(
+        f"energy: drives {audit.drives:.4g} J, pushes {audit.pushes:.4g} J, friction {audit.friction:.4g} J, impacts "
+        f"{audit.impacts:.4g} J; {audit.error:.1e} of what was turned over is without account"
+    )
+    if not audit.error <= ACCOUNTED:
+        say("the integration's steps are too long for this motion: give a larger --plant-rate")
+
+
+def _units(prismatic: NDArray[np.bool_], degrees: bool) -> list[tuple[str, float]]:
+    """Return each joint's unit of errors, and what a radian or metre is in it."""
+    turn = ("°", 180 / np.pi) if degrees else ("rad", 1.0)
+    return [("m", 1.0) if slides else turn for slides in prismatic.tolist()]
+
+
+def facts_of(result: SimulationResult) -> dict[str, Any]:
+    """Return what `--json` says of a run."""
+    tool = result.tool_norms
+    return {
+        "duration": float(result.t[-1]),
+        "steps": len(result.t) - 1,
+        "peak_error": result.peak_error.tolist(),
+        "rms_error": result.rms_error.tolist(),
+        "final_error": result.final_error.tolist(),
+        "tool_error": {"peak": tool.peak, "rms": tool.rms, "final": tool.final},
+        "saturated": result.saturated.tolist(),
+        "energy_error": result.audit.error,
+    }

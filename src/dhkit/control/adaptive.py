@@ -1,0 +1,228 @@
+"""Adaptive control: computed torque with inertial parameters that are estimated while the arm moves."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.control.gains import effective_inertia, gain, positive
+from dhkit.control.references import Setpoint
+from dhkit.description import Array, Description, Robot, description_of, require_bodies
+from dhkit.description.frames import number_array
+from dhkit.dynamics import inertial_parameters, mass_matrix, parameter_grouping, velocity_regressor
+from dhkit.errors import DescriptionError
+from dhkit.verification import random_motions
+
+__all__ = ["Adaptive"]
+
+STATES = 2000
+"""Random motions over which the regressor's square is averaged for the default adaptation gains."""
+
+
+class Adaptive:
+    """tau = Y(q, qd, qd_r, qdd_r) p + armature qdd_r + K_D s, dp/dt = Gamma Y^T s.
+
+    Slotine & Li, On the adaptive control of robot manipulators, 1987. With e = q_d - q: qd_r = qd_d + Lambda e,
+    qdd_r = qdd_d + Lambda de/dt, s = qd_r - qd = de/dt + Lambda e (the opposite sign of theirs), and
+    Y p + armature qdd_r = M qdd_r + C qd_r + g with C of the Christoffel symbols. With the true parameters p*,
+    V = (s^T M s + (p - p*)^T Gamma^-1 (p - p*)) / 2 falls by dV/dt = -s^T K_D s. So the error goes to 0; p goes to p*
+    only in a motion that excites all parameters.
+
+    p are the base parameters of the links (:func:`dhkit.dynamics.parameter_grouping`). The drives' rotor inertia is not
+    estimated: it is the arm's own. Called by a sampled controller, p is integrated by the trapezoidal rule from call to
+    call; a continuous integrator takes :meth:`initial_state` and :meth:`continuous`. The estimate goes on changing as
+    long as there is an error: friction, noise or a saturated drive make it drift.
+
+    Parameters
+    ----------
+    robot
+        The arm, or its description.
+    decay
+        Lambda, 1/s: how fast the error decays where s = 0. A number, or shape (n,).
+    kd
+        K_D, N m s/rad (N s/m for slides): a number, or shape (n,).
+    adaptation
+        Gamma, in units of p squared over J: a positive number, the diagonal (m,), or a positive definite matrix (m, m).
+    estimate
+        p at the start, shape (m,).
+    masses
+        Without ``estimate``, the estimate starts from the arm's own parameters times this factor.
+
+    Attributes
+    ----------
+    estimate
+        p now, shape (m,).
+
+    Raises
+    ------
+    ValueError
+        A gain that is negative or not finite, or Gamma not positive definite; an estimate of another shape.
+    TypeError
+        No arm, or what is no numbers.
+    DescriptionError
+        A link without a body.
+    """
+
+    estimate: Array
+
+    batches = False
+    """It takes the states of one arm, not those of a batch."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        decay: ArrayLike,
+        kd: ArrayLike,
+        adaptation: ArrayLike,
+        *,
+        estimate: ArrayLike | None = None,
+        masses: float = 1.0,
+    ) -> None:
+        self.description = description_of(robot)
+        require_bodies(self.description)
+        n = self.description.n
+        self.decay, self.kd = gain(decay, "decay", n), gain(kd, "kd", n)
+        grouping = parameter_grouping(self.description)
+        self._columns = list(grouping.columns)
+        self.adaptation = _adaptation(adaptation, len(grouping))
+        if estimate is None:
+            own = grouping.matrix @ inertial_parameters(self.description)
+            self._start: Array = positive(masses, "masses") * own
+        else:
+            self._start = _estimate(estimate, len(grouping))
+        self.reset()
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        bandwidth: float = 20.0,
+        damping: float = 1.0,
+        adaptation: float = 2.0,
+        q: ArrayLike | None = None,
+        estimate: ArrayLike | None = None,
+        masses: float = 1.0,
+    ) -> Self:
+        """Return the controller whose error has the poles of s^2 + 2 z w s + w^2 when the parameters are right.
+
+        It obeys (s + Lambda)(s + k) = 0, with Lambda = w (z - sqrt(z^2 - 1)), k = w (z + sqrt(z^2 - 1)) and
+        K_D = m k, m the effective inertia of each joint; so z is 1 or more. Gamma = a <Y^T K_D^-1 Y>^-1, averaged over
+        random motions inside the limits: to parameters that change slowly s = -K_D^-1 Y (p - p*), so that p - p* decays
+        at the rate a in a motion that excites it as random ones do. A slower or smaller motion excites it less.
+
+        Parameters
+        ----------
+        robot
+            The arm, or its description.
+        bandwidth, damping
+            w, rad/s, and z, 1 or more.
+        adaptation
+            a, 1/s.
+        q
+            Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
+        estimate, masses
+            As for the class.
+
+        Raises
+        ------
+        ValueError
+            A bandwidth or rate that is not positive, a damping below 1.
+        DescriptionError
+            A link without a body, or a joint that feels no inertia.
+        """
+        description = description_of(robot)
+        w, z = positive(bandwidth, "bandwidth"), positive(damping, "damping")
+        if z < 1:
+            raise ValueError(f"damping is {damping!r}; expected 1 or more: both poles of this controller are real")
+        m = effective_inertia(description, q)
+        if not (m > 0).all():
+            raise DescriptionError(f"{description.name}: joint {int(np.argmin(m)) + 1} feels no inertia")
+        apart = np.sqrt(z * z - 1)
+        kd = m * w * (z + apart)
+        Gamma = positive(adaptation, "adaptation") * _inverse_excitation(description, kd)
+        return cls(description, w * (z - apart), kd, Gamma, estimate=estimate, masses=masses)
+
+    def reset(self) -> None:
+        """Go back to the estimate at the start."""
+        self.estimate = self._start.copy()
+        self._time: float | None = None
+        self._rate: Array = np.zeros_like(self.estimate)
+
+    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
+        """Return the torques, shape (n,), and keep the estimate's rate until the next call."""
+        Y, known, s = self._terms(q, qd, setpoint)
+        rate = self.adaptation @ (Y.T @ s)
+        if self._time is not None:
+            self.estimate = self.estimate + (t - self._time) / 2 * (self._rate + rate)
+        self._time, self._rate = t, rate
+        tau: Array = Y @ self.estimate + known
+        return tau
+
+    def initial_state(self, q: Array | None = None) -> Array:
+        """Return the estimate at the start, shape (m,), wherever the arm is."""
+        return self._start.copy()
+
+    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+        """Return the torques, shape (n,), and the estimate's rate, shape (m,), for an estimate ``state`` (m,)."""
+        Y, known, s = self._terms(q, qd, setpoint)
+        return Y @ state + known, self.adaptation @ (Y.T @ s)
+
+    def lyapunov(self, q: Array, qd: Array, setpoint: Setpoint, estimate: Array, true: Array) -> float:
+        """Return V = (s^T M s + (p - p*)^T Gamma^-1 (p - p*)) / 2, J: it never rises under :meth:`continuous`.
+
+        Parameters
+        ----------
+        q, qd
+            The state, shape (n,).
+        setpoint
+            What is asked for there.
+        estimate, true
+            p and p*, shape (m,). M is that of the controller's arm, which is to be the true one.
+        """
+        _, s = self._reference(q, qd, setpoint)
+        wrong = estimate - true
+        M = mass_matrix(self.description, q)
+        return float(s @ M @ s + wrong @ np.linalg.solve(self.adaptation, wrong)) / 2
+
+    def _reference(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array]:
+        """Return qd_r and s."""
+        qd_r = setpoint.qd + self.decay * (setpoint.q - q)
+        return qd_r, qd_r - qd
+
+    def _terms(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array, Array]:
+        """Return Y in base parameters, the torques that need no estimate, and s."""
+        qd_r, s = self._reference(q, qd, setpoint)
+        qdd_r = setpoint.qdd + self.decay * (setpoint.qd - qd)
+        Y = velocity_regressor(self.description, q, qd, qd_r, qdd_r)[:, self._columns]
+        return Y, self.description.numbers.armature * qdd_r + self.kd * s, s
+
+
+def _inverse_excitation(description: Description, kd: Array) -> Array:
+    """Return <Y^T K_D^-1 Y>^-1 over random motions, shape (m, m)."""
+    q, qd, qdd = random_motions(description, STATES)
+    Y = velocity_regressor(description, q, qd, qd, qdd)[..., list(parameter_grouping(description).columns)]
+    rows = (Y / np.sqrt(kd)[:, None]).reshape(-1, Y.shape[-1]) / np.sqrt(len(q))
+    # By QR, with columns of unit length: squaring first would square the condition as well.
+    size = np.linalg.norm(rows, axis=0)
+    inverse = np.linalg.inv(np.linalg.qr(rows / size, mode="r")) / size[:, None]
+    product: Array = inverse @ inverse.T
+    return (product + product.T) / 2
+
+
+def _adaptation(value: ArrayLike, m: int) -> Array:
+    array = number_array(value, "adaptation", "a number, (m,) or (m, m)")
+    if array.shape not in ((), (m,), (m, m)) or not np.isfinite(array).all():
+        raise ValueError(f"adaptation has shape {array.shape}; expected a number, ({m},) or ({m}, {m}), finite")
+    matrix = array if array.ndim == 2 else np.diag(np.broadcast_to(array, m))
+    if not np.allclose(matrix, matrix.T) or np.linalg.eigvalsh(matrix).min() <= 0:
+        raise ValueError("adaptation is not symmetric and positive definite")
+    return matrix.copy()
+
+
+def _estimate(value: ArrayLike, m: int) -> Array:
+    array = number_array(value, "estimate", f"({m},)")
+    if array.shape != (m,) or not np.isfinite(array).all():
+        raise ValueError(f"estimate has shape {array.shape}; expected ({m},) finite base parameters")
+    return array.copy()

@@ -1,0 +1,205 @@
+"""Many arms at once: batches of states, gains and arms advanced together by one kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.control.batch_result import BatchResult, History
+from dhkit.control.batch_run import BatchRun, Record, closed_step
+from dhkit.control.controller import Controller, require_fits, reset
+from dhkit.control.law import law_of
+from dhkit.control.plant import Plant
+from dhkit.control.references import Reference, reference_of
+from dhkit.control.runs import Progress
+from dhkit.control.sensors import Sensors
+from dhkit.control.step_kernel import StepKernel
+from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
+from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics import Friction
+from dhkit.kernels import check_whole
+from dhkit.trajectories import Trajectory
+
+__all__ = ["simulate_batch"]
+
+KEEP = ("final", "errors", "all")
+MOST_BYTES = 4_000_000_000
+"""Of all states of a batch that are kept."""
+
+
+def simulate_batch(
+    description: Description,
+    controller: Controller | None = None,
+    reference: Reference | Trajectory | ArrayLike | None = None,
+    duration: float | None = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
+    rate: float = 1000.0,
+    arms: Sequence[Description] = (),
+    plant_rate: float | None = None,
+    *,
+    friction: bool | Friction | None = None,
+    keep: str = "errors",
+    sensors: Sensors | None = None,
+    saturation: bool = True,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> BatchResult:
+    """Return how a batch of arms moves under a controller that is called for all of them at once.
+
+    The size B of the batch is that of ``q0``, ``qd0``, ``arms``, ``reference`` or the gains, which broadcast. All arms
+    take the same steps of the classical Runge-Kutta method, as :func:`simulate` does. There are no joint stops, no
+    pushes and no stiction: dry friction has to be smooth.
+
+    Parameters
+    ----------
+    description
+        The robot that the controller and the reference know.
+    controller
+        Called with joint values and rates (B, n) and a setpoint whose arrays are (n,), or (B, n) where each arm holds
+        joint values of its own; returns torques (B, n). Those of dhkit can, with gains (n,) or (B, n), except for
+        :class:`OperationalSpace` and :class:`Adaptive`.
+    reference
+        As for :func:`simulate`, one for all; or joint values (B, n) to hold. None holds ``q0``.
+    q0, qd0
+        Where the runs begin, shape (n,) or (B, n).
+    arms
+        What moves: one for all, or one for each run (payloads, parameters); the robot unless given.
+    duration, rate, plant_rate, sensors, saturation
+        As for :func:`simulate`.
+    friction
+        None or False for none; of a width above 0.
+    keep
+        ``"final"``: last states; ``"errors"``: and norms of errors; ``"all"``: and all states, at most 4 GB.
+    threads
+        How many threads share the step of a large batch.
+    progress
+        Called after every thousand steps; an exception in it ends the run.
+
+    Raises
+    ------
+    SimulationError
+        The controller raises, or returns another shape, or for a finite state torques that are not finite.
+    DescriptionError
+        A link without a body.
+    ValueError, TypeError
+        An argument that does not fit: says which, and what is expected.
+    """
+    if keep not in KEEP:
+        raise ValueError(f"keep is {keep!r}; expected one of {', '.join(KEEP)}")
+    friction = Friction.chosen(friction)
+    if friction is not None and friction.width == 0:
+        raise ValueError("a batch has no stiction; expected friction that is smooth, such as Friction(0.01)")
+    if not getattr(controller, "batches", True):
+        name = type(controller).__name__
+        raise ValueError(f"{name} controls one arm at a time; expected another controller, or runs one by one")
+    require_fits(controller, description)
+    if rate is None:
+        raise ValueError("rate is None; expected Hz: a batch is sampled")
+    require_positive(rate=rate, plant_rate=plant_rate, duration=duration)
+    check_whole("threads", threads, 1)
+    moving = tuple(arms) or (description,)
+    for arm in moving:
+        if arm.kinds != description.kinds:
+            raise ValueError(f"a plant has joints {arm.kinds}; expected {description.kinds}")
+    n = description.n
+    if isinstance(reference, Trajectory | Reference):
+        wanted = reference_of(description, reference)
+        t = row_times(wanted.duration, duration, rate)
+        asked = sampled_reference(description, wanted, t)
+    else:
+        given, name = (q0, "q0") if reference is None else (reference, "reference")
+        array = np.asarray(0.0 if given is None else given)
+        if array.shape == (4, 4) and np.array_equal(array[3], [0, 0, 0, 1]):
+            raise ValueError(f"{name} looks like a pose of the tool; a batch holds joint values, ({n},) or (B, {n})")
+        held = _states(description, given, np.zeros(n), name)
+        t = row_times(None, duration, rate)
+        asked = held[None], np.zeros((1, *held.shape)), np.zeros((1, *held.shape))
+    q, qd = _states(description, q0, asked[0][0], "q0"), _states(description, qd0, asked[1][0], "qd0")
+    size = _size(q, qd, asked[0][0], np.empty((len(moving), n)), np.empty((*getattr(controller, "batch_shape", ()), n)))
+    if keep == "all" and (needed := 4 * 8 * size * len(t) * n) > MOST_BYTES:
+        raise ValueError(f"all states are {needed / 1e9:.3g} GB; expected at most {MOST_BYTES / 1e9:g} GB")
+    stiffness = max(Plant(arm, friction, None).stiffness for arm in {id(arm): arm for arm in moving}.values())
+    steps = substeps(stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
+    effort = np.stack([arm.numbers.effort for arm in moving])
+    if len(asked[0]) == 1:
+        asked = _filled(asked[0][0], size)[None], np.zeros((1, size, n)), np.zeros((1, size, n))
+    for array in asked:
+        array.flags.writeable = False
+    most = effort if saturation else np.full((1, n), np.inf)
+    law = law_of(controller) if sensors is None else None
+    run = BatchRun(
+        description=description,
+        controller=controller,
+        t=t,
+        reference=asked,
+        open_step=StepKernel.open(moving, friction, 1 / rate / steps),
+        closed_step=None if law is None else closed_step(moving, friction, 1 / rate / steps, law, most, asked),
+        substeps=steps,
+        most=most,
+        measuring=None if sensors is None else sensors.started(n, 1 / rate),
+        measured=keep != "final",
+    )
+    record = Record.empty(_filled(q, size), _filled(qd, size), len(t) if keep == "all" else 0)
+    reset(controller)
+    run(record, threads, progress)
+    return _result(run, record, moving, friction, keep)
+
+
+def _result(
+    run: BatchRun, record: Record, arms: tuple[Description, ...], friction: Friction | None, keep: str
+) -> BatchResult:
+    size, n = record.q.shape
+    steps = len(run.t)
+    wanted = [np.broadcast_to(_by_run(x), (size, steps, n)) for x in run.reference[:2]]
+    norms = keep != "final"
+    lower, upper = (np.stack([getattr(arm.numbers, name) for arm in arms]) for name in ("lower", "upper"))
+    return BatchResult(
+        arms=arms,
+        friction=friction,
+        t=run.t,
+        q0=record.q0,
+        qd0=record.qd0,
+        q=record.q,
+        qd=record.qd,
+        final_error=run.reference[0][-1] - record.q,
+        peak_error=record.peak if norms else None,
+        rms_error=np.sqrt(record.squares / steps) if norms else None,
+        saturated=record.cut / steps if norms else None,
+        outside=np.any(~((record.lowest >= lower) & (record.highest <= upper)), axis=1) if norms else None,
+        works=record.works,
+        history=History(*record.rows, *wanted) if keep == "all" else None,
+    )
+
+
+def _by_run(reference: Array) -> Array:
+    """Return a reference with the batch's axis before the one of time: (1, N, n) or (B, 1, n)."""
+    return reference[None] if reference.ndim == 2 else reference.transpose(1, 0, 2)
+
+
+def _states(description: Description, given: ArrayLike | None, default: Array, name: str) -> Array:
+    """Return joint values or rates, shape (n,) or (B, n), finite."""
+    if given is None:
+        return default
+    states = joint_array(description, given, name)
+    if states.ndim > 2 or not np.isfinite(states).all():
+        n = description.n
+        raise ValueError(f"{name} has shape {states.shape}; expected ({n},) or (B, {n}), finite")
+    return states
+
+
+def _filled(array: Array, size: int) -> Array:
+    """Return an array (n,) or (B, n) as (B, n): sums of two whole arrays take a fifth of the time of broadcast ones."""
+    return np.array(np.broadcast_to(array, (size, array.shape[-1])), order="C")
+
+
+def _size(*arrays: Array) -> int:
+    """Return the size of the batch that arrays (n,) and (B, n) broadcast to."""
+    sizes = {len(array) for array in arrays if array.ndim == 2 and len(array) != 1}
+    if len(sizes) > 1:
+        raise ValueError(
+            f"states, references, gains and arms are of batches of {', '.join(map(str, sorted(sizes)))}; expected one"
+        )
+    return sizes.pop() if sizes else 1

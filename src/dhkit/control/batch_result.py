@@ -1,0 +1,149 @@
+"""What a batch of simulations found, one row for each arm."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.control.result import EnergyAudit, SimulationResult
+from dhkit.description import Array, Description, write_atomically
+from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, potential_energy
+
+__all__ = ["BatchResult", "History"]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """All states of a batch: arrays (B, N+1, n), in units of the joints."""
+
+    q: Array
+    qd: Array
+    tau: Array
+    tau_asked: Array
+    reference_q: Array
+    """Broadcast over the batch."""
+    reference_qd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BatchResult:
+    """B simulated runs of N steps. Arms whose state became NaN stay NaN; the others do not feel it."""
+
+    arms: tuple[Description, ...]
+    """One that moved in all runs, or one for each."""
+    friction: Friction | None
+    t: Array
+    """Times of the states, shape (N+1,), s."""
+    q0: Array
+    """Where the runs began, shape (B, n), rad and m."""
+    qd0: Array
+    q: Array
+    """The last states, shape (B, n)."""
+    qd: Array
+    final_error: Array
+    """The reference less the joint values at the end, shape (B, n)."""
+    peak_error: Array | None
+    """The largest error of each joint, shape (B, n); None with ``keep="final"``."""
+    rms_error: Array | None
+    """The root of the mean squared error, likewise."""
+    saturated: Array | None
+    """Of each joint the share of steps in which its drive could not give what was asked, likewise."""
+    outside: NDArray[np.bool_] | None
+    """Which arms were beyond a joint limit in some state, shape (B,): a batch has no stops; likewise."""
+    works: Array
+    """What the drives did, the same counted without its sign, and what friction took, shape (B, 3), J."""
+    history: History | None = None
+    """Only with ``keep="all"``."""
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which runs ended in a state that is not finite, shape (B,)."""
+        failed: NDArray[np.bool_] = np.any(~np.isfinite(self.q) | ~np.isfinite(self.qd), axis=1)
+        return failed
+
+    def arm(self, index: int) -> Description:
+        """Return the arm that moved in a run."""
+        return self.arms[0] if len(self.arms) == 1 else self.arms[index]
+
+    def audit(self, index: int) -> EnergyAudit:
+        """Return where the energy of a run went."""
+        arm = self.arm(index)
+        q, qd = (np.stack([first[index], last[index]]) for first, last in ((self.q0, self.q), (self.qd0, self.qd)))
+        kinetic = kinetic_energy(arm, q, qd)
+        energy = kinetic + potential_energy(arm, q)
+        drives, turnover, friction = self.works[index].tolist()
+        return EnergyAudit(
+            change=float(energy[1] - energy[0]),
+            drives=drives,
+            pushes=0.0,
+            friction=friction,
+            impacts=0.0,
+            turnover=turnover + float(kinetic.max()),
+        )
+
+    def __getitem__(self, index: int) -> SimulationResult:
+        """Return one run.
+
+        Raises
+        ------
+        ValueError
+            The batch did not keep all states.
+        IndexError
+            There is no such run.
+        """
+        if self.history is None:
+            raise ValueError('the states of single runs were not kept; expected keep="all"')
+        if not isinstance(index, int | np.integer):
+            raise TypeError(f"run {index!r}; expected the number of one run")
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"run {index} of {len(self)}")
+        arm, history = self.arm(index), self.history
+        q, qd, tau, asked = (x[index] for x in (history.q, history.qd, history.tau, history.tau_asked))
+        return SimulationResult(
+            description=arm,
+            t=self.t,
+            q=q,
+            qd=qd,
+            qdd=forward_dynamics(arm, q, qd, tau, friction=False if self.friction is None else self.friction),
+            tau=tau,
+            tau_asked=asked,
+            reference_q=np.array(history.reference_q[index]),
+            reference_qd=np.array(history.reference_qd[index]),
+            audit=self.audit(index),
+            saturated=np.mean(tau != asked, axis=0),
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the arrays as ``.npz``, for :func:`numpy.load`, and return the path.
+
+        Raises
+        ------
+        ValueError
+            Another suffix.
+        OSError
+            The file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix.lower() != ".npz":
+            raise ValueError(f"{path}: found suffix {path.suffix!r}; expected .npz")
+        names = ("t", "q0", "qd0", "q", "qd", "final_error", "peak_error", "rms_error", "saturated", "outside", "works")
+        arrays = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        if self.history is not None:
+            arrays |= {f"history_{name}": value for name, value in vars(self.history).items()}
+        file = io.BytesIO()
+        np.savez(file, **arrays)
+        write_atomically(path, file.getvalue())
+        return path
+
+    def __repr__(self) -> str:
+        error = "" if self.peak_error is None else f", largest error {np.nanmax(self.peak_error, initial=0.0):.3g}"
+        if self.failed.any():
+            error += f", {int(self.failed.sum())} failed"
+        return f"<BatchResult of {len(self)} x {self.arms[0].name}: {self.t[-1]:g} s in {len(self.t) - 1} steps{error}>"

@@ -1,0 +1,184 @@
+"""All controllers by name, tuned alike, and compared on one motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dhkit.control.adaptive import Adaptive
+from dhkit.control.controller import Controller
+from dhkit.control.joint_controllers import PID
+from dhkit.control.linear import LQR
+from dhkit.control.model_controllers import ComputedTorque, FeedForward, PDGravity
+from dhkit.control.operational_space import OperationalSpace
+from dhkit.control.plant import Plant
+from dhkit.control.references import Reference, reference_of
+from dhkit.control.result import SimulationResult
+from dhkit.control.simulation import simulate
+from dhkit.description import Array, Description
+from dhkit.errors import DhkitError
+from dhkit.trajectories import Trajectory
+
+__all__ = ["CONTROLLERS", "Comparison", "compare", "make_controller"]
+
+STYLES = ("text", "markdown", "latex")
+LARGE = 10.0
+"""mm: from here on the tool's error is printed whole."""
+Tuned = Callable[[Description, float, float, Array], Controller]
+CONTROLLERS: Mapping[str, Tuned] = {
+    "pd": lambda arm, w, z, q: PID.tuned(arm, w, z, integral=0.0),
+    "pid": lambda arm, w, z, q: PID.tuned(arm, w, z),
+    "pd-gravity": lambda arm, w, z, q: PDGravity.tuned(arm, w, z),
+    "feed-forward": lambda arm, w, z, q: FeedForward.tuned(arm, w, z),
+    "computed-torque": lambda arm, w, z, q: ComputedTorque.tuned(arm, w, z),
+    "operational-space": lambda arm, w, z, q: OperationalSpace.tuned(arm, w, z),
+    "adaptive": lambda arm, w, z, q: Adaptive.tuned(arm, w, max(z, 1.0)),
+    "lqr": lambda arm, w, z, q: LQR(arm, q),
+}
+"""By name: of a robot, a bandwidth (rad/s), a damping, and where it is linearized, shape (n,)."""
+
+
+def make_controller(
+    name: str, description: Description, bandwidth: float = 20.0, damping: float = 1.0, q: Array | None = None
+) -> Controller:
+    """Return a controller by its name, tuned.
+
+    Parameters
+    ----------
+    name
+        One of ``CONTROLLERS``.
+    description
+        The robot that it knows.
+    bandwidth, damping
+        rad/s, and a number: as for the controllers' ``tuned``. Of an adaptive controller the damping is 1 at least; an
+        LQR follows from its default weights alone.
+    q
+        Where an LQR is linearized, shape (n,); zero unless given.
+
+    Raises
+    ------
+    ValueError
+        No such controller.
+    """
+    _require_known(name)
+    return CONTROLLERS[name](description, bandwidth, damping, np.zeros(description.n) if q is None else q)
+
+
+def _require_known(name: str) -> None:
+    if name not in CONTROLLERS:
+        raise ValueError(f"controller is {name!r}; expected one of {', '.join(CONTROLLERS)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What became of several controllers on the same motion; prints as a table."""
+
+    results: Mapping[str, SimulationResult]
+    """Of those that reached its end."""
+    failures: Mapping[str, str]
+    """Why the others did not."""
+
+    def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return the headings and the rows of the table: errors of the joint that errs most, the tool's, torques."""
+        first = next(iter(self.results.values()), None)
+        prismatic = np.zeros(1, dtype=bool) if first is None else first.description.numbers.prismatic
+        unit = "m" if prismatic.all() else "rad or m" if prismatic.any() else "rad"
+        headings = ("controller", f"largest error [{unit}]", "RMS", "at the end", "tool's largest [mm]", "torque [%]")
+        return headings, [(name, *_row(result)) for name, result in self.results.items()]
+
+    def table(self, style: str = "text") -> str:
+        """Return the table as ``text``, ``markdown`` or ``latex``; torques are shares of the drives' limits.
+
+        Raises
+        ------
+        ValueError
+            Another style.
+        """
+        if style not in STYLES:
+            raise ValueError(f"style is {style!r}; expected one of {', '.join(STYLES)}")
+        headings, rows = self.rows()
+        if style == "markdown":
+            lines = [headings, ("---",) * len(headings), *rows]
+            return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        if style == "latex":
+            body = [" & ".join(cell.replace("%", r"\%") for cell in line) + r" \\" for line in (headings, *rows)]
+            begin = rf"\begin{{tabular}}{{l{'r' * (len(headings) - 1)}}}"
+            return "\n".join([begin, body[0], r"\hline", *body[1:], r"\end{tabular}"])
+        widths = [max(len(line[k]) for line in (headings, *rows)) for k in range(len(headings))]
+
+        def aligned(line: Sequence[str]) -> str:
+            cells = zip(line[1:], widths[1:], strict=True)
+            return "  ".join([line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in cells)])
+
+        failed = [f"{name}: {reason}" for name, reason in self.failures.items()]
+        return "\n".join([*(aligned(line) for line in (headings, *rows)), *failed])
+
+    def __str__(self) -> str:
+        return self.table()
+
+
+def _row(result: SimulationResult) -> tuple[str, ...]:
+    effort = result.description.numbers.effort
+    share = 100 * float((np.abs(result.tau).max(axis=0) / effort).max())
+    errors = (result.peak_error.max(), result.rms_error.max(), np.abs(result.final_error).max())
+    tool = 1000 * result.tool_norms.peak
+    torque = f"{share:.0f}" if np.isfinite(effort).any() else "no limit"
+    return (*(f"{error:.2g}" for error in errors), f"{tool:.0f}" if tool >= LARGE else f"{tool:.2g}", torque)
+
+
+def compare(
+    description: Description,
+    reference: Reference | Trajectory,
+    controllers: Sequence[str] | Mapping[str, Any] = tuple(CONTROLLERS),
+    bandwidth: float = 20.0,
+    damping: float = 1.0,
+    done: Callable[[str], None] | None = None,
+    *,
+    plant: Plant | None = None,
+    **options: Any,
+) -> Comparison:
+    """Return how controllers follow a motion that begins on it.
+
+    Parameters
+    ----------
+    description
+        The robot that the controllers know.
+    reference
+        The motion.
+    controllers
+        Names, as ``CONTROLLERS`` has them, tuned alike; or controllers by names of one's own, among them such names:
+        ``{"mine": my_controller, "pid": "pid"}``.
+    bandwidth, damping
+        As for :func:`make_controller`, of those that are given by name.
+    done
+        Called with each controller's name when its run ends.
+    plant
+        What moves; the robot unless given.
+    options
+        As for :func:`simulate`: ``rate``, ``duration``, ``sensors`` and others.
+
+    Raises
+    ------
+    ValueError
+        No such controller.
+    """
+    chosen: Mapping[str, Any] = controllers if isinstance(controllers, Mapping) else {x: x for x in controllers}
+    for given in chosen.values():
+        if isinstance(given, str):
+            _require_known(given)
+    wanted = reference_of(description, reference)
+    middle = wanted.sampled(np.array([(wanted.duration or 0.0) / 2]))[0][0]
+    results, failures = {}, {}
+    for name, given in chosen.items():
+        try:
+            named = isinstance(given, str)
+            controller = make_controller(given, description, bandwidth, damping, middle) if named else given
+            results[name] = simulate(description, controller, wanted, plant=plant, **options)
+        except DhkitError as error:
+            failures[name] = str(error)
+        if done is not None:
+            done(name)
+    return Comparison(results, failures)

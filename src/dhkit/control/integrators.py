@@ -1,0 +1,220 @@
+"""One step of an integrator: Runge and Kutta's for held torques, Dormand and Prince's for continuous controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from dhkit.control.plant import Phase, Plant
+from dhkit.description import Array
+from dhkit.errors import SimulationError
+
+__all__ = ["DormandPrince", "Integrator", "RungeKutta", "State"]
+
+MOST_STEPS = 5_000
+"""Of DOP853 on the way to one time."""
+Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
+"""Of time, joint values, rates and the controller's states: torques (n,), and the states' derivatives (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where the arm is, how it moves, what the controller remembers, and what work was done so far."""
+
+    t: float
+    q: Array
+    qd: Array
+    memory: Array
+    """Internal states of a continuous controller, shape (m,)."""
+    drive_work: float = 0.0
+    """Done by the drives' torques, J."""
+    friction_work: float = 0.0
+    """Taken by friction, J."""
+    push_work: float = 0.0
+    """Done by pushes, J."""
+    impact_loss: float = 0.0
+    """Kinetic energy lost at stops, J."""
+
+
+class Integrator(Protocol):
+    """Advances a state while its contact lasts."""
+
+    def torque(self, state: State) -> Array:
+        """Return the drives' torques at a state, shape (n,)."""
+
+    def step(self, state: State, phase: Phase, end: float) -> State:
+        """Return a later state, at ``end`` at the latest."""
+
+
+@dataclass(frozen=True, eq=False)
+class RungeKutta:
+    """The classical method of order 4 (Kutta 1901), one step to the end, under torques that are held."""
+
+    plant: Plant
+    tau: Array
+
+    def torque(self, state: State) -> Array:
+        """Return the held torques."""
+        return self.tau
+
+    def step(self, state: State, phase: Phase, end: float) -> State:
+        """Return the state at the end."""
+        kernel = self.plant.step_kernel
+        if kernel is None or phase.pushes or phase.contact.holds.any():
+            return self._stages(state, phase, end)
+        q, qd = state.q, state.qd
+        works = np.array([[state.drive_work, 0.0, state.friction_work]])
+        into = (np.empty((1, len(q))), np.empty((1, len(q))), np.empty((1, 3)))
+        kernel.lasting(end - state.t)((q[None], qd[None], works), self.tau[None], into)
+        drives, _, friction = into[2][0].tolist()
+        return State(end, into[0][0], into[1][0], state.memory, drives, friction, state.push_work, state.impact_loss)
+
+    def _stages(self, state: State, phase: Phase, end: float) -> State:
+        """Return the state at the end, by the plant's accelerations while the contact lasts."""
+        plant, tau, h = self.plant, self.tau, end - state.t
+        q, qd, a1 = state.q, state.qd, phase.qdd
+        q2, v2 = q + h / 2 * qd, qd + h / 2 * a1
+        a2 = plant.moving(q2, v2, tau, phase.contact, phase.pushes)
+        q3, v3 = q + h / 2 * v2, qd + h / 2 * a2
+        a3 = plant.moving(q3, v3, tau, phase.contact, phase.pushes)
+        q4, v4 = q + h * v3, qd + h * a3
+        a4 = plant.moving(q4, v4, tau, phase.contact, phase.pushes)
+        stages = ((q, qd), (q2, v2), (q3, v3), (q4, v4))
+        friction, push = state.friction_work, state.push_work
+        if plant.friction is not None:
+            powers = [float(v @ plant.resistance(v, phase.contact.directions)) for _, v in stages]
+            friction += h * _weighted(powers)
+        if phase.pushes:
+            push += h * _weighted([float(v @ plant.pushed(phase.pushes, x)) for x, v in stages])
+        q_next = q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4)
+        qd_next = qd + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        _hold(phase, q, q_next, qd_next)
+        drives = state.drive_work + float(tau @ (q_next - q))
+        return State(end, q_next, qd_next, state.memory, drives, friction, push, state.impact_loss)
+
+
+class DormandPrince:
+    """SciPy's DOP853, of order 8 with a step size of its own (Hairer, Norsett and Wanner 1993, section II.5).
+
+    The works of drives, friction and pushes are integrated with the state, and so is what the controller remembers.
+    Where nothing sudden can happen, steps go beyond the times that are asked for, and the states there are those of the
+    method's interpolation of order 7; otherwise each step ends at the next of these times.
+
+    Parameters
+    ----------
+    plant
+        What moves.
+    torques
+        The drives' torques, and the derivatives of the controller's states.
+    tolerance
+        Of a step's error, relative and absolute in every state.
+    edges
+        Times that no step crosses, ascending, the end of the run last, s: torques may jump there.
+    longest
+        s of a step: a shorter pulse of torque may be passed over.
+    """
+
+    def __init__(
+        self, plant: Plant, torques: Torques, tolerance: float, edges: Sequence[float], longest: float = np.inf
+    ) -> None:
+        self.plant, self.torques, self.tolerance, self.edges = plant, torques, tolerance, edges
+        self.longest = longest
+        self._length: float | None = None
+        self._steps = 0
+        """On the way to ``_end``."""
+        self._end = 0.0
+        self._solver: DOP853 | None = None
+        self._last: State | None = None
+
+    def torque(self, state: State) -> Array:
+        """Return the torques at a state."""
+        return self.torques(state.t, state.q, state.qd, state.memory)[0]
+
+    def step(self, state: State, phase: Phase, end: float) -> State:
+        """Return a later state, at ``end`` at the latest.
+
+        Raises
+        ------
+        SimulationError
+            No step is short enough.
+        """
+        if end != self._end:
+            self._end, self._steps = end, 0
+        if self.plant.undisturbed:
+            return self._passing(state, phase, end)
+        solver = self._started(state, phase, end)
+        self._advance(solver)
+        later = self._state(state, solver.y.copy(), end if solver.status == "finished" else float(solver.t))
+        _hold(phase, state.q, later.q, later.qd)
+        return later
+
+    def _passing(self, state: State, phase: Phase, end: float) -> State:
+        """Return the state at ``end``, with steps that pass it."""
+        if self._solver is None or state is not self._last or self._solver.t_bound < end:
+            edge = next((edge for edge in self.edges if edge > state.t), end)
+            self._solver = self._started(state, phase, max(edge, end))
+        while self._solver.t < end:
+            self._advance(self._solver)
+        y = self._solver.y.copy() if self._solver.t == end else self._solver.dense_output()(end)
+        self._last = self._state(state, y, end)
+        return self._last
+
+    def _started(self, state: State, phase: Phase, end: float) -> DOP853:
+        plant, n, contact, pushes = self.plant, self.plant.n, phase.contact, phase.pushes
+        # A setpoint that jumps at the end has its value of before until then.
+        latest = float(np.nextafter(end, state.t))
+
+        def rates(t: float, y: Array) -> Array:
+            q, qd = y[:n], y[n : 2 * n]
+            tau, memory = self.torques(min(t, latest), q, qd, y[2 * n : -3])
+            friction = 0.0 if plant.friction is None else float(qd @ plant.resistance(qd, contact.directions))
+            push = float(qd @ plant.pushed(pushes, q)) if pushes else 0.0
+            qdd = plant.moving(q, qd, tau, contact, pushes)
+            if not np.isfinite(qdd).all():
+                # DOP853 would look for a shorter step for ever.
+                raise SimulationError(f"the arm has no finite accelerations at {t:g} s")
+            return np.concatenate([qd, qdd, memory, [float(tau @ qd), friction, push]])
+
+        works = [state.drive_work, state.friction_work, state.push_work]
+        start = np.concatenate([state.q, state.qd, state.memory, works])
+        # After a jump the old length says nothing: SciPy chooses a first one.
+        jump = any(edge == state.t for edge in self.edges)
+        length = None if self._length is None or jump else min(self._length, end - state.t)
+        options = {"rtol": self.tolerance, "atol": self.tolerance, "max_step": self.longest}
+        with np.errstate(over="ignore", invalid="ignore"):  # said by _advance
+            return DOP853(rates, state.t, start, end, first_step=length, **options)
+
+    def _advance(self, solver: DOP853) -> None:
+        begin = solver.t
+        self._steps += 1
+        if self._steps > MOST_STEPS:
+            raise SimulationError(
+                f"more than {MOST_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s: torques that jump"
+                " with the state, as those of a relay, have no continuous solution; expected a rate in Hz"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):  # said here
+            message = solver.step()
+        if message is not None or not np.isfinite(solver.y).all():
+            raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
+        self._length = solver.h_abs
+
+    def _state(self, before: State, y: Array, t: float) -> State:
+        n = self.plant.n
+        drives, friction, push = y[-3:].tolist()
+        return State(t, y[:n], y[n : 2 * n], y[2 * n : -3], drives, friction, push, before.impact_loss)
+
+
+def _hold(phase: Phase, before: Array, q: Array, qd: Array) -> None:
+    """Leave joints that hold exactly where they were."""
+    holds = phase.contact.holds
+    if holds.any():
+        q[holds], qd[holds] = before[holds], 0.0
+
+
+def _weighted(powers: Sequence[float]) -> float:
+    first, second, third, fourth = powers
+    return (first + 2 * second + 2 * third + fourth) / 6

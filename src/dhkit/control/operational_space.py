@@ -1,0 +1,187 @@
+"""Control of the tool's pose, through the Jacobian and the inertia that the tool feels."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.control.gains import gain, pd_gains, positive
+from dhkit.control.references import Setpoint
+from dhkit.description import Array, Robot, description_of
+from dhkit.description.frames import number_array
+from dhkit.dynamics import bias, mass_matrix, require_inertia
+from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
+from dhkit.verification import random_motions
+
+__all__ = ["OperationalSpace", "pose_error"]
+
+PROBES = 16
+"""Random configurations that tell in how many directions the tool can be moved."""
+ZERO = 1e-9
+"""Singular value, over the largest, below which the tool cannot be moved in a direction at all."""
+
+
+class OperationalSpace:
+    """tau = J^T Lambda (a_d + kd de/dt + kp e - dJ/dt qd) + C qd + g + N^T tau_0.
+
+    Khatib, A unified approach for motion and force control of robot manipulators: the operational space formulation,
+    1987. e is the tool's error: position, then the rotation vector of R_d R^T, in world axes; Lambda = (J M^-1 J^T)^-1
+    is the inertia that the tool feels. Each coordinate's error decays as s^2 + kd s + kp says.
+
+    Near a singularity, Lambda is damped. J, lengths over the arm's reach, has the singular values sigma_i with left and
+    right vectors u_i and v_i; where sigma_i is below the threshold sigma_0, (sigma_0^2 - sigma_i^2) v_i^T M^-1 v_i is
+    added to J M^-1 J^T along u_i. That is the damping factor (1 - (sigma / sigma_0)^2) lambda^2 of Nakamura & Hanafusa,
+    Inverse kinematic solutions with singularity robustness, 1986, but for each singular value by itself, as in the
+    numerical filtering of Chiaverini, Siciliano & Egeland, Review of the damped least-squares inverse kinematics, 1994.
+    So torques stay bounded, and a direction is given up where its sigma_i = 0. Directions in which the arm can never
+    move its tool, such as those out of the plane of planar2r, are left out: the part of the error that the columns of J
+    span counts.
+
+    What the tool leaves to the joints follows the setpoint's joint values: tau_0 = M (qdd_d + posture_kd (qd_d - qd) +
+    posture_kp (q_d - q)), and N^T = 1 - J^T Lambda J M^-1, which does not accelerate the tool. That is the null space
+    of a redundant arm or of left-out ``directions``, and in part a direction that is lost near a singularity.
+
+    Parameters
+    ----------
+    robot
+        The arm, or its description.
+    kp, kd
+        Gains of the tool's error, 1/s^2 and 1/s: a number, or shape (6,), position then rotation, world axes.
+    posture_kp, posture_kd
+        Gains of the joints' errors, 1/s^2 and 1/s: a number, or shape (n,); the means of ``kp`` and ``kd`` unless
+        given.
+    directions
+        Which of the tool's velocities are controlled, shape (6,), linear then angular, world axes: all unless given.
+    threshold
+        sigma_0: a number without unit, for lengths are taken over the arm's reach.
+
+    Raises
+    ------
+    ValueError
+        A gain that is negative or not finite, no direction, a threshold that is not positive.
+    TypeError
+        No arm, or what is no numbers.
+    DescriptionError
+        A link without a body.
+    """
+
+    batches = False
+    """It takes the states of one arm, not those of a batch."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        kp: ArrayLike,
+        kd: ArrayLike,
+        *,
+        posture_kp: ArrayLike | None = None,
+        posture_kd: ArrayLike | None = None,
+        directions: ArrayLike | None = None,
+        threshold: float = 0.05,
+    ) -> None:
+        self.description = description_of(robot)
+        require_inertia(self.description)
+        n = self.description.n
+        self.kp, self.kd = _tool_gain(kp, "kp"), _tool_gain(kd, "kd")
+        self.posture_kp = gain(self.kp.mean() if posture_kp is None else posture_kp, "posture_kp", n)
+        self.posture_kd = gain(self.kd.mean() if posture_kd is None else posture_kd, "posture_kd", n)
+        self.threshold = positive(threshold, "threshold")
+        self._rows = _rows(directions)
+        length = self.description.reach or 1.0
+        self._row_scale: Array = np.repeat([1 / length, 1.0], 3)[self._rows]
+        self._joint_scale: Array = np.where(self.description.numbers.prismatic, length, 1.0)
+        self._rank = self._freedoms()
+
+    @classmethod
+    def tuned(
+        cls,
+        robot: Robot,
+        bandwidth: float = 20.0,
+        damping: float = 1.0,
+        directions: ArrayLike | None = None,
+        threshold: float = 0.05,
+    ) -> Self:
+        """Return the controller with kp = w^2 and kd = 2 z w, for the tool's error and the joints'.
+
+        Parameters
+        ----------
+        robot
+            The arm, or its description.
+        bandwidth, damping
+            w, rad/s, and z.
+        directions, threshold
+            As for the class.
+        """
+        return cls(robot, *pd_gains(bandwidth, damping), directions=directions, threshold=threshold)
+
+    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
+        """Return the torques, shape (n,)."""
+        description, units, rank = self.description, self._joint_scale, self._rank
+        # Prismatic joints are measured in reaches as well, so that singular values have one unit.
+        J_full = jacobian(description, q)
+        J = self._scaled(J_full)
+        M = mass_matrix(description, q) * np.outer(units, units)
+        e = pose_error(forward_kinematics(description, q), setpoint.T)
+        de = setpoint.twist - J_full @ qd
+        wanted = setpoint.acceleration + self.kd * de + self.kp * e - jacobian_dot(description, q, qd) @ qd
+        a = self._row_scale * wanted[self._rows]
+        a_0 = setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
+        a_0 = a_0 / units
+
+        U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
+        U, sigma, Vt = U[:, :rank], sigma[:rank], Vt[:rank]
+        mobility = Vt @ np.linalg.solve(M, Vt.T)
+        inverse = sigma[:, None] * mobility * sigma
+        inverse[np.diag_indices(rank)] += np.maximum(self.threshold**2 - sigma**2, 0.0) * np.diagonal(mobility)
+        # J^T Lambda (a - J a_0) + M a_0 is J^T Lambda a + N^T M a_0.
+        force = np.linalg.solve(inverse, U.T @ a - sigma * (Vt @ a_0))
+        tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / units + bias(description, q, qd)
+        return tau
+
+    def _scaled(self, J: Array) -> Array:
+        """Return the rows of Jacobians (..., 6, n) that are controlled, lengths over the reach."""
+        scaled: Array = self._row_scale[:, None] * J[..., self._rows, :] * self._joint_scale
+        return scaled
+
+    def _freedoms(self) -> int:
+        """Return in how many of the directions the tool can be moved.
+
+        Raises
+        ------
+        ValueError
+            In none.
+        """
+        q = random_motions(self.description, PROBES).q
+        sigma = np.linalg.svd(self._scaled(jacobian(self.description, q)), compute_uv=False)
+        largest = float(sigma.max())
+        rank = int(np.sum(sigma > ZERO * largest, axis=-1).max()) if largest > ZERO else 0
+        if not rank:
+            raise ValueError(f"{self.description.name} moves its tool in none of the directions")
+        return rank
+
+
+def pose_error(T: Array, goal: Array) -> Array:
+    """Return how a pose (4, 4) differs from its goal, shape (6,): position, m, and rotation vector, rad, world axes.
+
+    The rotation vector of R_goal R^T, at most pi long; where it is pi long, of two opposite ones either.
+    """
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_matrix(goal[:3, :3] @ T[:3, :3].T).as_rotvec()
+    return np.concatenate([goal[:3, 3] - T[:3, 3], turn])
+
+
+def _tool_gain(value: ArrayLike, name: str) -> Array:
+    array = number_array(value, name, "a number, or (6,)")
+    if array.shape not in ((), (6,)):
+        raise ValueError(f"{name} has shape {array.shape}; expected a number, or (6,): position, then rotation")
+    return gain(array, name)
+
+
+def _rows(directions: ArrayLike | None) -> NDArray[np.intp]:
+    chosen = np.ones(6, dtype=bool) if directions is None else np.asarray(directions)
+    if chosen.shape != (6,) or not np.isin(chosen, (0, 1)).all() or not chosen.any():
+        raise ValueError(f"directions is {directions!r}; expected six of True and False, one of them True")
+    return np.flatnonzero(chosen)

@@ -1,0 +1,275 @@
+"""One run of a controller on a plant: sampled, its torques held in between, or continuous."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dhkit.control.controller import Controller, called, continuous_law, name_of, reset, torques
+from dhkit.control.events import advanced
+from dhkit.control.integrators import DormandPrince, Integrator, RungeKutta, State
+from dhkit.control.plant import Plant
+from dhkit.control.references import Reference, Setpoint
+from dhkit.control.result import EnergyAudit, SimulationResult
+from dhkit.control.sensors import Measuring
+from dhkit.control.timing import sampled_reference
+from dhkit.description import Array, Description
+from dhkit.dynamics import kinetic_energy
+from dhkit.errors import SimulationError
+from dhkit.kinematics import forward_kinematics
+
+__all__ = ["ContinuousRun", "Progress", "Run", "SampledRun", "result_of"]
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with how many steps are done and how many there are."""
+LONGEST_STEP = 2e-3
+"""s of an integration step where a controller, friction or stops may do something sudden that it would pass over."""
+PAIR = ("torques", "derivatives of the states")
+PROGRESS_EVERY = 1000
+"""Steps."""
+
+
+class Run(ABC):
+    """A run at the times of its rows, and what has been recorded so far.
+
+    Parameters
+    ----------
+    description
+        The robot that the controller and the reference know.
+    plant
+        What moves.
+    controller
+        None for no torques.
+    t
+        Times of the rows, shape (N+1,), s.
+    reference
+        Joint values, rates and accelerations at these times, shape (N+1, n) each.
+    most
+        Largest torques of the drives, shape (n,).
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        plant: Plant,
+        controller: Controller | None,
+        t: Array,
+        reference: tuple[Array, Array, Array],
+        most: Array,
+    ) -> None:
+        self.description, self.plant, self.controller = description, plant, controller
+        self.t, self.reference, self.most = t, reference, most
+        shape = (len(t), plant.n)
+        self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros(shape) for _ in range(5))
+        self.turnover = 0.0
+
+    @abstractmethod
+    def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
+        """Return the torques that are asked for in row k, shape (n,), and what advances the arm to the next row."""
+
+    def __call__(self, state: State, progress: Progress | None = None) -> SimulationResult:
+        """Return the run from a state on.
+
+        Raises
+        ------
+        SimulationError
+            With the result of all rows so far.
+        """
+        plant, steps = self.plant, len(self.t) - 1
+        edges = sorted({edge for push in plant.pushes for edge in (push.begin, push.end)} | set(self.edges()))
+        first, kept = state, -1
+        try:
+            for k in range(steps + 1):
+                asked, integrator = self.integrator(k, state)
+                tau = integrator.torque(state)
+                phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
+                self.q[k], self.qd[k], self.qdd[k] = state.q, state.qd, phase.qdd
+                self.tau[k], self.tau_asked[k] = tau, asked
+                kept, last = k, state
+                if k == steps:
+                    break
+                stops = self.stops(k, edges)
+                state = advanced(plant, integrator, state, stops[0], phase)
+                for until in stops[1:]:
+                    state = advanced(plant, integrator, state, until)
+                self.turnover += float(np.abs(tau * (state.q - last.q)).sum())
+                if progress is not None and k % PROGRESS_EVERY == PROGRESS_EVERY - 1:
+                    progress(k + 1, steps)
+        except SimulationError as error:
+            error.result = self.result(kept, first, last) if kept >= 0 else None
+            raise
+        return self.result(steps, first, state)
+
+    def edges(self) -> Sequence[float]:
+        """Return times at which torques jump, beside those of the rows."""
+        return ()
+
+    def stops(self, k: int, edges: Sequence[float]) -> list[float]:
+        """Return the times at which integration from row k to the next one pauses, the next row's at the end."""
+        begin, end = self.t[k], self.t[k + 1]
+        return [edge for edge in edges if begin < edge < end] + [float(end)]
+
+    def setpoint(self, k: int) -> Setpoint:
+        """Return what is asked for in row k."""
+        return Setpoint(self.description, *(array[k] for array in self.reference))
+
+    def result(self, k: int, first: State, last: State) -> SimulationResult:
+        """Return the rows up to k."""
+        rows = slice(0, k + 1)
+        recorded = {name: getattr(self, name)[rows] for name in ("t", "q", "qd", "qdd", "tau", "tau_asked")}
+        recorded |= {"reference_q": self.reference[0][rows], "reference_qd": self.reference[1][rows]}
+        return result_of(self.description, self.plant, recorded, first, last, self.turnover, self.controller)
+
+
+class SampledRun(Run):
+    """A controller that is called once a row, and whose torques are held until the next.
+
+    Parameters
+    ----------
+    substeps
+        Steps of Runge and Kutta's method from one row to the next.
+    measuring
+        What the controller sees; the true state unless given.
+    others
+        As for :class:`Run`.
+    """
+
+    def __init__(self, *others: Any, substeps: int = 1, measuring: Measuring | None = None) -> None:
+        super().__init__(*others)
+        self.substeps, self.measuring = substeps, measuring
+        reset(self.controller)
+
+    def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
+        """Return the controller's torques, and an integrator that holds them."""
+        n, t = self.plant.n, float(self.t[k])
+        if self.controller is None:
+            none = np.zeros(n)
+            return none, RungeKutta(self.plant, none)
+        q, qd = (state.q.copy(), state.qd.copy()) if self.measuring is None else self.measuring(state.q, state.qd)
+        asked = torques(called(self.controller, t, q, qd, self.setpoint(k)), n, t)
+        return asked, RungeKutta(self.plant, np.clip(asked, -self.most, self.most))
+
+    def stops(self, k: int, edges: Sequence[float]) -> list[float]:
+        """Return the ends of all steps to the next row."""
+        begin, m = self.t[k], self.substeps
+        between = [float(begin + (self.t[k + 1] - begin) * i / m) for i in range(1, m)]
+        return sorted({*between, *super().stops(k, edges)})
+
+
+class ContinuousRun(Run):
+    """A controller in continuous time: a part of the differential equation, as are its own states.
+
+    Parameters
+    ----------
+    wanted
+        The reference at any time.
+    q0
+        Where the arm begins, shape (n,).
+    tolerance
+        Of a step's error.
+    others
+        As for :class:`Run`.
+    """
+
+    def __init__(self, *others: Any, wanted: Reference, q0: Array, tolerance: float) -> None:
+        super().__init__(*others)
+        self.wanted = wanted
+        self.memory = np.zeros(0)
+        if self.controller is not None:
+            reset(self.controller)
+            self.memory, self._law = continuous_law(self.controller, q0)
+        edges = [*self.edges(), *(edge for push in self.plant.pushes for edge in (push.begin, push.end))]
+        end = float(self.t[-1])
+        inside = sorted(edge for edge in edges if 0 < edge < end)
+        free = self.plant.undisturbed and self.controller is None
+        longest = np.inf if free else LONGEST_STEP
+        self._integrator = DormandPrince(self.plant, self._torques, tolerance, [*inside, end], longest)
+
+    def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
+        """Return the torques at a row, and the integrator of the whole run."""
+        return self._asked(state.t, state.q, state.qd, state.memory)[0], self._integrator
+
+    def edges(self) -> Sequence[float]:
+        """Return the times at which the reference jumps."""
+        return [float(x) for x in getattr(self.wanted, "jumps", ())]
+
+    def _torques(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
+        asked, derivative = self._asked(t, q, qd, memory)
+        return np.clip(asked, -self.most, self.most), derivative
+
+    def _asked(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
+        n = self.plant.n
+        if self.controller is None:
+            return np.zeros(n), self.memory
+        wanted = sampled_reference(self.description, self.wanted, np.array([t]))
+        setpoint = Setpoint(self.description, *(array[0] for array in wanted))
+        returned = called(self._law, t, q.copy(), qd.copy(), setpoint, memory.copy())
+        if not isinstance(returned, tuple) or len(returned) != len(PAIR):
+            raise SimulationError(f"the controller returned {type(returned).__name__} at {t:g} s; expected {PAIR}")
+        asked = torques(returned[0], n, t)
+        derivative = np.asarray(returned[1], dtype=float).reshape(-1)
+        if not np.isfinite(derivative).all():
+            raise SimulationError(f"the controller's states have derivatives that are not finite at {t:g} s")
+        if derivative.shape != self.memory.shape:
+            raise SimulationError(
+                f"the controller's states have {derivative.size} derivatives at {t:g} s; expected {self.memory.size}"
+            )
+        return asked, derivative
+
+
+def result_of(
+    description: Description,
+    plant: Plant,
+    recorded: Mapping[str, Array],
+    first: State,
+    last: State,
+    turnover: float,
+    controller: Controller | None,
+) -> SimulationResult:
+    """Return the result of a run.
+
+    Parameters
+    ----------
+    description
+        The robot that the controller and the reference know.
+    plant
+        What moved.
+    recorded
+        Its rows by the names of :class:`SimulationResult`.
+    first, last
+        The states of the first row and of the last.
+    turnover
+        What the drives gave and took, counted alike, J.
+    controller
+        Whose torques they were.
+    """
+    q = recorded["q"]
+    moving = float(kinetic_energy(plant.description, q, recorded["qd"]).max())
+    audit = EnergyAudit(
+        change=plant.energy(last.q, last.qd) - plant.energy(first.q, first.qd),
+        drives=last.drive_work,
+        pushes=last.push_work,
+        friction=last.friction_work,
+        impacts=last.impact_loss,
+        turnover=turnover + moving,
+    )
+    arrays: dict[str, Any] = dict(recorded)
+    return SimulationResult(
+        description=plant.description,
+        **arrays,
+        audit=audit,
+        reference_poses=_reference_poses(description, plant, recorded["reference_q"]),
+        controller=name_of(controller),
+        saturated=np.mean(recorded["tau"] != recorded["tau_asked"], axis=0),
+    )
+
+
+def _reference_poses(description: Description, plant: Plant, q: Array) -> Array:
+    """Return a reference's poses where those of the arm that moves are others, shape (N+1, 12) or (0, 12)."""
+    known = forward_kinematics(description, q)
+    if np.array_equal(known, forward_kinematics(plant.description, q)):
+        return np.zeros((0, 12))
+    return known[:, :3].reshape(-1, 12)

@@ -1,0 +1,144 @@
+"""The regressor of adaptive control: with rates and reference rates, and in the fewest parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.dynamics.regressor import regressor
+from dhkit.kernels import Kernel, fill, kernel
+from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
+from dhkit.symbolic import velocity_regressor as velocity_regressor_expression
+
+__all__ = ["ParameterGrouping", "parameter_grouping", "velocity_regressor", "velocity_regressor_kernel"]
+
+DEPENDENT = 1e-9
+"""Remainder of a column of unit length, its part along earlier columns taken off, below which it depends on them:
+roundings leave 1e-14."""
+STATES_PER_JOINT = 20
+"""Random states per joint at which dependent columns are looked for: twice as many equations as parameters."""
+
+
+def velocity_regressor(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qd_r: ArrayLike,
+    qdd_r: ArrayLike,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return Y with Y theta + armature qdd_r = M(q) qdd_r + C(q, qd) qd_r + g(q), theta of ``inertial_parameters``.
+
+    C is that of :func:`dhkit.dynamics.coriolis_matrix`. With qd_r = qd and qdd_r = qdd it is the regressor of inverse
+    dynamics, :func:`dhkit.dynamics.regressor` (Slotine & Li, On the Adaptive Control of Robot Manipulators, 1987).
+
+    Parameters
+    ----------
+    description
+        The robot; its links' bodies do not matter.
+    q, qd
+        Joint values and rates, shapes (..., n), rad, m and seconds; batch axes broadcast.
+    qd_r, qdd_r
+        Reference rates and accelerations, likewise.
+    out
+        Where to write, shape (..., n, 10 n), float64, C-contiguous.
+    threads
+        How many threads share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, 10 n); NaN where an input is not finite.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument of another shape, or not numeric; ``out`` does not fit.
+    """
+    named = ((q, "q"), (qd, "qd"), (qd_r, "qd_r"), (qdd_r, "qdd_r"))
+    states = [joint_array(description, x, name) for x, name in named]
+    run, parameters = velocity_regressor_kernel(description)
+    return fill(run, parameters, states, (description.n, 10 * description.n), out, threads)
+
+
+@lru_cache(maxsize=512)
+def velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`velocity_regressor` and an arm's parameters of it."""
+    pattern, parameters = table_pattern(description)
+    numbers = description.numbers
+    gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
+    run = kernel("velocity_regressor", pattern, lambda: _graph(description))
+    return run, np.concatenate([parameters, gravity])
+
+
+def _graph(description: Description) -> Graph:
+    import casadi
+
+    table, parameters = SymbolicTable.parametric(description)
+    gravity = joint_symbols("gravity", 3)
+    states = {name: joint_symbols(name, description.n) for name in ("q", "qd", "qd_r", "qdd_r")}
+    Y = velocity_regressor_expression(table, (gravity[0], gravity[1], gravity[2]), *states.values())
+    return Graph.of("velocity_regressor", {"parameters": casadi.vertcat(parameters, gravity), **states}, {"Y": Y})
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterGrouping:
+    """Base parameters in numbers: the fewest combinations of inertial parameters that the torques depend on.
+
+    With theta of :func:`dhkit.dynamics.inertial_parameters`, Y theta = Y[..., columns] @ (matrix @ theta) for every
+    state: base parameter k is entry ``columns[k]`` of theta plus the multiples of others that cannot be told from it.
+    """
+
+    columns: tuple[int, ...]
+    """Places of the columns of a regressor that are independent, ascending."""
+    matrix: Array
+    """Shape (m, 10 n)."""
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+@lru_cache(maxsize=128)
+def parameter_grouping(description: Description) -> ParameterGrouping:
+    """Return an arm's base parameters from the rank of its regressor at random states.
+
+    Columns are taken one after the other, and kept where they do not depend on those before (Gautier 1991, Numerical
+    calculation of the base inertial parameters of robots): moments first, from the last link to the first, then masses.
+    So a mass is grouped with moments, and what may belong to two links with that nearer to the base.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.dynamics import inertial_parameters
+    >>> arm = library_robot("planar2r")
+    >>> grouping = parameter_grouping(arm)  # of rx, ry and Izz of both links, the masses grouped with them
+    >>> grouping.columns
+    (1, 2, 6, 11, 12, 16)
+    >>> (grouping.matrix @ inertial_parameters(arm)).shape
+    (6,)
+    """
+    n = description.n
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-np.pi, np.pi, (3, STATES_PER_JOINT * n, n))
+    A = regressor(description, *states).reshape(-1, 10 * n)
+    order = [10 * i + k for i in reversed(range(n)) for k in range(1, 10)] + [10 * i for i in reversed(range(n))]
+    basis, kept = np.zeros((len(A), 0)), []
+    floor = DEPENDENT * np.linalg.norm(A, axis=0).max()
+    for k in order:
+        size = np.linalg.norm(A[:, k])
+        if size <= floor:
+            continue
+        rest = A[:, k] / size
+        for _ in range(2):  # the second time takes off what roundings left
+            rest = rest - basis @ (basis.T @ rest)
+        if np.linalg.norm(rest) > DEPENDENT:
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            kept.append(k)
+    columns = tuple(sorted(kept))
+    matrix, *_ = np.linalg.lstsq(A[:, columns], A, rcond=None)
+    return ParameterGrouping(columns, np.asarray(matrix))

@@ -1,0 +1,168 @@
+"""The regressor of M qdd_r + C qd_r + g in the links' inertial parameters, by bilinear Newton-Euler equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dhkit.description import INERTIA_PLACES, Convention
+from dhkit.symbolic.differentiable.frames import SymbolicTable
+from dhkit.symbolic.differentiable.vectors import (
+    Scalar,
+    Vector3,
+    about_x_back,
+    about_z_back,
+    cross,
+    dot,
+    plus,
+    times,
+)
+
+if TYPE_CHECKING:
+    import casadi
+
+__all__ = ["velocity_regressor"]
+
+NOTHING: Vector3 = (0.0, 0.0, 0.0)
+UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def velocity_regressor(
+    table: SymbolicTable, gravity: Vector3, q: casadi.SX, qd: casadi.SX, qd_r: casadi.SX, qdd_r: casadi.SX
+) -> casadi.SX:
+    """Return Y with Y theta = M(q) qdd_r + C(q, qd) qd_r + g(q), n x 10 n, without the drives' inertia.
+
+    What is quadratic in the rates in the regressor of inverse dynamics (Atkeson, An & Hollerbach 1986, eq. 8) is
+    replaced by the symmetric bilinear form of qd and qd_r. That is C(q, qd) qd_r with C of the Christoffel symbols,
+    which are symmetric in the two rates that they are multiplied by.
+
+    Parameters
+    ----------
+    table
+        The arm's frames; base and tool do not enter.
+    gravity
+        Free-fall acceleration in the axes of frame 0, m/s^2.
+    q, qd, qd_r, qdd_r
+        n x 1: joint values, rates, and reference rates and accelerations, rad, m and seconds.
+    """
+    import casadi
+
+    Y = casadi.SX(table.n, 10 * table.n)
+    motion = Motion(NOTHING, NOTHING, NOTHING, times(-1.0, gravity))
+    columns: list[tuple[Vector3, Vector3]] = []
+    for i in range(table.n):
+        step = Step.of(table, i, q[i])
+        motion = step.carried(motion, qd[i], qd_r[i], qdd_r[i])
+        columns = [step.carried_column(column) for column in columns] + [step.own_column]
+        for j, (v, w) in enumerate(columns):
+            Y[j, 10 * i : 10 * i + 10] = casadi.horzcat(*motion.power(v, w))
+    return Y
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A link's angular velocities, and accelerations that are bilinear in the two rates, in its DH frame's axes."""
+
+    w: Vector3
+    """By qd, rad/s."""
+    w_r: Vector3
+    """By qd_r, rad/s."""
+    wd: Vector3
+    """Angular acceleration, rad/s^2."""
+    a: Vector3
+    """Acceleration of the frame's origin less gravity, m/s^2."""
+
+    def swung(self, r: Vector3) -> Vector3:
+        """Return U r, by which a point at r from the origin accelerates against it.
+
+        U = [wd]x + ([w]x [w_r]x + [w_r]x [w]x) / 2.
+        """
+        both = plus(cross(self.w, cross(self.w_r, r)), cross(self.w_r, cross(self.w, r)))
+        return plus(cross(self.wd, r), times(0.5, both))
+
+    def power(self, v: Vector3, w: Vector3) -> list[Scalar]:
+        """Return the power that the link needs to move with v (of its origin) and w, for each of its ten parameters.
+
+        Force m a + U (m c) and moment m c x a + I wd + (w x I w_r + w_r x I w) / 2 about the frame's origin.
+        """
+        first = [dot(v, self.swung(unit)) + dot(w, cross(unit, self.a)) for unit in UNITS]
+        second = []
+        turned, turned_r = cross(w, self.w), cross(w, self.w_r)  # w . (w_i x I w_r) = (w x w_i) . I w_r
+        for i, j in INERTIA_PLACES.values():
+            terms = [_entry(i, j, w, self.wd), 0.5 * _entry(i, j, turned, self.w_r)]
+            second.append(sum([*terms, 0.5 * _entry(i, j, turned_r, self.w)]))
+        return [dot(v, self.a), *first, *second]
+
+
+def _entry(i: int, j: int, a: Vector3, b: Vector3) -> Scalar:
+    """Return the coefficient of the tensor's entry (i, j) in a . I b."""
+    return a[i] * b[j] if i == j else a[i] * b[j] + a[j] * b[i]
+
+
+@dataclass(frozen=True)
+class Step:
+    """From one DH frame to the next, in the axes of the next."""
+
+    prismatic: bool
+    standard: bool
+    alpha: tuple[Scalar, Scalar]
+    """Cosine and sine of the twist."""
+    theta: tuple[Scalar, Scalar]
+    """Cosine and sine of the joint's angle."""
+    lever: Vector3
+    """From the frame before to this one, m."""
+    axis: Vector3
+    """The joint's axis."""
+
+    @classmethod
+    def of(cls, table: SymbolicTable, i: int, q: Scalar) -> Step:
+        import casadi
+
+        a, d, cos_alpha, sin_alpha, c, s = table.rows[i]
+        if table.prismatic[i]:
+            d = d + q
+        else:
+            cos_q, sin_q = casadi.cos(q), casadi.sin(q)
+            c, s = cos_q * c - sin_q * s, sin_q * c + cos_q * s
+        standard = table.convention is Convention.STANDARD
+        lever: Vector3 = (a, sin_alpha * d, cos_alpha * d) if standard else (a * c, -a * s, d)
+        axis: Vector3 = (0.0, sin_alpha, cos_alpha) if standard else (0.0, 0.0, 1.0)
+        return cls(table.prismatic[i], standard, (cos_alpha, sin_alpha), (c, s), lever, axis)
+
+    def turned(self, x: Vector3) -> Vector3:
+        """Return a vector of the frame before in this one's axes."""
+        if self.standard:
+            return about_x_back(*self.alpha, about_z_back(*self.theta, x))
+        return about_z_back(*self.theta, about_x_back(*self.alpha, x))
+
+    @property
+    def own_column(self) -> tuple[Vector3, Vector3]:
+        """The joint's own column of the Jacobian: velocity of the next frame's origin, and angular velocity."""
+        if self.prismatic:
+            return self.axis, NOTHING
+        # In the modified convention the frame's origin lies on the axis.
+        return (cross(self.axis, self.lever) if self.standard else NOTHING), self.axis
+
+    def carried_column(self, column: tuple[Vector3, Vector3]) -> tuple[Vector3, Vector3]:
+        """Return an earlier joint's column for this frame."""
+        v, w = self.turned(column[0]), self.turned(column[1])
+        return plus(v, cross(w, self.lever)), w
+
+    def carried(self, before: Motion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> Motion:
+        """Return this link's motion from that of the link before and the joint's rates."""
+        motion = Motion(*(self.turned(x) for x in (before.w, before.w_r, before.wd, before.a)))
+        # v w_r x z + v_r w x z: twice the bilinear form of v w x z.
+        turning = plus(times(v, cross(motion.w_r, self.axis)), times(v_r, cross(motion.w, self.axis)))
+        driven = times(dv_r, self.axis)
+        if self.prismatic:
+            a = plus(plus(motion.a, motion.swung(self.lever)), plus(turning, driven))
+            return Motion(motion.w, motion.w_r, motion.wd, a)
+        after = Motion(
+            plus(motion.w, times(v, self.axis)),
+            plus(motion.w_r, times(v_r, self.axis)),
+            plus(motion.wd, plus(times(0.5, turning), driven)),
+            motion.a,
+        )
+        # The lever turns with this link in the standard convention, with the link before in the modified one.
+        swung = (after if self.standard else motion).swung(self.lever)
+        return Motion(after.w, after.w_r, after.wd, plus(after.a, swung))

@@ -1,0 +1,146 @@
+"""What a file of dhkit says about itself: its kind and its robot, in an archive's texts or a table's first comments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dhkit.description import Description, from_toml, library_robot, robots, to_toml
+from dhkit.description.files import read_bounded
+from dhkit.errors import DescriptionError
+
+__all__ = ["TEXTS", "FileKind", "checked_suffix", "decoded"]
+
+TEXTS = ("format", "robot", "digest", "toml")
+"""Names of an archive's texts: its kind and version, the robot's name, its digest and its whole file."""
+LABEL_LENGTH = 1000
+"""Characters in which a table's first two lines are searched."""
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of file that dhkit writes for one robot."""
+
+    noun: str
+    """What the file holds, in messages, such as ``trajectory``."""
+    arrays: tuple[str, ...]
+    """Names of an archive's arrays of numbers."""
+    most: int
+    """Bytes that are read of a file, and that its content may take unpacked."""
+    otherwise: str = ""
+    """What reads a table that does not name its robot, for messages."""
+
+    @property
+    def title(self) -> str:
+        """First comment of a table."""
+        return f"dhkit {self.noun}"
+
+    @property
+    def version(self) -> str:
+        """An archive's text ``format``."""
+        return f"{self.title} 1"
+
+    def read(self, path: Path, known: tuple[str, ...]) -> tuple[str, bytes]:
+        """Return a file's suffix, one of the known ones, and its bytes.
+
+        Raises
+        ------
+        DescriptionError
+            Another suffix, or a file that cannot be read or is too long.
+        """
+        try:
+            suffix = checked_suffix(path, known)
+        except ValueError as error:
+            raise DescriptionError(str(error)) from None
+        return suffix, read_bounded(path, self.most, f"a {self.noun}")
+
+    def archived(self, description: Description, arrays: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what an archive holds: the robot as texts, and arrays by name."""
+        texts = (self.version, description.name, description.digest, to_toml(description))
+        return dict(zip(TEXTS, texts, strict=True)) | dict(arrays)
+
+    def robot_of_archive(self, values: Mapping[str, Any], description: Description | None) -> Description:
+        """Return the robot of an archive: the one given, the library's where it is equal, or the archive's own.
+
+        Raises
+        ------
+        DescriptionError
+            Another kind or version of file, a robot that does not fit its name and digest, or another than the given.
+        """
+        if values["format"] != self.version:
+            raise DescriptionError(f"format is {values['format'][:40]!r}; expected {self.version!r}")
+        own = from_toml(values["toml"], file="its robot")
+        if own.digest != values["digest"] or own.name != values["robot"]:
+            raise DescriptionError(f"its robot is not the {values['robot'][:40]!r} that it names; the file is damaged")
+        if description is not None:
+            return self._same_robot(own.name, own.digest, description)
+        # The library's robot knows where its meshes are.
+        return library_robot(own.name) if _in_library(own.name, own.digest) else own
+
+    def comments(self, description: Description) -> tuple[str, str]:
+        """Return a table's first two comments."""
+        return self.title, f"robot: {description.name} {description.digest}"
+
+    def robot_of_table(self, text: str, description: Description | None) -> Description:
+        """Return the robot that a table's first two comments name: the one given, or the library's.
+
+        Raises
+        ------
+        DescriptionError
+            Other comments, another robot than the given, or none given and one that the library does not have.
+        """
+        lines = text[:LABEL_LENGTH].splitlines()[:2]
+        words = lines[1].removeprefix("# robot: ").split() if len(lines) == 2 else []
+        if not lines or lines[0] != f"# {self.title}" or len(words) != 2 or not lines[1].startswith("# robot: "):
+            raise DescriptionError(f"does not begin with '# {self.title}' and '# robot: NAME DIGEST'{self.otherwise}")
+        name, digest = words
+        if description is not None:
+            return self._same_robot(name, digest, description)
+        if not _in_library(name, digest):
+            raise DescriptionError(
+                f"its robot {name[:40]} ({digest[:12]}) is not the library's; give the robot, or a file of .npz, which"
+                " holds it"
+            )
+        return library_robot(name)
+
+    def _same_robot(self, name: str, digest: str, description: Description) -> Description:
+        if description.digest != digest:
+            raise DescriptionError(
+                f"a {self.noun} of {name[:40]} ({digest[:12]}); expected one of {description.name}"
+                f" ({description.digest})"
+            )
+        return description
+
+
+def checked_suffix(path: Path, known: tuple[str, ...]) -> str:
+    """Return a path's suffix in small letters.
+
+    Raises
+    ------
+    ValueError
+        None of the known ones.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in known:
+        raise ValueError(f"{path}: found suffix {path.suffix!r}; expected one of {', '.join(known)}")
+    return suffix
+
+
+def decoded(content: bytes) -> str:
+    """Return a file's text.
+
+    Raises
+    ------
+    DescriptionError
+        Not UTF-8; names the byte.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DescriptionError(f"byte {error.start} is not UTF-8; expected text") from None
+
+
+def _in_library(name: str, digest: str) -> bool:
+    return name in robots() and library_robot(name).digest == digest
