@@ -51,17 +51,20 @@ check: $(CHECK_READY)  ## ruff, mypy --strict, import order
 accept: $(TEST_READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
 
-bench: $(BENCH_READY)  ## kinematics and dynamics beside their peers; writes benchmarks/results/
+bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside peers; writes benchmarks/results/
 	$(BIN)/python benchmarks/kinematics.py $(ARGS)
 	$(BIN)/python benchmarks/dynamics.py $(ARGS)
 	$(BIN)/python benchmarks/planning.py
+	$(BIN)/python benchmarks/control.py
 
 $(BENCH_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
 	@touch $@
 
-assets: $(READY)  ## generate urdf/ and meshes/ anew
+assets: $(READY)  ## generate urdf/, meshes/, the tables of docs/control.md and the pictures of docs/lab.md anew
 	$(BIN)/python -m dhkit.model.assets
+	$(BIN)/python benchmarks/controllers.py
+	$(BIN)/python docs/screenshots.py
 
 lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	$(PYTHON) -m venv $(VENV)-lowest

@@ -59,6 +59,14 @@ def test_importing_dhkit_imports_nothing_heavy():
     assert done.stdout.strip() == "[]", done
 
 
+def test_the_lab_is_imported_when_it_is_first_used():
+    done = run(
+        "import sys, dhkit; before = 'dhkit.lab' in sys.modules;"
+        "print(before, dhkit.lab.serve.__name__, 'tornado' in sys.modules)"
+    )
+    assert done.stdout.split() == ["False", "serve", "False"], done
+
+
 def test_importing_dhkit_takes_no_time(law):
     seconds = []
     for _ in range(max(3, law.samples(20))):

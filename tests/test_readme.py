@@ -19,12 +19,19 @@ FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 )
 def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
+    if command.startswith("lab"):
+        monkeypatch.setattr("dhkit.cli.browser.time.sleep", press_ctrl_c)
     (tmp_path / "answer.toml").write_text(
         'robot = "planar2r"\n[answer]\nV = "m1*g*l1*s1/2 + m2*g*(l1*s1 + l2*s12/2)"\n'
     )
     with pytest.raises(SystemExit) as exit:
         main(shlex.split(command))
     assert exit.value.code == 0, capsys.readouterr()
+
+
+def press_ctrl_c(seconds):
+    raise KeyboardInterrupt
 
 
 def test_there_are_commands_and_a_file_to_run():

@@ -15,7 +15,7 @@ from dhkit.description import Array, Description, DHTable, Named
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
-    from dhkit.control import Controller, Push, Reference, SimulationResult
+    from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
     from dhkit.description.table import Quantity
     from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
@@ -370,21 +370,23 @@ class Arm:
         duration: float | None = None,
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
-        rate: float = 1000.0,
+        rate: float | None = 1000.0,
         plant: Arm | None = None,
         plant_rate: float | None = None,
         *,
         friction: bool | Friction = False,
         restitution: float | None = 0.0,
         pushes: Sequence[Push] = (),
+        sensors: Sensors | None = None,
         saturation: bool = True,
+        tolerance: float = 1e-13,
         progress: Callable[[int, int], None] | None = None,
     ) -> SimulationResult:
         """Return how the arm moves under a controller; see :func:`dhkit.control.simulate`.
 
         Parameters
         ----------
-        controller, reference, duration, q0, qd0, rate, plant_rate, saturation, progress
+        controller, reference, duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance, progress
             As there.
         plant
             The arm that moves, where it differs from this one: another payload, other parameters, the same joints.
@@ -398,7 +400,7 @@ class Arm:
         from dhkit.control import Plant, simulate
         from dhkit.dynamics import Friction
 
-        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, tuple(pushes))
+        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, _listed(pushes))
         return simulate(
             self._description,
             controller,
@@ -409,9 +411,90 @@ class Arm:
             rate,
             moved,
             plant_rate,
+            sensors=sensors,
             saturation=saturation,
+            tolerance=tolerance,
             progress=progress,
         )
+
+    def simulate_batch(
+        self,
+        controller: Controller | None = None,
+        reference: Reference | Trajectory | ArrayLike | None = None,
+        duration: float | None = None,
+        q0: ArrayLike | None = None,
+        qd0: ArrayLike | None = None,
+        rate: float = 1000.0,
+        plant: Arm | Sequence[Arm] | None = None,
+        plant_rate: float | None = None,
+        *,
+        friction: bool | Friction | None = None,
+        keep: str = "errors",
+        sensors: Sensors | None = None,
+        saturation: bool = True,
+        threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> BatchResult:
+        """Return how many arms move, their states advanced together; see :func:`dhkit.control.simulate_batch`.
+
+        Parameters
+        ----------
+        plant
+            The arm that moves, or one for each run: other payloads, other parameters, the same joints.
+        controller, reference, duration, q0, qd0, rate, plant_rate, friction, keep, sensors, saturation
+            As there.
+        threads, progress
+            As there.
+        """
+        from dhkit.control import simulate_batch
+
+        arms = () if plant is None else [plant] if isinstance(plant, Arm) else plant
+        return simulate_batch(
+            self._description,
+            controller,
+            reference,
+            duration,
+            q0,
+            qd0,
+            rate,
+            [arm.description for arm in arms],
+            plant_rate,
+            friction=friction,
+            keep=keep,
+            sensors=sensors,
+            saturation=saturation,
+            threads=threads,
+            progress=progress,
+        )
+
+    def compare(
+        self,
+        reference: Reference | Trajectory,
+        controllers: Sequence[str] | Mapping[str, Any] | None = None,
+        bandwidth: float = 20.0,
+        damping: float = 1.0,
+        plant: Arm | None = None,
+        *,
+        friction: bool | Friction = False,
+        restitution: float | None = 0.0,
+        pushes: Sequence[Push] = (),
+        **options: Any,
+    ) -> Comparison:
+        """Return how controllers follow a motion, all of dhkit's or chosen ones; see :func:`dhkit.control.compare`.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> motion = arm.quintic([0.0, 0.5], [1.0, 1.0], duration=1.0)
+        >>> print(arm.compare(motion, ("pid", "computed-torque"), plant=arm.with_payload(0.2)))  # doctest: +ELLIPSIS
+        controller       largest error [rad] ...
+        """
+        from dhkit.control import CONTROLLERS, Plant, compare
+        from dhkit.dynamics import Friction
+
+        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, _listed(pushes))
+        chosen = tuple(CONTROLLERS) if controllers is None else controllers
+        return compare(self._description, reference, chosen, bandwidth, damping, plant=moved, **options)
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return A (2n, 2n) and B (2n, n) of the arm near a state; see :func:`dhkit.control.linearize`."""
@@ -690,3 +773,10 @@ class Arm:
 
     def _repr_html_(self) -> str:
         return f"<b>{self.name}</b>{self.dh._repr_html_()}"
+
+
+def _listed(pushes: Sequence[Push]) -> tuple[Push, ...]:
+    """Return pushes as a tuple, one alone too."""
+    from dhkit.control import Push
+
+    return (pushes,) if isinstance(pushes, Push) else tuple(pushes)

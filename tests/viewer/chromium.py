@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 import time
 import urllib.request
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,19 @@ FLAGS = [
 ]
 START_TIMEOUT = 30.0
 TIMEOUT = 20.0
+KEY_CODES = {
+    "Tab": 9,
+    "Enter": 13,
+    "Escape": 27,
+    " ": 32,
+    "End": 35,
+    "Home": 36,
+    "ArrowLeft": 37,
+    "ArrowUp": 38,
+    "ArrowRight": 39,
+    "ArrowDown": 40,
+}
+"""Windows' codes of keys, by which Chromium knows what a key does."""
 
 
 def require_chromium() -> None:
@@ -177,11 +191,63 @@ class Page:
         """Wait until two more pictures have been drawn."""
         self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
-    def press(self, key: str) -> None:
-        """Press and release a key."""
-        text = {"text": key} if len(key) == 1 else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+    def press(self, key: str, modifiers: int = 0) -> None:
+        """Press and release a key; modifiers: 1 Alt, 2 Control, 8 Shift."""
+        about: dict[str, object] = {"key": key, "modifiers": modifiers}
+        if key in KEY_CODES:
+            about |= {"code": key, "windowsVirtualKeyCode": KEY_CODES[key]}
+        if key == "Enter":
+            about["text"] = "\r"
+        elif len(key) == 1:
+            about["text"] = key
+        self.call("Input.dispatchKeyEvent", type="keyDown", **about)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **{k: v for k, v in about.items() if k != "text"})
+
+    def write(self, text: str) -> None:
+        """Replace the text of the focused field, key by key, and press Enter."""
+        self.call("Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"])
+        for letter in text:
+            self.press(letter)
+        self.press("Enter")
+
+    def centre(self, element: str) -> tuple[float, float]:
+        """Return the middle of an element, a JavaScript expression, scrolled into view; px."""
+        x, y = self.evaluate(  # type: ignore[misc]
+            f"(e => {{ e.scrollIntoView({{block: 'nearest'}}); const box = e.getBoundingClientRect();"
+            f" return [box.left + box.width / 2, box.top + box.height / 2]; }})({element})"
+        )
+        return x, y
+
+    def mouse(self, kind: str, x: float, y: float, *, down: bool = False) -> None:
+        """Move, press or release the mouse."""
+        button = "none" if kind == "mouseMoved" and not down else "left"
+        count = 0 if kind == "mouseMoved" else 1
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(down), clickCount=count)
+
+    def click(self, element: str) -> None:
+        """Click on an element, a JavaScript expression, with the mouse."""
+        x, y = self.centre(element)
+        self.mouse("mouseMoved", x, y)
+        self.mouse("mousePressed", x, y, down=True)
+        self.mouse("mouseReleased", x, y)
+
+    def drag(self, places: Sequence[tuple[float, float]]) -> None:
+        """Press the mouse at the first place, move it over the others, and release it at the last."""
+        self.mouse("mouseMoved", *places[0])
+        self.mouse("mousePressed", *places[0], down=True)
+        for place in places[1:]:
+            self.mouse("mouseMoved", *place, down=True)
+        self.mouse("mouseReleased", *places[-1])
+
+    def choose(self, element: str, value: str) -> None:
+        """Choose an option of a list, a JavaScript expression, by the keyboard."""
+        self.evaluate(f"{element}.focus()")
+        here, there = self.evaluate(  # type: ignore[misc]
+            f"(e => [e.selectedIndex, [...e.options].findIndex(o => o.value === {json.dumps(value)})])({element})"
+        )
+        assert there >= 0, f"{element} has no option {value}"
+        for _ in range(abs(there - here)):
+            self.press("ArrowDown" if there > here else "ArrowUp")
 
     def screenshot(self, file: Path | None = None) -> np.ndarray:
         """Return the picture, shape (height, width, 3), 0 to 255; write it as PNG if a file is given."""

@@ -1,6 +1,7 @@
 """The page in a headless Chromium: it shows the arm, where it should be, offline and live, and serves a person."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from dhkit.viewer.drawables import part_transform
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.protocol import encode_pose, encode_scene
 from dhkit.viewer.scene import build_scene, node_transforms
+from simulation_results import swinging
 from viewer.pictures import MINIMUM, centre, green, orange, shows_the_arm
 from viewer.test_view import motion
 
@@ -343,21 +345,26 @@ def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
     assert page.errors == []
 
 
+def check_copies(page, layer, transforms):
+    """Check that a layer's copies of the nodes stand where transforms, shape (..., n + 2, 4, 4), have them."""
+    copies = page.evaluate(
+        f"dhkit.stage.overlays.layers.{layer}.group.children"
+        ".map(copy => { copy.updateMatrixWorld(true); return copy.matrixWorld.elements; })"
+    )
+    in_view = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    expected = transforms[..., 1:, :, :].reshape(-1, 4, 4)  # without the base
+    assert len(copies) == len(expected)
+    for copy, T in zip(copies, expected, strict=True):
+        assert np.abs(np.reshape(copy, (4, 4)).T - in_view @ T).max() < FLOAT32
+
+
 def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(page, signal_arm):
     with View(signal_arm) as view:
         view.show(STATES[0])
         page.open(view.url)
         view.ghosts([STATES[1], STATES[2]], BLUE)
         view.wait()
-        copies = page.evaluate(
-            "dhkit.stage.overlays.layers.ghosts.group.children"
-            ".map(copy => { copy.updateMatrixWorld(true); return copy.matrixWorld.elements; })"
-        )
-        in_view = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-        expected = node_transforms(signal_arm, [STATES[1], STATES[2]])[:, 1:].reshape(-1, 4, 4)  # without the base
-        assert len(copies) == len(expected)
-        for copy, T in zip(copies, expected, strict=True):
-            assert np.abs(np.reshape(copy, (4, 4)).T - in_view @ T).max() < FLOAT32
+        check_copies(page, "ghosts", node_transforms(signal_arm, [STATES[1], STATES[2]]))
         picture = page.screenshot()
         assert shows_the_arm(picture)
         check_tool(page, picture, signal_arm, STATES[0])
@@ -372,6 +379,78 @@ def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(page, signal
         check_tool(page, page.screenshot(), signal_arm, STATES[2])
         assert page.evaluate("dhkit.stage.overlays.empty") is True
         assert page.errors == []
+
+
+def apart(arm, seconds=3.0):
+    """Return a result whose reference is far from its motion; both are straight lines between joint values."""
+    result = swinging(arm, states=31, seconds=seconds)
+    share = (result.t / seconds)[:, None]
+    wanted = np.array([0.4, 0.2]) + share * np.array([-1.3, 0.7])
+    return replace(result, q=wanted + np.array([0.5, -0.6]), reference_q=wanted)
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_a_simulation_plays_with_its_reference_as_a_ghost(page, signal_arm, tmp_path, live):
+    result = apart(signal_arm)
+    with View(signal_arm) as view:
+        view.play(result)
+        if live:
+            page.open(view.url)
+        else:
+            open_offline(page, view, tmp_path)
+        page.until("dhkit.player.time > 0.1")
+        page.press(" ")
+        tools = []
+        for time_ in (0.0, 1.2, 3.0):
+            page.evaluate(f"dhkit.player.seek({time_})")
+            picture = page.screenshot()
+            share = time_ / 3.0
+            q, wanted = ((1 - share) * states[0] + share * states[-1] for states in (result.q, result.reference_q))
+            check_copies(page, "companion", node_transforms(signal_arm, wanted))
+            check_tool(page, picture, signal_arm, q)
+            tools.append(projected(page, world_to_tool(signal_arm, wanted)[:3, 3]))
+            r, g, b = picture[int(tools[-1][1]), int(tools[-1][0])]
+            assert b > r + 15  # a bluish ball at the ghost's tool
+            assert b > g
+            assert ((tools[-1] > 0) & (tools[-1] < (900, 700))).all()
+        assert np.linalg.norm(tools[-1] - tools[0]) > 50  # px
+        page.press("o")
+        assert page.evaluate("dhkit.stage.overlays.layers.companion.group.visible") is False
+        assert page.errors == []
+
+
+def test_the_ghost_of_a_simulation_goes_with_it(page, signal_arm):
+    with View(signal_arm) as view:
+        page.open(view.url)
+        for replay in (lambda: view.play(([0, 1], STATES[:2])), lambda: view.show(STATES[0])):
+            view.play(apart(signal_arm))
+            view.wait()
+            assert page.evaluate("dhkit.stage.overlays.layers.companion.group.children.length") == 3
+            assert page.evaluate("document.getElementById('overlays').hidden") is False
+            replay()
+            view.wait()
+            assert page.evaluate("dhkit.stage.overlays.layers.companion.group.children.length") == 0
+            assert page.evaluate("document.getElementById('overlays').hidden") is True
+        check_tool(page, page.screenshot(), signal_arm, STATES[0])
+        assert page.errors == []
+
+
+def test_a_ghost_behind_the_arm_does_not_flicker_through_it(page, signal_arm, tmp_path):
+    view = View(signal_arm)
+    close = replace(apart(signal_arm), reference_q=apart(signal_arm).q + 1e-6)
+    view.play((close.t, close.q), trace=False)
+    open_offline(page, view, tmp_path)
+    page.press(" ")
+    page.evaluate("dhkit.player.seek(1)")
+    alone = page.screenshot()[BETWEEN_PANELS]
+    view.play(close, trace=False)
+    open_offline(page, view, tmp_path)
+    page.press(" ")
+    page.evaluate("dhkit.player.seek(1)")
+    beside = page.screenshot()[BETWEEN_PANELS]
+    arm = green(alone)
+    changed = (np.abs(beside - alone).max(axis=-1) > 10) & arm
+    assert changed.sum() < 0.03 * arm.sum()  # on the outline
 
 
 def test_obstacles_stand_where_they_are_and_their_sizes_are_true(page, signal_arm, tmp_path):

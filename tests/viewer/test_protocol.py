@@ -12,7 +12,9 @@ from dhkit.description import library_robot
 from dhkit.model.shapes import link_parts
 from dhkit.viewer import protocol
 from dhkit.viewer.protocol import MessageType, ProtocolError
+from dhkit.viewer.requests import Request, Shown, decode_message
 from dhkit.viewer.scene import build_scene
+from dhkit.viewer.streams import MOST_FLOATS, Samples, decode_samples, decode_state, encode_state
 
 number = st.floats(-1e3, 1e3, width=32)
 joints = st.integers(1, 9)
@@ -33,11 +35,17 @@ def test_a_pose_comes_back(data, n, time):
     assert (header.type, header.joints, header.sequence, header.time) == (MessageType.POSE, n, 0, time)
 
 
-@given(st.data(), joints, st.integers(1, 5), st.booleans())
-def test_an_animation_comes_back(data, n, count, trace):
+@given(st.data(), joints, st.integers(1, 5), st.booleans(), st.booleans())
+def test_an_animation_comes_back(data, n, count, trace, accompanied):
     times = np.sort(data.draw(arrays(float, count, elements=st.floats(0, 1e5))))
     q, T = drawn(data.draw, count, n), drawn(data.draw, count, n + 2, 4, 4)
-    back = protocol.decode_animation(protocol.encode_animation(times, q, T, trace=trace))
+    ghost = (drawn(data.draw, count, n + 2, 4, 4), np.array([1, 2, 3], dtype=np.uint8)) if accompanied else None
+    message = protocol.encode_animation(times, q, T, trace=trace, ghost=ghost)
+    back = protocol.decode_animation(message)
+    assert (back.ghost is not None) == accompanied
+    if ghost is not None:
+        assert np.array_equal(back.ghost, ghost[0][:, :, :3])
+        assert message.endswith(b"\x01\x02\x03")
     assert np.array_equal(back.times, times)
     assert np.array_equal(back.q, q)
     assert np.array_equal(back.transforms, T[:, :, :3])
@@ -121,7 +129,7 @@ def test_a_message_of_another_kind_is_named():
 
 @given(st.integers(0, 2**32 - 1))
 def test_an_acknowledgement_is_read(sequence):
-    assert protocol.decode_shown(f'{{"type": "shown", "sequence": {sequence}}}') == sequence
+    assert decode_message(f'{{"type": "shown", "sequence": {sequence}}}') == Shown(sequence)
 
 
 @pytest.mark.parametrize(
@@ -130,18 +138,42 @@ def test_an_acknowledgement_is_read(sequence):
         ("{", "no JSON"),
         (b"\xff", "no JSON"),
         ("[" * 100_000, "no JSON"),
-        ("[1]", "type is 'list'"),
-        ('{"type": "eval"}', "type is 'eval'; expected 'shown'"),
+        ("[1]", "message is list; expected an object"),
+        ("NaN", "no JSON"),
+        ('{"type": "eval"}', "type is 'eval'; expected 'shown' or 'request'"),
         ('{"type": "shown"}', "sequence is None"),
         ('{"type": "shown", "sequence": true}', "sequence is True"),
         ('{"type": "shown", "sequence": -1}', "sequence is -1"),
         ('{"type": "shown", "sequence": 1.0}', "sequence is 1.0"),
+        ('{"type": "request", "name": "x"}', "id is None"),
+        ('{"type": "request", "id": 0, "name": "x"}', "id is 0; expected a whole number from 1"),
+        ('{"type": "request", "id": 1, "name": 2}', "name is '2'"),
+        ('{"type": "request", "id": 1, "name": ""}', "name is ''"),
+        (f'{{"type": "request", "id": 1, "name": "{"x" * 41}"}}', "expected the name of a request"),
+        ('{"type": "request", "id": 1, "name": "x", "data": [1]}', "data is list"),
+        ('{"type": "request", "id": 1, "name": "x", "data": {"q": [NaN]}}', "no JSON"),
+        ('{"type": "request", "id": 1, "name": "x", "data": {"q": [[[[[[[1]]]]]]]}}', "nested 6 levels at most"),
     ],
 )
-def test_what_is_no_acknowledgement_is_named(text, complaint):
+def test_what_is_no_message_is_named(text, complaint):
     with pytest.raises(ProtocolError, match=complaint):
-        protocol.decode_shown(text)
+        decode_message(text)
 
 
 def test_header_is_sixteen_bytes_little_endian():
     assert protocol.stamped(protocol.encode_trace(np.zeros((0, 3))), 7) == struct.pack("<BBHId", 4, 0, 0, 7, 0.0)
+
+
+def test_requests_states_and_samples_come_back():
+    text = '{"type": "request", "id": 3, "name": "joints.set", "data": {"q": [0.5, 1]}}'
+    assert decode_message(text) == Request(3, "joints.set", {"q": [0.5, 1]})
+    assert decode_state(encode_state("arm", {"name": "<b>ä", "n": 2})) == ("arm", {"name": "<b>ä", "n": 2})
+    first = Samples("control", ("t", "e1"), np.arange(6, dtype=np.float32).reshape(3, 2), restart=True)
+    both = first.followed_by(Samples("control", ("t", "e1"), np.ones((1, 2), np.float32)))
+    found = decode_samples(both.encoded())
+    assert (found.name, found.columns, found.restart, found.rows.shape) == ("control", ("t", "e1"), True, (4, 2))
+    assert np.array_equal(found.rows, both.rows)
+    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((MOST_FLOATS, 2), np.float32)))
+    assert many.rows.size == MOST_FLOATS
+    anew = both.followed_by(Samples("control", ("t", "e1", "e2"), np.zeros((1, 3), np.float32)))
+    assert anew.restart and anew.rows.shape == (1, 3)

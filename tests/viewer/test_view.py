@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from dhkit.description import from_dh, library_robot, pose
-from dhkit.errors import ModelError
+from dhkit.description import from_dh, library_robot, pose, with_payload
+from dhkit.errors import DescriptionError, ModelError
 from dhkit.kinematics.manipulability import force_ellipsoid, velocity_ellipsoid
 from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
@@ -23,6 +23,7 @@ from dhkit.viewer.protocol import (
 )
 from dhkit.viewer.scene import node_transforms, scene_size
 from dhkit.viewer.session import Slot
+from simulation_results import swinging
 
 FLOAT32 = 1e-6
 TABLE_DRAWN = 1_500_000  # bytes
@@ -49,6 +50,38 @@ def test_what_is_sent_is_the_kinematics(name):
     assert np.abs(played.transforms - node_transforms(arm, played.q)[:, :, :3]).max() < 2 * FLOAT32
     assert played.times[-1] == times[-1]
     assert played.trace
+
+
+@pytest.mark.parametrize("name", ["planar2r", "stanford", "panda"])
+def test_a_simulation_plays_with_its_reference_as_a_ghost(name):
+    arm = library_robot(name)
+    result = swinging(arm, error=0.3)
+    with View(arm) as view:
+        view.play(result, trace=False)
+        played = decode_animation(view._state[Slot.MOTION])
+        view.play((result.t, result.q))
+        alone = decode_animation(view._state[Slot.MOTION])
+    assert played.times[-1] == result.t[-1]
+    assert not played.trace
+    assert np.array_equal(played.q, alone.q)
+    assert np.array_equal(played.transforms, alone.transforms)
+    assert alone.ghost is None
+    between = np.stack([np.interp(played.times, result.t, column) for column in result.reference_q.T], axis=1)
+    assert np.abs(played.ghost - node_transforms(arm, between)[:, :, :3]).max() < 2 * FLOAT32
+    assert np.abs(played.ghost - played.transforms).max() > 0.05
+
+
+def test_a_simulation_of_the_arm_with_a_payload_plays_and_one_of_another_arm_does_not():
+    arm = library_robot("puma560")
+    loaded = swinging(with_payload(arm, 2.5))
+    with View(arm) as view:
+        view.play(loaded)
+        assert decode_animation(view._state[Slot.MOTION]).ghost is not None
+        for other in ("planar2r", "ur5"):
+            with pytest.raises(DescriptionError, match=rf"simulation is one of {other} .*; expected one of puma560"):
+                view.play(swinging(library_robot(other)))
+        with pytest.raises(ValueError, match=r"times has shape \(1,\); expected \(N,\) with N >= 2"):
+            view.play(swinging(arm, states=1))
 
 
 def test_a_view_begins_ready():

@@ -257,6 +257,189 @@ def plan(
     return plan_command.run(task, files, line=line, degrees=degrees, json=json)
 
 
+MOTION_WORDS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
+Motion = Annotated[
+    Path | None, typer.Option("--motion", help="Follow it: .npz, .mat, .csv or .yaml of dhkit or from elsewhere.")
+]
+Columns = Annotated[
+    str | None, typer.Option("--columns", metavar="OURS=THEIRS ...", help='Of such a file: "t=tout q=yout".')
+]
+Start = Annotated[
+    str | None, typer.Option("--from", metavar="Q ...", help="Or go from here, joint values or a configuration's name,")
+]
+Goal = Annotated[str | None, typer.Option("--to", metavar="Q ...", help="to here.")]
+Duration = Annotated[float | None, typer.Option(help="s, of a motion between configurations.")]
+Bandwidth = Annotated[float, typer.Option(help="Of the controller, rad/s.")]
+Damping = Annotated[float, typer.Option(help="Of the controller.")]
+Rate = Annotated[float, typer.Option(help="Calls of the controller, Hz.")]
+PlantRate = Annotated[float | None, typer.Option(help="Steps of the integration, Hz; those of the controller.")]
+Load = Annotated[
+    str | None,
+    typer.Option("--payload", metavar="KG [@ X Y Z]", help="What it carries, centre of mass in the tool's frame, m."),
+]
+Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller does not know of the payload.")]
+FrictionOption = Annotated[
+    str,
+    typer.Option("--friction", metavar="none|stiction|WIDTH", help="Of the joints; WIDTH of smooth one, rad/s."),
+]
+Restitution = Annotated[float, typer.Option(help="Of the joint stops, 0 to 1.")]
+NoStops = Annotated[bool, typer.Option("--no-stops", help="Joints pass their limits.")]
+PushOption = Annotated[
+    list[str] | None,
+    typer.Option("--push", metavar="FX FY FZ @ BEGIN END", help="A force on the tool, N, world axes, over a time, s."),
+]
+
+
+@app.command(cls=gathering(MOTION_WORDS))
+def simulate(
+    robot: Robot,
+    controller: Annotated[
+        str,
+        typer.Option(
+            help="pd, pid, pd-gravity, feed-forward, computed-torque, operational-space, adaptive, lqr, none."
+        ),
+    ] = "computed-torque",
+    motion: Motion = None,
+    columns: Columns = None,
+    start: Start = None,
+    to: Goal = None,
+    duration: Duration = None,
+    bandwidth: Bandwidth = 20.0,
+    damping: Damping = 1.0,
+    rate: Rate = 1000.0,
+    plant_rate: PlantRate = None,
+    continuous: Annotated[bool, typer.Option("--continuous", help="A controller in continuous time.")] = False,
+    load: Load = None,
+    unmodelled: Unmodelled = False,
+    friction: FrictionOption = "none",
+    compensate: Annotated[bool, typer.Option("--compensate", help="The controller compensates friction.")] = False,
+    restitution: Restitution = 0.0,
+    no_stops: NoStops = False,
+    push: PushOption = None,
+    noise: Annotated[float, typer.Option(min=0, help="Standard deviation of measured joint values, rad and m.")] = 0.0,
+    resolution: Annotated[float, typer.Option(min=0, help="Of the encoders, on the joints' side, rad and m.")] = 0.0,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    json: Json = False,
+) -> int:
+    """Simulate an arm under a controller; exit status 1 where the run does not get to its end."""
+    from dhkit.cli import simulate as simulate_command
+    from dhkit.cli import simulation_task as asked
+    from dhkit.control import Sensors
+
+    arm, plant = asked.moving_arm(Arm.load(robot), load, unmodelled)
+    sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
+    followed, named = asked.chosen_motion(arm, motion, start, to, duration, degrees, columns)
+    task = asked.Task(
+        arm=arm,
+        plant=plant,
+        motion=followed,
+        named=named,
+        controllers=[controller],
+        bandwidth=bandwidth,
+        damping=damping,
+        compensate=compensate,
+        options={
+            "rate": None if continuous else rate,
+            "plant_rate": plant_rate,
+            "friction": asked.friction_of(friction),
+            "restitution": None if no_stops else restitution,
+            "pushes": asked.pushes(push or ()),
+            "sensors": sensors,
+        },
+    )
+    return simulate_command.run(task, simulate_command.Files(output, html, figure), degrees=degrees, json=json)
+
+
+@app.command(cls=gathering(MOTION_WORDS))
+def compare(
+    robot: Robot,
+    controllers: Annotated[str, typer.Option(help="Which, separated by commas; all unless given.")] = "",
+    motion: Motion = None,
+    columns: Columns = None,
+    start: Start = None,
+    to: Goal = None,
+    duration: Duration = None,
+    bandwidth: Bandwidth = 20.0,
+    damping: Damping = 1.0,
+    rate: Rate = 1000.0,
+    plant_rate: PlantRate = None,
+    load: Load = None,
+    unmodelled: Unmodelled = False,
+    friction: FrictionOption = "none",
+    restitution: Restitution = 0.0,
+    no_stops: NoStops = False,
+    push: PushOption = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in are in degrees.")] = False,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
+    json: Json = False,
+) -> int:
+    """Compare controllers on one motion; exit status 1 where one does not get to its end."""
+    from dhkit.cli import compare as compare_command
+    from dhkit.cli import simulation_task as asked
+    from dhkit.control import CONTROLLERS
+
+    arm, plant = asked.moving_arm(Arm.load(robot), load, unmodelled)
+    followed, named = asked.chosen_motion(arm, motion, start, to, duration, degrees, columns)
+    task = asked.Task(
+        arm=arm,
+        plant=plant,
+        motion=followed,
+        named=named,
+        controllers=[name.strip() for name in controllers.split(",")] if controllers else list(CONTROLLERS),
+        bandwidth=bandwidth,
+        damping=damping,
+        options={
+            "rate": rate,
+            "plant_rate": plant_rate,
+            "friction": asked.friction_of(friction),
+            "restitution": None if no_stops else restitution,
+            "pushes": asked.pushes(push or ()),
+        },
+    )
+    return compare_command.run(task, figure, json=json)
+
+
+@app.command()
+def play(
+    robot: Robot,
+    file: Annotated[Path, typer.Argument(help="A motion or a simulation.")],
+    html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
+    columns: Columns = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Samples from elsewhere have degrees.")] = False,
+) -> int:
+    """Play a motion or a simulation in the browser, or write a page of it."""
+    from dhkit.cli import play as play_command
+
+    return play_command.run(Arm.load(robot), file, html, degrees=degrees, names=columns)
+
+
+@app.command()
+def lab(
+    robot: Robot,
+    port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+) -> int:
+    """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
+    from dhkit.cli import browser
+
+    return browser.run_lab(Arm.load(robot), port, open_browser=not no_browser)
+
+
+@app.command()
+def view(
+    robot: Robot,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write a page in place of it.")] = None,
+) -> int:
+    """Show an arm in the browser, to look at; Ctrl-C ends it."""
+    from dhkit.cli import browser
+
+    return browser.run_view(Arm.load(robot), html, open_browser=not no_browser)
+
+
 @app.command()
 def verify(
     robot: Robot,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dhkit.viewer.figures import plot, plot_arm, plot_motion
 from dhkit.viewer.overlays import heat_colors
+from dhkit.viewer.simulation_figures import plot_comparison, plot_simulation
 from dhkit.viewer.trajectory_figures import plot_trajectory, plot_uses
 from dhkit.viewer.view import View
 from dhkit.viewer.workspace_figures import plot_ellipsoid, plot_workspace
@@ -16,8 +17,10 @@ __all__ = [
     "heat_colors",
     "plot",
     "plot_arm",
+    "plot_comparison",
     "plot_ellipsoid",
     "plot_motion",
+    "plot_simulation",
     "plot_trajectory",
     "plot_uses",
     "plot_workspace",

@@ -6,21 +6,29 @@ say where they come from (a websocket must), and know the random token in the pa
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import json
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from dhkit.viewer.page import SECURITY_POLICY
-from dhkit.viewer.protocol import ProtocolError, decode_shown
+from dhkit.viewer.protocol import ProtocolError
+from dhkit.viewer.requests import Shown, decode_message
 
 if TYPE_CHECKING:
     from dhkit.viewer.server import ViewerServer
     from dhkit.viewer.session import Session
 
 __all__ = ["File", "Page", "Refused"]
+
+MOST_REQUESTS = 64
+"""Of one page that wait for an answer, or whose answer the page has not taken yet."""
+MOST_PAGES = 100
+"""Pages at a time: each may keep the samples of some minutes waiting."""
 
 
 class Guarded(RequestHandler):
@@ -79,12 +87,16 @@ class Page(Guarded, WebSocketHandler):
     """The websocket of one page."""
 
     session: Session
+    _unanswered = 0
+    """Requests that wait for an answer."""
 
     def prepare(self) -> None:
-        """Refuse strangers, and who does not say where it comes from: browsers do."""
+        """Refuse strangers, who does not say where it comes from (browsers do), and more pages than we can serve."""
         super().prepare()
         if "Origin" not in self.request.headers:
             raise HTTPError(403, reason="Missing Origin")
+        if len(self.server.pages) >= MOST_PAGES:
+            raise HTTPError(503, reason="Too many pages")
 
     def check_origin(self, origin: str) -> bool:
         """Accept: :meth:`prepare` has looked at it."""
@@ -97,18 +109,42 @@ class Page(Guarded, WebSocketHandler):
         self.server.pages.add(self)
         self.send()
 
-    def on_message(self, message: str | bytes) -> None:
-        """Take an acknowledgement, and send what has come up meanwhile."""
+    async def on_message(self, message: str | bytes) -> None:
+        """Take an acknowledgement, and send what has come up meanwhile; or have a request answered.
+
+        Nothing more is read from a page that does not take what it is told, so that nothing piles up for it.
+        """
         try:
-            self.session.shown(decode_shown(message))
+            found = decode_message(message)
         except ProtocolError as error:
-            self.say({"type": "error", "error": str(error)})
+            await _taken(self.say({"type": "error", "error": str(error)}))
             return
-        self.send()
+        if isinstance(found, Shown):
+            self.session.shown(found.sequence)
+            self.send()
+        elif self._unanswered >= MOST_REQUESTS:
+            text = f"{MOST_REQUESTS} requests wait for an answer; expected at most so many"
+            await _taken(self.say({"type": "error", "id": found.id, "error": text}))
+        else:
+            self._unanswered += 1
+            self.server.ask(self, found)
+
+    def answered(self, answer: str) -> None:
+        """Send the answer to a request; until the page takes it the request counts as unanswered."""
+        written = self._write(answer, binary=False)
+        if written is not None:
+            written.add_done_callback(self._count_answered)
+
+    def beat(self) -> None:
+        """Give a sign of life, unless the page has not even taken what it was told before."""
+        connection = self.ws_connection
+        stream = None if connection is None else connection.stream
+        if stream is not None and not stream.writing():
+            self.say({"type": "beat"})
 
     def on_close(self) -> None:
         """Forget the page."""
-        self.server.pages.discard(self)
+        self.server.forget(self)
 
     def send(self) -> None:
         """Send what may be sent."""
@@ -116,12 +152,31 @@ class Page(Guarded, WebSocketHandler):
         if message is not None:
             self._write(message, binary=True)
 
-    def say(self, message: dict[str, str]) -> None:
-        """Send a line of JSON."""
-        self._write(json.dumps(message), binary=False)
+    def say(self, message: dict[str, Any]) -> asyncio.Future[None] | None:
+        """Send a line of JSON; what is returned is done when the page has taken it."""
+        return self._write(json.dumps(message), binary=False)
 
-    def _write(self, message: str | bytes, binary: bool) -> None:
+    def _count_answered(self, _: asyncio.Future[None]) -> None:
+        self._unanswered -= 1
+
+    def _write(self, message: str | bytes, binary: bool) -> asyncio.Future[None] | None:
         try:
-            self.write_message(message, binary=binary)
+            written = self.write_message(message, binary=binary)
         except WebSocketClosedError:
-            self.server.pages.discard(self)
+            self.server.forget(self)
+            return None
+        written.add_done_callback(_note)
+        return written
+
+
+async def _taken(written: asyncio.Future[None] | None) -> None:
+    """Wait until a page has taken a message, or is gone."""
+    if written is not None:
+        with suppress(WebSocketClosedError):
+            await written
+
+
+def _note(written: asyncio.Future[None]) -> None:
+    """Take note of how a write ended: that a page is gone is not worth a line in the log."""
+    if not written.cancelled():
+        written.exception()

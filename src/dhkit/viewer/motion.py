@@ -2,19 +2,73 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.control import SimulationResult
 from dhkit.description import Description
 from dhkit.description.frames import joint_array
 from dhkit.description.numbers import Array
+from dhkit.errors import DescriptionError
+from dhkit.trajectories import Trajectory
 
-__all__ = ["check_motion", "frame_times", "sampled"]
+__all__ = ["Motion", "PlayedMotion", "check_motion", "played_motion", "sampled"]
+
+Motion = Trajectory | SimulationResult | tuple[ArrayLike, ArrayLike]
+"""What can be played: the last are times (N,), s, and joint values (N, n), rad and m."""
 
 RATE = 60.0
 """Frames a second: what a screen shows."""
 MIN_FRAMES, MAX_FRAMES = 121, 6001
-"""At least so many, for slow motion; at most so many, 2.5 MB for a 6-axis arm."""
+"""At least so many, for slow motion; at most so many, 2.5 MB for a 6-axis arm, and 2.3 MB more for its ghost."""
+
+
+class PlayedMotion(NamedTuple):
+    """A motion at the times of a page's frames."""
+
+    times: Array
+    """Shape (N,), s, at equal steps from 0."""
+    q: Array
+    """Shape (N, n), rad and m."""
+    reference_q: Array | None
+    """What was to be followed, shape (N, n), rad and m; None for a motion that follows nothing."""
+
+
+def played_motion(description: Description, motion: Motion) -> PlayedMotion:
+    """Return a motion of an arm as a page plays it.
+
+    Raises
+    ------
+    ValueError
+        Times or joint values of other shapes, fewer than two of them, values that are not finite, or times that do
+        not increase.
+    TypeError
+        Not numbers.
+    DescriptionError
+        A motion of another robot.
+    """
+    if isinstance(motion, Trajectory):
+        motion.require(description)
+        times = frame_times(motion.duration)
+        return PlayedMotion(times, motion.q(times), None)
+    if isinstance(motion, SimulationResult):
+        _require_same_arm(description, motion.description)
+        times, q = sampled(*check_motion(description, motion.t, motion.q))
+        _, reference_q = sampled(*check_motion(description, motion.t, motion.reference_q))
+        return PlayedMotion(times, q, reference_q)
+    return PlayedMotion(*sampled(*check_motion(description, *motion)), None)
+
+
+def _require_same_arm(description: Description, simulated: Description) -> None:
+    """Refuse another robot; the arm that was simulated may carry a payload or differ in its parameters."""
+    same = simulated.digest == description.digest
+    if not same and (simulated.name, simulated.kinds) != (description.name, description.kinds):
+        raise DescriptionError(
+            f"the simulation is one of {simulated.name} ({simulated.digest}); expected one of {description.name}"
+            f" ({description.digest})"
+        )
 
 
 def check_motion(description: Description, times: ArrayLike, q: ArrayLike) -> tuple[Array, Array]:

@@ -31,6 +31,23 @@ MODULES = (
 )
 """The page's ES modules; ``main.js`` imports the others."""
 
+LAB_FILES = (
+    "lab.js",
+    "lab.css",
+    "requests.js",
+    "dom.js",
+    "joints.js",
+    "tool.js",
+    "gizmo.js",
+    "table.js",
+    "motion.js",
+    "control.js",
+    "plot.js",
+    "uplot.js",
+    "uplot.css",
+)
+"""Of the panels, in the folder ``lab``: loaded where Python answers requests. uPlot is a copy of 1.6.32 from npm."""
+
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
@@ -73,7 +90,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     ModelError
         As :func:`meshcat_bundle`.
     """
-    names = ("index.html", "viewer.css", *MODULES)
+    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in LAB_FILES))
     files = {name: (f"{CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
     files[""] = files.pop("index.html")
     files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())

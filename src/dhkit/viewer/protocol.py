@@ -5,16 +5,21 @@ of joints n (u16), sequence (u32), time (f64, s). What follows depends on the ty
 
 - scene: length (u32) and JSON about the arm; then, to the end, length (u32) and a meshcat command in msgpack;
 - pose: q (f32, n), transforms (f32, (n + 2) x 12);
-- animation: count N (u32), zero (u32), times (f64, N), q (f32, N x n), transforms (f32, N x (n + 2) x 12);
+- animation: count N (u32), zero (u32), times (f64, N), q (f32, N x n), transforms (f32, N x (n + 2) x 12); flag 1
+  draws the tool's path; with flag 2 a ghost moves along: its transforms (f32, N x (n + 2) x 12) and tint (u8, 3);
 - trace: points in the world (f32, N x 3);
 - frames: nothing; flag 1 shows them;
 - points: count N (u32), then points in the world (f32, N x 3) and their colors (u8, N x 3);
 - ellipsoids: count k (u32), then transforms of the unit ball (f32, k x 12);
 - ghosts: count k (u32), then transforms (f32, k x (n + 2) x 12) and tints (u8, k x 3);
-- obstacles: count k (u32), then of each a transform (f32, 12), half edges (f32, 3) and a radius (f32).
+- obstacles: count k (u32), then of each a transform (f32, 12), half edges (f32, 3) and a radius (f32);
+- state: JSON ``{"name": ..., "data": ...}`` to the end, for a panel;
+- samples: length (u32) and JSON ``{"name": ..., "columns": [...], "restart": false}``, padded to a multiple of 4, then
+  rows (f32) to the end.
 
 A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Page to
-Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn.
+Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn, and where there are panels requests
+(:mod:`dhkit.viewer.requests`), each with an answer as JSON text.
 """
 
 from __future__ import annotations
@@ -52,7 +57,6 @@ __all__ = [
     "decode_points",
     "decode_pose",
     "decode_scene",
-    "decode_shown",
     "decode_trace",
     "encode_animation",
     "encode_ellipsoids",
@@ -63,13 +67,14 @@ __all__ = [
     "encode_pose",
     "encode_scene",
     "encode_trace",
+    "message_header",
     "stamped",
 ]
 
 HEADER = struct.Struct("<BBHId")
 LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32
-FLAG = 1
+FLAG, GHOST_FLAG = 1, 2
 
 
 class ProtocolError(ValueError):
@@ -88,6 +93,8 @@ class MessageType(IntEnum):
     ELLIPSOIDS = 7
     GHOSTS = 8
     OBSTACLES = 9
+    STATE = 10
+    SAMPLES = 11
 
 
 @dataclass(frozen=True)
@@ -123,6 +130,8 @@ class Animation:
     """Shape (N, n + 2, 3, 4)."""
     trace: bool
     """Whether the tool's path is drawn as it plays."""
+    ghost: Array | None
+    """A second arm that moves along, translucent: shape (N, n + 2, 3, 4), or None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +176,7 @@ def encode_scene(scene: Scene) -> bytes:
     about = json.dumps(scene.about, separators=(",", ":"), allow_nan=False).encode()
     blocks = [about, *(umsgpack.packb(command) for command in scene.commands)]
     body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
-    return _header(MessageType.SCENE, joints=len(scene.about["joints"])) + body
+    return message_header(MessageType.SCENE, joints=len(scene.about["joints"])) + body
 
 
 def decode_scene(message: bytes) -> tuple[Lowered, list[Lowered]]:
@@ -191,7 +200,7 @@ def encode_pose(q: Array, transforms: Array, time: float = 0.0) -> bytes:
     time
         When, s.
     """
-    return _header(MessageType.POSE, joints=len(q), time=time) + _floats(q) + _floats(transforms[:, :3, :])
+    return message_header(MessageType.POSE, joints=len(q), time=time) + _floats(q) + _floats(transforms[:, :3, :])
 
 
 def decode_pose(message: bytes) -> Pose:
@@ -201,7 +210,14 @@ def decode_pose(message: bytes) -> Pose:
     return Pose(numbers[:n], numbers[n:].reshape(n + 2, 3, 4))
 
 
-def encode_animation(times: Array, q: Array, transforms: Array, *, trace: bool) -> bytes:
+def encode_animation(
+    times: Array,
+    q: Array,
+    transforms: Array,
+    *,
+    trace: bool,
+    ghost: tuple[Array, NDArray[np.uint8]] | None = None,
+) -> bytes:
     """Return an animation message.
 
     Parameters
@@ -214,31 +230,38 @@ def encode_animation(times: Array, q: Array, transforms: Array, *, trace: bool) 
         Shape (N, n + 2, 4, 4).
     trace
         Whether the tool's path is drawn as it plays.
+    ghost
+        A second arm that moves along: transforms of the same shape, and red, green and blue, shape (3,).
     """
-    header = _header(MessageType.ANIMATION, flags=FLAG * trace, joints=q.shape[1])
+    flags = FLAG * trace + GHOST_FLAG * (ghost is not None)
+    header = message_header(MessageType.ANIMATION, flags=flags, joints=q.shape[1])
     count = LENGTH.pack(len(times)) + LENGTH.pack(0)  # the zero keeps the times on a multiple of 8
-    return header + count + times.astype("<f8").tobytes() + _floats(q) + _floats(transforms[:, :, :3, :])
+    body = header + count + times.astype("<f8").tobytes() + _floats(q) + _floats(transforms[:, :, :3, :])
+    return body if ghost is None else body + _floats(ghost[0][:, :, :3, :]) + _bytes(ghost[1])
 
 
 def decode_animation(message: bytes) -> Animation:
     """Return the states in an animation message."""
     header = _expect(message, MessageType.ANIMATION)
     (count,) = LENGTH.unpack_from(message, HEADER.size)
-    start = HEADER.size + 2 * LENGTH.size
+    n, start = header.joints, HEADER.size + 2 * LENGTH.size
     times = _array(message[start : start + 8 * count], "<f8")
-    numbers = _array(message[start + 8 * count :], "<f4")
-    q, transforms = np.split(numbers, [count * header.joints])
+    floats, placed = start + 8 * count, (count, n + 2, 3, 4)
+    arms = 2 if header.flags & GHOST_FLAG else 1
+    numbers = _array(message[floats : floats + 4 * count * (n + arms * 12 * (n + 2))], "<f4")
+    q, transforms, ghost = np.split(numbers, [count * n, count * (n + 12 * (n + 2))])
     return Animation(
         times,
-        q.reshape(count, header.joints),
-        transforms.reshape(count, header.joints + 2, 3, 4),
+        q.reshape(count, n),
+        transforms.reshape(placed),
         bool(header.flags & FLAG),
+        ghost.reshape(placed) if arms == 2 else None,
     )
 
 
 def encode_trace(points: Array) -> bytes:
     """Return a trace message: a polyline in the world, shape (N, 3), m; no points take it away."""
-    return _header(MessageType.TRACE) + _floats(points)
+    return message_header(MessageType.TRACE) + _floats(points)
 
 
 def decode_trace(message: bytes) -> Array:
@@ -249,7 +272,7 @@ def decode_trace(message: bytes) -> Array:
 
 def encode_points(points: Array, colors: NDArray[np.uint8]) -> bytes:
     """Return a message of colored points, shapes (N, 3), m and red, green, blue; none take them away."""
-    return _header(MessageType.POINTS) + LENGTH.pack(len(points)) + _floats(points) + _bytes(colors)
+    return message_header(MessageType.POINTS) + LENGTH.pack(len(points)) + _floats(points) + _bytes(colors)
 
 
 def decode_points(message: bytes) -> Cloud:
@@ -261,7 +284,7 @@ def decode_points(message: bytes) -> Cloud:
 
 def encode_ellipsoids(transforms: Array) -> bytes:
     """Return a message of ellipsoids: what maps the unit ball to each, shape (k, 4, 4); none take them away."""
-    return _header(MessageType.ELLIPSOIDS) + LENGTH.pack(len(transforms)) + _floats(transforms[:, :3, :])
+    return message_header(MessageType.ELLIPSOIDS) + LENGTH.pack(len(transforms)) + _floats(transforms[:, :3, :])
 
 
 def decode_ellipsoids(message: bytes) -> Array:
@@ -280,7 +303,7 @@ def encode_ghosts(transforms: Array, tints: NDArray[np.uint8]) -> bytes:
     tints
         Shape (k, 3): red, green and blue.
     """
-    header = _header(MessageType.GHOSTS, joints=transforms.shape[1] - 2)
+    header = message_header(MessageType.GHOSTS, joints=transforms.shape[1] - 2)
     return header + LENGTH.pack(len(transforms)) + _floats(transforms[:, :, :3, :]) + _bytes(tints)
 
 
@@ -294,7 +317,7 @@ def decode_ghosts(message: bytes) -> Ghosts:
 def encode_obstacles(transforms: Array, half_edges: Array, radii: Array) -> bytes:
     """Return a message of :class:`Obstacles`, shapes (k, 4, 4), (k, 3) and (k,), m; none take them away."""
     rows = np.concatenate([transforms[:, :3, :].reshape(-1, 12), half_edges, radii[:, None]], axis=1)
-    return _header(MessageType.OBSTACLES) + LENGTH.pack(len(rows)) + _floats(rows)
+    return message_header(MessageType.OBSTACLES) + LENGTH.pack(len(rows)) + _floats(rows)
 
 
 def decode_obstacles(message: bytes) -> Obstacles:
@@ -306,7 +329,7 @@ def decode_obstacles(message: bytes) -> Obstacles:
 
 def encode_frames(visible: bool) -> bytes:
     """Return a message that shows or hides the triads with their labels."""
-    return _header(MessageType.FRAMES, flags=FLAG * visible)
+    return message_header(MessageType.FRAMES, flags=FLAG * visible)
 
 
 def stamped(message: bytes, sequence: int) -> bytes:
@@ -329,28 +352,8 @@ def decode_header(message: bytes) -> Header:
         raise ProtocolError(f"no message: {error}") from None
 
 
-def decode_shown(text: str | bytes) -> int:
-    """Return the sequence number of a page's acknowledgement.
-
-    Raises
-    ------
-    ProtocolError
-        Not JSON, not an object, of another type, or without a whole number from 0 to 2^32 - 1.
-    """
-    try:
-        message = json.loads(text)
-    except (ValueError, RecursionError):
-        raise ProtocolError("message is no JSON") from None
-    if not isinstance(message, dict) or message.get("type") != "shown":
-        kind = message.get("type") if isinstance(message, dict) else type(message).__name__
-        raise ProtocolError(f"message type is {str(kind)[:40]!r}; expected 'shown'")
-    sequence = message.get("sequence")
-    if type(sequence) is not int or not 0 <= sequence < MAX_SEQUENCE:
-        raise ProtocolError(f"sequence is {str(sequence)[:40]}; expected a whole number from 0 to 2^32 - 1")
-    return sequence
-
-
-def _header(kind: MessageType, flags: int = 0, joints: int = 0, time: float = 0.0) -> bytes:
+def message_header(kind: MessageType, flags: int = 0, joints: int = 0, time: float = 0.0) -> bytes:
+    """Return the first 16 bytes of a message that is not stamped yet."""
     return HEADER.pack(kind, flags, joints, 0, time)
 
 

@@ -6,26 +6,34 @@ It runs in a daemon thread with an event loop of its own; :mod:`dhkit.viewer.han
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import secrets
 import threading
 import time
-from collections.abc import Mapping
-from concurrent.futures import Future
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeout
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application
 
-from dhkit.errors import ModelError
+from dhkit.errors import DhkitError, ModelError
 from dhkit.viewer.handlers import File, Page, Refused
 from dhkit.viewer.page import page_files
 from dhkit.viewer.protocol import stamped
+from dhkit.viewer.requests import Request
 from dhkit.viewer.session import Session, Slot
+from dhkit.viewer.streams import Samples, encode_state
 
-__all__ = ["ViewerServer"]
+__all__ = ["Answer", "ViewerServer"]
+
+Answer = Callable[[str, dict[str, Any]], Any]
 
 LOG = logging.getLogger(__name__)
 ADDRESS = "127.0.0.1"
@@ -36,6 +44,13 @@ BEAT = 2.0
 PING = 15.0
 """Seconds after which a browser that vanished without a word is dropped."""
 MAX_MESSAGE = 1_000_000
+"""Bytes of a message from a page."""
+MAX_BODY = 1_000
+"""Bytes of the body of a request by HTTP: ours have none."""
+MAX_BUFFER = 2 * MAX_MESSAGE
+"""Bytes that are read ahead of a connection."""
+IDLE = 60.0
+"""Seconds that a connection may take to say what it wants."""
 POLL = 0.005
 
 
@@ -46,6 +61,11 @@ class ViewerServer:
     ----------
     state
         The latest message of every slot.
+    answer
+        What answers pages' requests, called with a request's name and data in a thread of its own, one after the
+        other: returns what JSON can hold, or raises an error whose line the page shows. None for pages without panels.
+    port, token
+        Where the page is, for pages that are to find it again; any free port and a new token unless given.
 
     Raises
     ------
@@ -53,14 +73,21 @@ class ViewerServer:
         No viewer in the meshcat wheel, or the server did not start.
     """
 
-    def __init__(self, state: Mapping[Slot, bytes]) -> None:
-        self.token = secrets.token_urlsafe(16)
+    def __init__(
+        self, state: Mapping[Slot, bytes], answer: Answer | None = None, port: int = 0, token: str | None = None
+    ) -> None:
+        self.token = token or secrets.token_urlsafe(16)
+        self._answer = answer
+        self._worker = ThreadPoolExecutor(1, "dhkit-answers") if answer else None
+        self._wanted_port = port
         self.files = page_files()
         self._lock = threading.Lock()
         self._sequence = 0
-        self._state: dict[Slot, tuple[int, bytes]] = {}
-        self._changed: set[Slot] = set()
+        self._state: dict[int, tuple[int, bytes | Samples]] = {}
+        self._changed: dict[int, bytes | Samples] = {}
+        self._panels: dict[str, int] = {}
         self.pages: set[Page] = set()
+        self._asked: dict[Page, deque[Request]] = {}
         self._closed = False
         for slot, message in state.items():
             self._keep(slot, message)
@@ -77,7 +104,34 @@ class ViewerServer:
         """What a browser may call us."""
         return f"{ADDRESS}:{self.port}", f"localhost:{self.port}"
 
-    def publish(self, slot: Slot, message: bytes) -> None:
+    def publish_state(self, name: str, data: Any) -> None:
+        """Make a panel's state, of what JSON can hold, the latest of its name; see :meth:`publish`."""
+        self.publish(self._panel(name), encode_state(name, data))
+
+    def append(self, samples: Samples) -> None:
+        """Add rows to those of the same name, on every page and for later ones; see :meth:`publish`."""
+        self.publish(self._panel(f"samples {samples.name}"), samples)
+
+    def ask(self, page: Page, request: Request) -> None:
+        """Have a page's request answered, after those that were there before."""
+        if self._worker is None or self._answer is None:
+            text = "this page only shows; it has nothing to ask for"
+            page.answered(json.dumps({"type": "error", "id": request.id, "error": text}))
+            return
+        with self._lock:
+            self._asked.setdefault(page, deque()).append(request)
+        try:
+            self._worker.submit(self._answer_next, self._answer)
+        except RuntimeError:
+            return  # closed meanwhile
+
+    def forget(self, page: Page) -> None:
+        """Leave what a page that is gone has asked for."""
+        self.pages.discard(page)
+        with self._lock:
+            self._asked.pop(page, None)
+
+    def publish(self, slot: int, message: bytes | Samples) -> None:
         """Make a message the latest of its slot and send it to every page that has drawn the one before.
 
         Returns at once; many calls in a row are one transmission of the latest.
@@ -118,6 +172,8 @@ class ViewerServer:
         if self._closed:
             return
         self._closed = True
+        if self._worker is not None:
+            self._worker.shutdown(wait=False, cancel_futures=True)
         try:
             self._loop.call_soon_threadsafe(self._stop.set)
         except RuntimeError:
@@ -131,10 +187,33 @@ class ViewerServer:
         with self._lock:
             return Session(self._state)
 
-    def _keep(self, slot: Slot, message: bytes) -> None:
+    def _panel(self, name: str) -> int:
+        with self._lock:
+            return self._panels.setdefault(name, Slot.PANELS + len(self._panels))
+
+    def _keep(self, slot: int, message: bytes | Samples) -> None:
         self._sequence += 1
+        if isinstance(message, Samples):
+            _, before = self._state.get(slot, (0, None))
+            self._state[slot] = (self._sequence, _joined(before, replace(message, restart=before is None)))
+            self._changed[slot] = _joined(self._changed.get(slot), message)
+            return
         self._state[slot] = (self._sequence, stamped(message, self._sequence))
-        self._changed.add(slot)
+        self._changed[slot] = self._state[slot][1]
+
+    def _answer_next(self, answer: Answer) -> None:
+        """Answer a request of the page whose turn it is: one that asks for much does not keep the others waiting."""
+        with self._lock:
+            if not self._asked:
+                return
+            page = next(iter(self._asked))
+            requests = self._asked.pop(page)
+            request = requests.popleft()
+            if requests:
+                self._asked[page] = requests
+        text = _answered(answer, request)
+        with suppress(ModelError):  # closed meanwhile
+            self._soon(lambda: page.answered(text))
 
     def _soon(self, call: Any) -> None:
         try:
@@ -146,7 +225,7 @@ class ViewerServer:
 
     def _flush(self) -> None:
         with self._lock:
-            latest = {slot: self._state[slot] for slot in self._changed}
+            latest = {slot: (self._state[slot][0], message) for slot, message in self._changed.items()}
             self._changed.clear()
         for page in tuple(self.pages):
             for slot, (sequence, message) in latest.items():
@@ -183,8 +262,8 @@ class ViewerServer:
             websocket_ping_interval=PING,
             websocket_max_message_size=MAX_MESSAGE,
         )
-        self.sockets = bind_sockets(0, ADDRESS)
-        http = HTTPServer(application)
+        self.sockets = bind_sockets(self._wanted_port, ADDRESS)
+        http = HTTPServer(application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE)
         http.add_sockets(self.sockets)
         self.port = self.sockets[0].getsockname()[1]
         started.set_result(self.port)
@@ -200,4 +279,21 @@ class ViewerServer:
         while True:
             await asyncio.sleep(BEAT)
             for page in tuple(self.pages):
-                page.say({"type": "beat"})
+                page.beat()
+
+
+def _answered(answer: Answer, request: Request) -> str:
+    """Return the answer to a request as JSON, or its error in one line."""
+    reply: dict[str, Any] = {"id": request.id}
+    try:
+        return json.dumps(reply | {"type": "answer", "data": answer(request.name, request.data)}, allow_nan=False)
+    except (DhkitError, ValueError, TypeError) as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+    except Exception as error:
+        LOG.exception("request %s failed", request.name)
+        text = f"{type(error).__name__} in {request.name}; Python's log says more"
+    return json.dumps(reply | {"type": "error", "error": text})
+
+
+def _joined(before: bytes | Samples | None, later: Samples) -> Samples:
+    return before.followed_by(later) if isinstance(before, Samples) else later

@@ -6,7 +6,7 @@ import html
 import threading
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,8 @@ from dhkit.description import Description
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
-from dhkit.trajectories import Trajectory
 from dhkit.viewer import protocol
-from dhkit.viewer.motion import check_motion, frame_times, sampled
+from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
@@ -28,7 +27,8 @@ if TYPE_CHECKING:
 
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
-    from dhkit.viewer.server import ViewerServer
+    from dhkit.viewer.server import Answer, ViewerServer
+    from dhkit.viewer.streams import Samples
 
 __all__ = ["View"]
 
@@ -49,6 +49,11 @@ class View:
         The arm.
     frames
         Whether the DH frames are drawn as triads with labels; a page can switch them too.
+    answer
+        What answers requests of a page with panels: see :class:`dhkit.viewer.server.ViewerServer`. A page has panels
+        where this is given.
+    port, token
+        Where the page is, for pages that are to find it again; any free port and a new token unless given.
 
     Raises
     ------
@@ -63,15 +68,21 @@ class View:
     ...     view.play(([0.0, 1.0], [[0.3, 0.5], [1.2, -0.4]]))
     """
 
-    def __init__(self, description: Description, *, frames: bool = False) -> None:
-        from dhkit.model.shapes import link_parts
-
+    def __init__(
+        self,
+        description: Description,
+        *,
+        frames: bool = False,
+        answer: Answer | None = None,
+        port: int = 0,
+        token: str | None = None,
+    ) -> None:
         self._description = description
+        self._answer, self._port, self._token = answer, port, token
         self._server: ViewerServer | None = None
         self._closed = False
         self._lock = threading.RLock()
-        scene = build_scene(description, link_parts(description))
-        self._state: dict[Slot, bytes] = {Slot.SCENE: protocol.encode_scene(scene)}
+        self._state: dict[Slot, bytes] = {Slot.SCENE: self._scene(description)}
         self.frames(frames)
         self.show(first_configuration(description))
 
@@ -117,14 +128,41 @@ class View:
             raise ValueError(f"q is {q.tolist()}; expected finite values")
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
-    def play(self, motion: Trajectory | tuple[ArrayLike, ArrayLike], *, trace: bool = True) -> None:
+    def replace(self, description: Description) -> None:
+        """Show another arm in place of this one, in its first configuration; what was drawn beside it is taken away.
+
+        Raises
+        ------
+        ModelError
+            A mesh that cannot be read.
+        """
+        scene = self._scene(description)
+        with self._lock:
+            self._description = description
+            nothing = np.zeros((0, description.n + 2, 4, 4))
+            self._publish(Slot.SCENE, scene)
+            self._publish(Slot.GHOSTS, protocol.encode_ghosts(nothing, np.zeros((0, 3), np.uint8)))
+            self._publish(Slot.TRACE, protocol.encode_trace(np.zeros((0, 3))))
+            self.show(first_configuration(description))
+
+    def panel(self, name: str, data: Any) -> None:
+        """Tell pages the state of a panel, of what JSON can hold, in place of the last of this name."""
+        server = self._live()
+        server.publish_state(name, data)
+
+    def append(self, samples: Samples) -> None:
+        """Tell pages rows of numbers that follow those of the same name."""
+        self._live().append(samples)
+
+    def play(self, motion: Motion, *, trace: bool = True) -> None:
         """Play a motion; the page can pause, repeat and slow it down.
 
         Parameters
         ----------
         motion
-            A trajectory of this arm; or times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m,
-            between which joints move evenly.
+            A trajectory of this arm; or a simulation of it, with a translucent ghost that follows the reference
+            exactly; or times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m, between which
+            joints move evenly. The arm that was simulated may differ in its payload and parameters.
         trace
             Whether the tool draws its path.
 
@@ -133,16 +171,13 @@ class View:
         ValueError
             Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
         DescriptionError
-            The trajectory is another robot's.
+            The trajectory or the simulation is another robot's.
         """
-        if isinstance(motion, Trajectory):
-            motion.require(self._description)
-            times = frame_times(motion.duration)
-            q = motion.q(times)
-        else:
-            times, q = sampled(*check_motion(self._description, *motion))
-        transforms = node_transforms(self._description, q)
-        self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace))
+        times, q, reference_q = played_motion(self._description, motion)
+        transforms, ghost = node_transforms(self._description, q), None
+        if reference_q is not None:
+            ghost = node_transforms(self._description, reference_q), ghost_tints(1)
+        self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace, ghost=ghost))
 
     def trace(self, points: ArrayLike | None) -> None:
         """Draw a line through points, in place of the last; None takes it away.
@@ -299,6 +334,13 @@ class View:
         style = f"width: 100%; height: {IFRAME_HEIGHT}px; border: 0; border-radius: 8px"
         return f'<iframe {source} title="{name}" style="{style}"></iframe>'
 
+    def _scene(self, description: Description) -> bytes:
+        from dhkit.model.shapes import link_parts
+
+        scene = build_scene(description, link_parts(description))
+        scene.about["panels"] = self._answer is not None
+        return protocol.encode_scene(scene)
+
     def _live(self) -> ViewerServer:
         from dhkit.viewer.server import ViewerServer
 
@@ -306,7 +348,7 @@ class View:
             if self._closed:
                 raise ModelError("the viewer is closed")
             if self._server is None:
-                self._server = ViewerServer(self._state)
+                self._server = ViewerServer(self._state, self._answer, self._port, self._token)
             return self._server
 
     def _publish(self, slot: Slot, message: bytes) -> None:

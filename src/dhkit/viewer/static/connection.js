@@ -4,9 +4,12 @@ const SILENCE = 6500; // ms without a sign of life: three beats and a little
 const FIRST_RETRY = 250, LAST_RETRY = 4000; // ms
 
 export class Connection {
-  constructor(url, { receive, status }) {
+  // told(message): called with what comes as text; lost(): when the connection ends.
+  constructor(url, { receive, status, told, lost }) {
     this.url = url;
     this.receive = receive;
+    this.told = told;
+    this.lost = lost;
     this.status = status;
     this.retry = FIRST_RETRY;
     this.open();
@@ -21,9 +24,11 @@ export class Connection {
       this.heard = Date.now();
       this.retry = FIRST_RETRY;
       this.status("");
-      if (typeof data !== "string") this.receive(data);
+      if (typeof data === "string") this.told?.(JSON.parse(data));
+      else this.receive(data);
     };
     this.socket.onclose = () => {
+      this.lost?.();
       this.status("Connection to Python lost. Reconnecting …");
       setTimeout(() => this.open(), this.retry);
       this.retry = Math.min(2 * this.retry, LAST_RETRY);
@@ -36,7 +41,13 @@ export class Connection {
   }
 
   shown(sequence) {
-    if (this.socket.readyState !== WebSocket.OPEN) return;
-    this.socket.send(JSON.stringify({ type: "shown", sequence }));
+    this.send({ type: "shown", sequence });
+  }
+
+  // Whether it could be sent.
+  send(message) {
+    if (this.socket.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(message));
+    return true;
   }
 }

@@ -2,7 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { ANIMATION, ELLIPSOIDS, FRAMES, GHOSTS, OBSTACLES } from "./messages.js";
-import { POINTS, POSE, SCENE, TRACE, decode, placements } from "./messages.js";
+import { POINTS, POSE, SAMPLES, SCENE, STATE, TRACE, decode, placements } from "./messages.js";
 import { Player } from "./player.js";
 import { Readout } from "./readout.js";
 import { Stage, THREE } from "./stage.js";
@@ -17,6 +17,7 @@ class Page {
     this.player = new Player(element("player"), { show: (time) => this.showTime(time) });
     this.motion = null; // what is on show: {q, positions, quaternions}, for an animation with times and more
     this.drawn = []; // sequences to acknowledge after the next picture
+    this.early = []; // what panels are told before they are there
     this.controls();
     requestAnimationFrame((now) => this.tick(now));
   }
@@ -34,13 +35,35 @@ class Page {
       [GHOSTS]: () => this.takeOverlay(() => this.stage.setGhosts(message)),
       [OBSTACLES]: () => this.takeOverlay(() => this.stage.setObstacles(message)),
     };
+    if (message.type === STATE || message.type === SAMPLES) {
+      this.takePanel(message);
+      this.connection?.shown(message.sequence);
+      return;
+    }
     take[message.type]();
     this.drawn.push(message.sequence);
-    // A page in the background draws nothing; it has the state all the same.
-    if (document.hidden) this.acknowledge();
+    // A page in the background draws nothing; it has the state all the same. Ghosts beside panels are drawn in the same
+    // picture as the pose that follows, not each in one of its own.
+    if (document.hidden || (this.lab && message.type === GHOSTS)) this.acknowledge();
+  }
+
+  // Panels are loaded where Python answers requests; what they are told meanwhile waits.
+  takePanel(message) {
+    if (!this.lab) return void this.early.push(message);
+    if (message.type === STATE) this.lab.take(message);
+    else this.lab.samples(message);
+  }
+
+  async openLab() {
+    document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href: "lab/lab.css" }));
+    const { Lab } = await import("./lab/lab.js");
+    this.lab = new Lab(this);
+    this.stage.beside();
+    for (const message of this.early.splice(0)) this.takePanel(message);
   }
 
   takeScene(message) {
+    if (message.about.panels && this.connection && !this.opening) this.opening = this.openLab().catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     this.stage.build(message);
     this.readout.set(message.about);
     element("tools").hidden = false;
@@ -52,23 +75,29 @@ class Page {
       this.player.unload();
       this.stage.drawn.clear();
       this.stage.forget();
+      this.takeOverlay(() => this.stage.setCompanion(null));
     }
     this.motion = { q: message.q, ...placements(message.transforms, THREE) };
     this.stage.include(this.motion);
     this.showState(this.motion);
+    this.lab?.moved(null);
+    if (this.lab) this.stage.trail.append(this.motion.positions.slice(-3));
   }
 
   takeAnimation(message) {
-    const motion = { ...message, ...placements(message.transforms, THREE) };
+    const placed = (states) => states && { ...states, ...placements(states.transforms, THREE) };
+    const motion = { ...placed(message), ghost: placed(message.ghost) };
     this.motion = motion;
     this.player.reveal();
     this.stage.forget();
+    this.takeOverlay(() => this.stage.setCompanion(motion.ghost));
     this.stage.include(motion);
     const tool = 3 * (motion.nodes - 1), points = new Float32Array(message.flag ? 3 * motion.times.length : 0);
     for (let i = 0; i < points.length / 3; i++) {
       points.set(motion.positions.subarray(3 * i * motion.nodes + tool, 3 * i * motion.nodes + tool + 3), 3 * i);
     }
     this.stage.setTrace(this.stage.drawn, points);
+    this.stage.trail.clear();
     this.player.load(motion.times[motion.times.length - 1]);
   }
 
@@ -79,16 +108,19 @@ class Page {
 
   // Samples are at equal steps: dhkit/viewer/motion.py.
   showTime(time) {
-    const { times, q, joints, nodes, positions, quaternions } = this.motion;
+    const { times, q, joints, nodes, ghost } = this.motion;
     const last = times.length - 1;
     const at = (time / times[last]) * last;
     const k = Math.min(last - 1, Math.floor(at)), share = at - k;
-    this.stage.drawn.draw(Math.round(at));
-    this.showState({
-      q: mix(q, joints, k, share),
+    const between = ({ positions, quaternions }) => ({
       positions: mix(positions, 3 * nodes, k, share),
       quaternions: turn(quaternions, nodes, k, share),
     });
+    this.stage.drawn.draw(Math.round(at));
+    if (ghost) this.stage.placeCompanion(between(ghost));
+    const state = { q: mix(q, joints, k, share), ...between(this.motion) };
+    this.showState(state);
+    this.lab?.moved(state.q, time);
   }
 
   showState({ q, positions, quaternions }) {
@@ -157,8 +189,9 @@ class Page {
 
 // Whether the focused control has its own use for a key: a slider for arrows, a button for space, a list for letters.
 function keepsKey({ target, key }) {
-  if (target.matches("select")) return true;
-  if (target.matches("input")) return key !== " " && key.length > 1;
+  if (target.matches("select, textarea, input:not([type=range], [type=checkbox])")) return true;
+  if (target.matches("input[type=checkbox]")) return key === " ";
+  if (target.matches("input")) return key.length > 1;
   return key === " " && target.matches("button, summary");
 }
 
@@ -184,6 +217,8 @@ function turn(quaternions, nodes, k, share) {
 }
 
 function banner(text) {
+  document.body.classList.toggle("waiting", Boolean(text));
+  if (element("banner").textContent === text) return;
   element("banner").textContent = text;
   element("banner").hidden = !text;
 }
@@ -197,7 +232,13 @@ function start() {
     return;
   }
   const url = new URL("socket", location.href.replace(/^http/, "ws"));
-  page.connection = new Connection(url, { receive: (data) => page.receive(data), status: banner });
+  page.connection = new Connection(url, {
+    receive: (data) => page.receive(data),
+    status: banner,
+    told: (message) => message.type !== "beat" && page.lab?.requests.take(message),
+    lost: () => page.lab?.requests.drop(),
+  });
+  banner("Connecting to Python …");
 }
 
 function bytes(base64) {

@@ -1,8 +1,8 @@
 // Messages from Python: the layout is described in dhkit/viewer/protocol.py.
 
 export const SCENE = 1, POSE = 2, ANIMATION = 3, TRACE = 4, FRAMES = 5;
-export const POINTS = 6, ELLIPSOIDS = 7, GHOSTS = 8, OBSTACLES = 9;
-const HEADER = 16, FLAG = 1;
+export const POINTS = 6, ELLIPSOIDS = 7, GHOSTS = 8, OBSTACLES = 9, STATE = 10, SAMPLES = 11;
+const HEADER = 16, FLAG = 1, GHOST_FLAG = 2;
 export const PER_TRANSFORM = 12;
 export const PER_SOLID = PER_TRANSFORM + 4; // half edges and a radius
 
@@ -11,6 +11,7 @@ export function decode(buffer) {
   const header = {
     type: view.getUint8(0),
     flag: Boolean(view.getUint8(1) & FLAG),
+    ghostFlag: Boolean(view.getUint8(1) & GHOST_FLAG),
     joints: view.getUint16(2, true),
     sequence: view.getUint32(4, true),
     time: view.getFloat64(8, true),
@@ -33,16 +34,20 @@ const BODIES = {
     const numbers = new Float32Array(buffer, HEADER);
     return { q: numbers.subarray(0, joints), transforms: numbers.subarray(joints) };
   },
-  [ANIMATION]: (buffer, view, { joints }) => {
-    const count = view.getUint32(HEADER, true);
-    const start = HEADER + 8;
-    const numbers = new Float32Array(buffer, start + 8 * count);
+  [ANIMATION]: (buffer, view, { joints, ghostFlag }) => {
+    const count = view.getUint32(HEADER, true), nodes = joints + 2;
+    const start = HEADER + 8, perArm = count * nodes * PER_TRANSFORM;
+    const floats = start + 8 * count;
+    const numbers = new Float32Array(buffer, floats, count * joints + perArm * (ghostFlag ? 2 : 1));
+    const arm = (k) => numbers.subarray(count * joints + k * perArm, count * joints + (k + 1) * perArm);
+    const tint = new Uint8Array(buffer, floats + numbers.byteLength);
     return {
       joints,
-      nodes: joints + 2,
+      nodes,
       times: new Float64Array(buffer, start, count),
       q: numbers.subarray(0, count * joints),
-      transforms: numbers.subarray(count * joints, count * (joints + (joints + 2) * PER_TRANSFORM)),
+      transforms: arm(0),
+      ghost: ghostFlag ? { transforms: arm(1), tint } : null,
     };
   },
   [TRACE]: (buffer) => ({ points: new Float32Array(buffer, HEADER) }),
@@ -57,6 +62,12 @@ const BODIES = {
     return { transforms: floats, tints: bytes };
   },
   [OBSTACLES]: (buffer, view) => ({ solids: counted(buffer, view, PER_SOLID).floats }),
+  [STATE]: (buffer) => JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, HEADER))),
+  [SAMPLES]: (buffer, view) => {
+    const length = view.getUint32(HEADER, true), start = HEADER + 4;
+    const about = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, start, length)));
+    return { ...about, rows: new Float32Array(buffer, start + length) };
+  },
 };
 
 // So many floats for each of what a message counts, and the bytes behind them.

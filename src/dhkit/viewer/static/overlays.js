@@ -1,23 +1,28 @@
-// What is drawn beside the arm: a cloud of points, ellipsoids, ghosts, which are the arm in further states, and obstacles.
+// What is drawn beside the arm: a cloud of points, ellipsoids, ghosts, which are the arm in further states, a ghost that
+// moves along with an animation, and obstacles.
 
 import { PER_SOLID, PER_TRANSFORM, placements } from "./messages.js";
 import { isFloor, solid } from "./obstacles.js";
 
 const SPRITE = 32; // px
-const NAMES = ["points", "ellipsoids", "ghosts", "obstacles"];
+const NAMES = ["points", "ellipsoids", "ghosts", "companion", "obstacles"];
+const ROD = 0.0035; // radius of a skeleton's rods, share of its size
+const NONE = new Uint8Array(0);
+const SAME = 1e-4; // m and rad
 const GHOST = 0.3, BALL = 0.3; // opacities
 
 export class Overlays {
   constructor(scene, THREE) {
     this.THREE = THREE;
     this.layers = Object.fromEntries(NAMES.map((name) => [name, new Layer(scene, THREE)]));
+    this.skeletons = new Skeletons(scene, THREE);
     this.dot = sprite(THREE);
     this.ballColor = new THREE.Color();
     this.solidColor = new THREE.Color();
   }
 
   get empty() {
-    return Object.values(this.layers).every((layer) => !layer.group.children.length);
+    return !this.skeletons.count && Object.values(this.layers).every((layer) => !layer.group.children.length);
   }
 
   // Take all that is shown into a box.
@@ -26,7 +31,7 @@ export class Overlays {
   }
 
   show(visible) {
-    for (const layer of Object.values(this.layers)) layer.group.visible = visible;
+    for (const { group } of [this.skeletons, ...Object.values(this.layers)]) group.visible = visible;
   }
 
   color(balls, solids) {
@@ -62,25 +67,44 @@ export class Overlays {
   }
 
   // stage: whose nodes are copied; each copy shares their geometry.
-  setGhosts({ transforms, tints }, { nodes, boxAt }) {
+  // skeletons: whether a ghost is only rods between its frames, which a slow machine can draw many of.
+  setGhosts({ transforms, tints }, { nodes, boxAt, skeletons = false }) {
     const { THREE } = this;
     const { positions, quaternions } = placements(transforms, THREE);
-    const ghosts = [], box = new THREE.Box3();
-    for (let k = 0; k < tints.length / 3; k++) {
-      const [r, g, b] = tints.subarray(3 * k, 3 * k + 3);
-      const color = new THREE.Color(r / 255, g / 255, b / 255);
-      const material = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: GHOST });
-      // The base stands where the arm's own does.
-      nodes.slice(1).forEach((node, j) => {
-        const i = j + 1;
-        const copy = bareCopy(node, material, THREE);
-        copy.position.fromArray(positions, 3 * (k * nodes.length + i));
-        copy.quaternion.fromArray(quaternions, 4 * (k * nodes.length + i));
-        ghosts.push(copy);
-      });
-      box.union(boxAt(positions, quaternions, k));
+    const ghosts = [], box = new THREE.Box3(), count = tints.length / 3;
+    for (let k = 0; k < count; k++) box.union(boxAt(positions, quaternions, k));
+    const { layers: { ghosts: layer }, last } = this, key = tints.join();
+    this.skeletons.set(positions, nodes.length, skeletons ? tints : NONE, ROD * box.getSize(new THREE.Vector3()).length());
+    if (skeletons) {
+      this.last = null;
+      return void layer.fill([], box);
     }
-    this.layers.ghosts.fill(ghosts, box, { shared: true });
+    if (last?.nodes === nodes && last.key === key) {
+      const each = nodes.length - 1;
+      for (let k = 0; k < count; k++) place(layer.group.children.slice(k * each, (k + 1) * each), positions, quaternions, k);
+      showOnce(layer.group.children, each);
+      layer.box = box;
+      return;
+    }
+    this.last = { nodes, key };
+    for (let k = 0; k < count; k++) {
+      const ghost = ghostOf(nodes, tints.subarray(3 * k, 3 * k + 3), THREE);
+      place(ghost, positions, quaternions, k);
+      ghosts.push(...ghost);
+    }
+    showOnce(ghosts, nodes.length - 1);
+    layer.fill(ghosts, box, { shared: true });
+  }
+
+  // A ghost for the motion on show, as large as the box of all its states; without a tint there is none.
+  setCompanion(tint, nodes, box) {
+    const ghost = tint ? ghostOf(nodes, tint, this.THREE) : [];
+    this.layers.companion.fill(ghost, box, { shared: true });
+  }
+
+  // positions, quaternions: of all nodes, in order.
+  placeCompanion(positions, quaternions) {
+    place(this.layers.companion.group.children, positions, quaternions, 0);
   }
 
   setObstacles({ solids }) {
@@ -117,6 +141,85 @@ class Layer {
     this.box = box;
     this.shared = shared;
   }
+}
+
+// Translucent copies of an arm's nodes but the first: the base stands where the arm's own does.
+function ghostOf(nodes, [r, g, b], THREE) {
+  const color = new THREE.Color(r / 255, g / 255, b / 255);
+  // A ghost that is where the arm is lies behind it, and does not flicker through its surface.
+  const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 };
+  const material = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: GHOST, ...behind });
+  return nodes.slice(1).map((node) => bareCopy(node, material, THREE));
+}
+
+// Put a ghost's nodes where the k-th of the given states has them.
+function place(ghost, positions, quaternions, k) {
+  const nodes = ghost.length + 1;
+  ghost.forEach((copy, j) => {
+    const i = k * nodes + j + 1;
+    copy.position.fromArray(positions, 3 * i);
+    copy.quaternion.fromArray(quaternions, 4 * i);
+  });
+}
+
+// Ghosts as rods between the origins of their frames: objects that are kept, since a new material would have to be
+// compiled for each picture of a drag.
+class Skeletons {
+  constructor(scene, THREE) {
+    this.THREE = THREE;
+    this.group = new THREE.Group();
+    this.rod = new THREE.CylinderGeometry(1, 1, 1, 8);
+    this.ball = new THREE.SphereGeometry(1.7, 12, 8);
+    this.materials = new Map();
+    scene.add(this.group);
+  }
+
+  // positions: 3 for each of the nodes of each ghost.
+  set(positions, nodes, tints, radius) {
+    let used = 0;
+    const next = (geometry, material) => {
+      const mesh = this.group.children[used] ?? new this.THREE.Mesh();
+      if (!mesh.parent) this.group.add(mesh);
+      used++;
+      return Object.assign(mesh, { geometry, material, visible: true, renderOrder: 1 });
+    };
+    const at = (i) => new this.THREE.Vector3().fromArray(positions, 3 * i), up = new this.THREE.Vector3(0, 1, 0);
+    for (let k = 0; k < tints.length / 3; k++) {
+      const material = this.material(tints.subarray(3 * k, 3 * k + 3));
+      let from = at(k * nodes);
+      for (let i = 1; i < nodes; i++) {
+        const to = at(k * nodes + i), along = to.clone().sub(from), length = along.length();
+        if (length < radius) continue;
+        const rod = next(this.rod, material);
+        rod.position.addVectors(from, to).multiplyScalar(0.5);
+        rod.quaternion.setFromUnitVectors(up, along.divideScalar(length));
+        rod.scale.set(radius, length, radius);
+        const ball = next(this.ball, material);
+        ball.position.copy(to);
+        ball.scale.setScalar(radius);
+        from = to;
+      }
+    }
+    for (const mesh of this.group.children.slice(used)) mesh.visible = false;
+    this.count = tints.length / 3;
+  }
+
+  material([r, g, b]) {
+    const key = `${r} ${g} ${b}`;
+    if (!this.materials.has(key)) this.materials.set(key, new this.THREE.MeshBasicMaterial({ color: new this.THREE.Color(r / 255, g / 255, b / 255) }));
+    return this.materials.get(key);
+  }
+}
+
+// Links of several ghosts at the same place would flicker through each other: the first alone is drawn.
+function showOnce(copies, each) {
+  copies.forEach((copy, i) => {
+    copy.visible = true;
+    for (let j = i % each; j < i && copy.visible; j += each) {
+      const other = copies[j];
+      if (other.visible && other.position.distanceTo(copy.position) < SAME && other.quaternion.angleTo(copy.quaternion) < SAME) copy.visible = false;
+    }
+  });
 }
 
 // A node without its triad, in one material, without shadow.

@@ -3,16 +3,20 @@
 import { corners, inView, localBox } from "./boxes.js";
 import { Labels } from "./labels.js";
 import { Overlays } from "./overlays.js";
-import { Quality } from "./quality.js";
+import { Quality, drawnInSoftware } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
-import { Trace } from "./trace.js";
+import { Trace, Trail } from "./trace.js";
 
 const { THREE } = MeshCat;
 const FIELD = 34; // degrees of view, vertically
 const MARGIN = 1.07; // around the arm
 const SAMPLES = 60; // states of an animation that the camera must take in
+const SOLID_GHOSTS = 2; // more are drawn as skeletons beside panels
+const REST = 400; // ms without a change after which the picture is drawn finely
+const FINEST = 2; // pixels of the picture for one of the page
 const TRACE_RADIUS = 0.0035; // share of the arm's size
 const POINT = 0.008; // diameter of a point, share of the arm's size
+const AXIS_COLORS = [0xe5484d, 0x30a46c, 0x3b82f6];
 const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/scene.py
 
 export class Stage {
@@ -20,9 +24,19 @@ export class Stage {
   constructor(pane, labels, insets) {
     this.pane = pane;
     this.insets = insets;
-    this.viewer = new MeshCat.Viewer(pane, false);
+    // Without a graphics processor smooth edges halve the number of pictures: they wait until nothing moves.
+    this.software = drawnInSoftware();
+    const renderer = new THREE.WebGLRenderer({ antialias: !this.software, alpha: true });
+    renderer.shadowMap.enabled = true;
+    renderer.shadowMap.type = THREE.PCFSoftShadowMap;
+    pane.append(renderer.domElement);
+    this.viewer = new MeshCat.Viewer(pane, false, renderer);
+    this.ratio = Math.min(devicePixelRatio, FINEST);
+    this.fine = false; // whether the picture on show is drawn finely
+    this.changed = 0; // ms, when the last picture of a motion was drawn
     this.labels = new Labels(labels);
     this.nodes = [];
+    this.old = []; // materials of a scene that is gone
     this.seen = new THREE.Box3();
     this.framed = new THREE.Box3();
     this.touched = false;
@@ -34,6 +48,10 @@ export class Stage {
     this.plain = false;
     this.given = new Trace(this.viewer.scene, THREE);
     this.drawn = new Trace(this.viewer.scene, THREE);
+    this.trail = new Trail(this.viewer.scene, THREE);
+    this.steady = false; // whether the camera only moves when the arm leaves the picture
+    this.held = false; // whether it does not move at all: a person drags something
+    this.preset = null; // direction to look from
     this.overlays = new Overlays(this.viewer.scene, THREE);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.color());
@@ -47,7 +65,7 @@ export class Stage {
     const { viewer } = this;
     viewer.set_3d_pane_size = () => this.resize();
     viewer.gui.domElement.remove();
-    viewer.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    viewer.renderer.setPixelRatio(this.ratio);
     viewer.hide_background();
     for (const name of ["Lights", "Grid", "Axes"]) viewer.set_property([name], "visible", false);
   }
@@ -65,6 +83,12 @@ export class Stage {
     this.viewer.scene.add(this.sky, this.key, this.key.target, this.fill, this.floor);
   }
 
+  // Panels are beside the scene: a person moves the arm, and pictures must keep up.
+  beside() {
+    this.steady = true;
+    if (this.software) this.quality.save();
+  }
+
   withoutShadows() {
     this.key.castShadow = false;
     this.floor.visible = false;
@@ -73,6 +97,7 @@ export class Stage {
 
   withoutGloss() {
     this.plain = true;
+    this.ratio = 1;
     this.viewer.renderer.setPixelRatio(1);
     for (const node of this.nodes) node.traverse(matt);
     this.resize();
@@ -85,7 +110,7 @@ export class Stage {
     this.grid?.material.color.set(value("--grid"));
     this.sky.groundColor.set(dark ? 0x6a7080 : 0xb4b8c4);
     this.floor.material.opacity = dark ? 0.35 : 0.13;
-    for (const trace of [this.given, this.drawn]) trace.color(value("--accent"));
+    for (const trace of [this.given, this.drawn, this.trail]) trace.color(value("--accent"));
     this.overlays.color(value("--accent"), value("--obstacle"));
     this.dirty();
   }
@@ -104,6 +129,7 @@ export class Stage {
 
   build({ about, commands, joints }) {
     const { viewer } = this;
+    this.keepPrograms();
     viewer.delete_path(["dhkit"]);
     for (const command of commands) viewer.handle_command_bytearray(command);
     const root = viewer.scene_tree.find(["dhkit"]).object;
@@ -116,10 +142,13 @@ export class Stage {
     // Looked up among the children: finding a path in the tree would create it.
     this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
     for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
+    // A scene begins with its triads hidden: what a person has switched on stays on.
+    for (const triad of this.triads) if (triad) triad.visible = this.framesShown;
     this.grid = node("grid", "<object>");
     this.grid.castShadow = this.grid.receiveShadow = false;
     this.grid.material.depthWrite = false;
     this.size = about.size;
+    this.trail.begin(about.size);
     this.up = new THREE.Vector3(...about.up);
     this.labels.set(about.labels);
     this.boxes = this.nodes.map((n) => localBox(n));
@@ -127,6 +156,16 @@ export class Stage {
     this.framed.makeEmpty();
     this.setUp();
     this.color();
+  }
+
+  // A program whose last material goes is compiled anew for the next: the old materials go behind the next picture.
+  keepPrograms() {
+    const spent = new THREE.Material();
+    this.viewer.scene_tree.find(["dhkit"]).object.traverse((object) => {
+      if (!object.material) return;
+      this.old.push(...[object.material].flat());
+      object.material = spent;
+    });
   }
 
   setUp() {
@@ -167,14 +206,18 @@ export class Stage {
   // Keep what was seen so far in view, unless someone has turned the camera.
   include(placement) {
     this.placement = placement;
-    const { positions, quaternions } = placement;
-    const count = positions.length / (3 * this.nodes.length);
-    const stride = Math.max(1, Math.floor(count / SAMPLES));
-    for (let k = 0; k < count; k += stride) this.seen.union(this.boxAt(positions, quaternions, k));
-    this.seen.union(this.boxAt(positions, quaternions, count - 1));
-    this.overlays.growBox(this.seen);
-    if (this.touched || this.framed.containsBox(this.seen)) return;
+    this.seen.union(this.boxOf(placement));
+    if (!this.steady) this.overlays.growBox(this.seen);
+    if (this.held || this.touched || this.framed.containsBox(this.seen)) return;
     this.frame(this.seen);
+  }
+
+  // The box around the arm in all states of a motion, or nearly all.
+  boxOf({ positions, quaternions }) {
+    const count = positions.length / (3 * this.nodes.length), whole = new THREE.Box3();
+    const stride = Math.max(1, Math.floor(count / SAMPLES));
+    for (let k = 0; k < count; k += stride) whole.union(this.boxAt(positions, quaternions, k));
+    return whole.union(this.boxAt(positions, quaternions, count - 1));
   }
 
   // What is in view stays in view when the free part of the pane changes.
@@ -241,13 +284,26 @@ export class Stage {
 
   // From where to look, z up: an arm that moves in a vertical plane from the front, others from the side and above.
   direction(box) {
+    if (this.preset) return this.preset.clone();
     if (Math.abs(this.up.z) < 0.5) return new THREE.Vector3(0.18, 0, 1).addScaledVector(this.up, 0.14);
     const span = box.getSize(new THREE.Vector3());
     const flat = span.z < 0.25 * Math.max(span.x, span.y);
     return new THREE.Vector3(0.62, -0.78, (flat ? 0.85 : 0.36) * Math.sign(this.up.z));
   }
 
+  // name: front, side, top or iso, as the arm stands.
+  look(name) {
+    const up = this.up.clone(), front = Math.abs(up.z) < 0.5 ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(1, 0, 0);
+    const side = new THREE.Vector3().crossVectors(front, up);
+    const views = { front, side, top: up.clone().addScaledVector(side, 1e-3), iso: front.clone().add(side).addScaledVector(up, 0.8) };
+    this.preset = views[name];
+    this.touched = false;
+    this.setUp();
+    this.reframe();
+  }
+
   resetCamera() {
+    this.preset = null;
     this.touched = false;
     this.setUp();
     this.reframe();
@@ -261,9 +317,49 @@ export class Stage {
     this.dirty();
   }
 
+  // A frame on its way from one pose to another, 16 numbers by row each; null takes it away.
+  showMoving(from, to, share) {
+    this.moving ??= this.addMoving();
+    this.moving.visible = Boolean(from);
+    this.dirty();
+    if (!from) return;
+    const [p, q] = [from, to].map((T) => {
+      const matrix = new THREE.Matrix4().set(...T);
+      return { at: new THREE.Vector3().setFromMatrixPosition(matrix), turn: new THREE.Quaternion().setFromRotationMatrix(matrix) };
+    });
+    this.moving.position.lerpVectors(p.at, q.at, share);
+    this.moving.quaternion.slerpQuaternions(p.turn, q.turn, share);
+  }
+
+  // A frame of three rods, longer and thinner than the triads of the arm.
+  addMoving() {
+    const axes = new THREE.Group(), length = 1.6 * TRIAD * this.size, thickness = 0.006 * this.size;
+    AXIS_COLORS.forEach((color, k) => {
+      const rod = new THREE.Mesh(new THREE.CylinderGeometry(thickness, thickness, length, 8), new THREE.MeshBasicMaterial({ color, depthTest: false, transparent: true }));
+      rod.position.setComponent(k, length / 2);
+      if (k === 0) rod.rotation.z = -Math.PI / 2;
+      if (k === 2) rod.rotation.x = Math.PI / 2;
+      rod.renderOrder = 9;
+      axes.add(rod);
+    });
+    this.viewer.scene.add(axes);
+    return axes;
+  }
+
+  // Tint the links of some joints, counted from 0, as being where they must not be.
+  warn(joints) {
+    const color = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--accent").trim());
+    this.nodes.slice(1, -1).forEach((node, i) => {
+      const on = joints.includes(i);
+      for (const part of node.children) if (part.name !== "frame") part.traverse((object) => object.material?.emissive?.copy(color).multiplyScalar(on ? 0.55 : 0));
+    });
+    this.dirty();
+  }
+
   showTraces(visible) {
     this.given.show(visible);
     this.drawn.show(visible);
+    this.trail.show(visible);
     this.dirty();
   }
 
@@ -284,8 +380,19 @@ export class Stage {
 
   setGhosts(message) {
     const { nodes } = this;
-    this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state) });
+    this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
     this.overlaid();
+  }
+
+  // A ghost that moves along with a motion, or null for none.
+  setCompanion(ghost) {
+    const box = ghost ? this.boxOf(ghost) : new THREE.Box3();
+    this.overlays.setCompanion(ghost?.tint, this.nodes, box);
+  }
+
+  placeCompanion({ positions, quaternions }) {
+    this.overlays.placeCompanion(positions, quaternions);
+    this.dirty();
   }
 
   setObstacles(message) {
@@ -300,16 +407,29 @@ export class Stage {
 
   // What is drawn beside the arm is in view too.
   overlaid() {
-    if (!this.touched) this.reframe();
+    if (!this.touched && !this.steady) this.reframe();
     this.dirty();
   }
 
   render(now) {
     const { viewer } = this;
-    if (!viewer.needs_render) return;
+    if (!viewer.needs_render) return this.refine(now);
+    if (this.fine) viewer.renderer.setPixelRatio(this.ratio);
+    this.fine = false;
+    this.changed = now;
+    this.trail.upload();
     viewer.render();
+    for (const material of this.old.splice(0)) material.dispose();
     this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
+  }
+
+  // Draw a picture that has not changed for a while at a higher resolution, which the browser averages.
+  refine(now) {
+    if (!this.software || this.fine || now - this.changed < REST || this.ratio >= FINEST) return;
+    this.fine = true;
+    this.viewer.renderer.setPixelRatio(FINEST);
+    this.viewer.render();
   }
 
   // A point of the world in px from the pane's upper left corner; null behind the camera.

@@ -1,6 +1,9 @@
 // A path as a thin tube whose drawn part can grow: three.js draws plain lines one pixel wide.
 
 const SIDES = 6;
+const MOST_POINTS = 20000; // of a trail
+const JUMP = 0.2; // share of the arm's size: a trail begins anew behind a longer step
+const REST = 1e-5; // share of the arm's size: a shorter step is none
 
 export class Trace {
   constructor(scene, THREE) {
@@ -39,6 +42,66 @@ export class Trace {
     this.scene.remove(this.tube);
     this.tube.geometry.dispose();
     this.tube = null;
+  }
+}
+
+// The way of the tool while it is moved: a line that grows by 12 bytes a point.
+export class Trail {
+  constructor(scene, THREE) {
+    this.THREE = THREE;
+    this.size = 1;
+    this.count = 0;
+    this.sent = 0;
+    this.points = new Float32Array(3 * MOST_POINTS);
+    const geometry = new THREE.BufferGeometry();
+    this.attribute = new THREE.BufferAttribute(this.points, 3).setUsage(THREE.DynamicDrawUsage);
+    geometry.setAttribute("position", this.attribute);
+    geometry.setDrawRange(0, 0);
+    this.line = new THREE.Line(geometry, new THREE.LineBasicMaterial());
+    this.line.frustumCulled = false;
+    scene.add(this.line);
+  }
+
+  color(color) {
+    this.line.material.color.set(color);
+  }
+
+  begin(size) {
+    this.size = size;
+    this.clear();
+  }
+
+  clear() {
+    this.count = this.sent = 0;
+  }
+
+  show(visible) {
+    this.line.visible = visible;
+    if (!visible) this.clear();
+  }
+
+  // point: x y z in the world (z up), m.
+  append(point) {
+    if (!this.line.visible) return;
+    const last = this.points.subarray(3 * this.count - 3, 3 * this.count);
+    const step = this.count ? Math.hypot(point[0] - last[0], point[1] - last[1], point[2] - last[2]) : Infinity;
+    if (step < REST * this.size) return;
+    if (this.count && step > JUMP * this.size) this.clear();
+    if (this.count === MOST_POINTS) {
+      this.points.copyWithin(0, 3 * (MOST_POINTS / 2));
+      this.count = MOST_POINTS / 2;
+      this.sent = 0;
+    }
+    this.points.set(point, 3 * this.count++);
+  }
+
+  // Hand over all points since the last picture at once: three.js keeps a single range of what has changed.
+  upload() {
+    this.line.geometry.setDrawRange(0, this.count);
+    if (this.sent === this.count) return;
+    Object.assign(this.attribute.updateRange, { offset: 3 * this.sent, count: 3 * (this.count - this.sent) });
+    this.attribute.needsUpdate = true;
+    this.sent = this.count;
   }
 }
 

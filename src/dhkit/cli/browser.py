@@ -1,0 +1,42 @@
+"""`dhkit lab` and `dhkit view`: an arm in the browser, until Ctrl-C."""
+
+from __future__ import annotations
+
+import time
+import webbrowser
+from pathlib import Path
+
+from dhkit.arm import Arm
+from dhkit.cli.output import say
+from dhkit.cli.outputs import PAGES, check_outputs
+from dhkit.lab import serve
+
+__all__ = ["run_lab", "run_view", "until_interrupted"]
+
+
+def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
+    """Say where a page is, open it, and wait for Ctrl-C; return 0."""
+    try:
+        say(f"{what} at {url}; Ctrl-C ends it")
+        if open_browser:
+            webbrowser.open(url)
+        while True:
+            time.sleep(3600)
+    except KeyboardInterrupt:
+        return 0
+
+
+def run_lab(arm: Arm, port: int | None, *, open_browser: bool) -> int:
+    """Serve a lab."""
+    with serve(arm, block=False, port=port, open_browser=False) as lab:
+        return until_interrupted(lab.url, f"the lab of {arm.name}", open_browser=open_browser)
+
+
+def run_view(arm: Arm, page: Path | None, *, open_browser: bool) -> int:
+    """Show an arm, or write a page of it."""
+    check_outputs(((page, PAGES),))
+    with arm.view() as view:
+        if page is not None:
+            say(f"wrote {view.save_html(page)}")
+            return 0
+        return until_interrupted(view.url, arm.name, open_browser=open_browser)

@@ -1,0 +1,375 @@
+"""The panel of control: a controller on the simulated arm in real time, with a reference as ghost, pushes and loads."""
+
+from __future__ import annotations
+
+import base64
+import logging
+import tempfile
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.control import CONTROLLERS, FrictionCompensation, make_controller
+from dhkit.description import Array
+from dhkit.dynamics import Friction
+from dhkit.errors import DhkitError
+from dhkit.lab.desk import Desk
+from dhkit.lab.fields import Fields
+from dhkit.lab.live import Live, Wanted
+from dhkit.lab.motion_panel import MotionPanel
+from dhkit.viewer.streams import Samples
+
+__all__ = ["ControlPanel", "Settings"]
+
+log = logging.getLogger(__name__)
+
+RATE = 1000.0
+"""Hz of the controller."""
+FRAMES = 60.0
+"""Pictures a second."""
+BEHIND = 5
+"""Frames that a slow machine is behind before time is let go."""
+SMOOTH = 0.05
+"""rad/s or m/s of smooth friction."""
+FRICTIONS = ("none", "smooth", "stiction")
+REFERENCES = ("hold", "sine", "motion", "target")
+AMPLITUDE, FREQUENCY = 0.3, 0.25
+"""Of a sine: rad (and shares of the reach), and Hz."""
+MOST_FORCE, LONGEST_PUSH = 1e4, 10.0
+PARTS = ("controller", "bandwidth", "damping", "friction", "payload", "compensate", "reference")
+TITLES = {
+    "pd": "PD of each joint",
+    "pid": "PID of each joint",
+    "pd-gravity": "PD and gravity",
+    "feed-forward": "Feed-forward",
+    "computed-torque": "Computed torque",
+    "operational-space": "Operational space",
+    "adaptive": "Adaptive",
+    "lqr": "LQR",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is simulated."""
+
+    controller: str = "computed-torque"
+    bandwidth: float = 20.0
+    """rad/s."""
+    damping: float = 1.0
+    friction: str = "none"
+    payload: float = 0.0
+    """kg at the tool, which the controller does not know of."""
+    compensate: bool = False
+    reference: str = "hold"
+
+    def changed(self, request: str, data: dict[str, Any]) -> Settings:
+        """Return the settings with some of them changed.
+
+        Raises
+        ------
+        ValueError
+            A value that is none.
+        """
+        fields = Fields(request, data, PARTS)
+        return Settings(
+            fields.choice("controller", list(CONTROLLERS), self.controller),
+            fields.number("bandwidth", 0.1, 1000.0, self.bandwidth),
+            fields.number("damping", 0.01, 10.0, self.damping),
+            fields.choice("friction", FRICTIONS, self.friction),
+            fields.number("payload", 0.0, 1000.0, self.payload),
+            fields.flag("compensate", self.compensate),
+            fields.choice("reference", REFERENCES, self.reference),
+        )
+
+    @property
+    def model(self) -> Friction | None:
+        """The friction of the joints."""
+        return {"none": None, "smooth": Friction(SMOOTH), "stiction": Friction()}[self.friction]
+
+
+class ControlPanel:
+    """Requests ``control.…``, ``bodies.assume`` and ``arm.planar``; the run has a thread of its own."""
+
+    def __init__(self, desk: Desk, motions: MotionPanel) -> None:
+        self.desk, self.motions = desk, motions
+        self.settings = Settings()
+        self.planar = False
+        self._lock = threading.RLock()
+        self._live: Live | None = None
+        self._free: list[int] = []
+        self._base: Array = np.zeros(0)
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._paused = False
+        self._speed = 1.0
+        self._error: str | None = None
+        desk.changed.append(self._forget)
+
+    def start(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Simulate from the state on show."""
+        settings = self.settings.changed("control.start", data)
+        arm = self.desk.arm
+        if not all(joint.bodies for joint in arm.description.joints):
+            raise ValueError("control.start: the arm has no bodies; expected uniform links to be assumed first")
+        self._end()
+        with self._lock:
+            before, self.settings = self.settings, settings
+            self._free = [1, 2] if self.planar else list(range(arm.n))
+            self._base = self.desk.q.copy()
+            try:
+                live = Live(self._simulated(arm), self._plant(arm), settings.model, self._base[self._free], RATE)
+                self._apply(live, arm)
+            except (DhkitError, ValueError):
+                self.settings = before
+                raise
+            self._live = live
+            self._error, self._paused, self._speed = None, False, 1.0
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(live, self._stop), name="dhkit-control", daemon=True)
+        self.desk.running = True
+        self._thread.start()
+        self.publish()
+        return {}
+
+    def change(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Change the settings, while it runs too."""
+        with self._lock:
+            self.settings = self.settings.changed("control.change", data)
+            live, arm = self._live, self.desk.arm
+            if live is not None:
+                live.change(self._plant(arm), self.settings.model)
+                self._apply(live, arm)
+        self.publish()
+        return {}
+
+    def pause(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Hold the time, or let it go on."""
+        Fields("control.pause", data, [])
+        self._paused = not self._paused
+        self.publish()
+        return {}
+
+    def stop(self, data: dict[str, Any]) -> dict[str, Any]:
+        """End the run; its samples stay."""
+        Fields("control.stop", data, [])
+        self._end()
+        self.publish()
+        return {}
+
+    def push(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Push a link or the tool from now on."""
+        fields = Fields("control.push", data, ["link", "force", "duration"])
+        link = fields.whole("link", 1, self.desk.arm.n) if "link" in fields else None
+        force = fields.vector("force", 3)
+        duration = fields.number("duration", 0.0, LONGEST_PUSH, 0.2)
+        if np.abs(force).max() > MOST_FORCE:
+            raise ValueError(f"control.push: force is beyond {MOST_FORCE:g} N")
+        with self._lock:
+            if self._live is None or not self.desk.running:
+                raise ValueError("control.push: nothing runs")
+            if self.planar and link is not None:
+                raise ValueError("control.push: only the tool can be pushed while joints are locked")
+            self._live.push(link, force, duration)
+        return {}
+
+    def download(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the run so far as a file."""
+        kind = Fields("control.download", data, ["format"]).choice("format", ("csv", "npz"))
+        with self._lock:
+            if self._live is None:
+                raise ValueError("control.download: nothing has been simulated yet")
+            result = self._live.result()
+        with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
+            path = result.save(Path(folder) / f"run.{kind}")
+            content = base64.b64encode(path.read_bytes()).decode()
+        return {"name": f"{self.desk.arm.name}-{self.settings.controller}.{kind}", "content": content}
+
+    def assume(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Give an arm without bodies uniform links."""
+        Fields("bodies.assume", data, [])
+        self._end()
+        self.desk.assumed_bodies = True
+        self.desk.replace(self.desk.arm.with_uniform_links())
+        return {}
+
+    def lock_to_planar(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Leave only joints 2 and 3 free, or all again."""
+        on = Fields("arm.planar", data, ["on"]).flag("on")
+        kinds = self.desk.arm.description.kinds
+        if on and (self.desk.arm.n < 4 or kinds[1:3] != "RR"):
+            raise ValueError(f"arm.planar: joints are {kinds}; expected at least 4, the second and third revolute")
+        self._end()
+        self.planar = on
+        self.publish()
+        return {}
+
+    def publish(self) -> None:
+        """Tell the pages what runs."""
+        live, settings = self._live, self.settings
+        running = self._thread is not None
+        self.desk.view.panel(
+            "control",
+            {
+                "running": running,
+                "paused": self._paused,
+                "controllers": [{"name": name, "title": TITLES.get(name, name)} for name in CONTROLLERS],
+                **{name: getattr(settings, name) for name in PARTS},
+                "planar": self.planar,
+                "rate": RATE,
+                "speed": round(self._speed, 2),
+                "time": round(live.t, 3) if live is not None else 0.0,
+                "error": self._error,
+                "note": "the links' masses are assumed: uniform rods" if self.desk.assumed_bodies else None,
+            },
+        )
+
+    def close(self) -> None:
+        """End the run."""
+        self._end()
+
+    # The run
+
+    def _run(self, live: Live, stop: threading.Event) -> None:
+        begin, frame, told = time.monotonic(), 0, 0.0
+        columns = self._columns()
+        self.desk.view.append(Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True))
+        try:
+            while not stop.is_set():
+                if self._paused:
+                    time.sleep(1 / FRAMES)
+                    begin, frame = time.monotonic(), 0
+                    continue
+                late = time.monotonic() - (begin + frame / FRAMES)
+                if late < 0:
+                    time.sleep(-late)
+                elif late > BEHIND / FRAMES:
+                    self._speed = 0.8 * self._speed + 0.2 * (frame / FRAMES) / max(time.monotonic() - begin, 1e-9)
+                    begin, frame = time.monotonic(), 0
+                self._frame(live)
+                frame += 1
+                if frame / FRAMES >= 1.0 and late <= BEHIND / FRAMES:
+                    self._speed = min(1.0, 0.8 * self._speed + 0.2)
+                if time.monotonic() - told > 0.25:
+                    told = time.monotonic()
+                    self.publish()
+        except (DhkitError, ValueError) as error:
+            self._failed(live, stop, " ".join(str(error).split()))
+        except Exception as error:
+            log.exception("the simulation failed")
+            self._failed(live, stop, f"{type(error).__name__}: Python's log says more")
+
+    def _frame(self, live: Live) -> None:
+        with self._lock:
+            error = tau = np.zeros(len(self._free))
+            for _ in range(round(RATE / FRAMES)):
+                error, tau = live.advance()
+            q, wanted = self._full(live.q), self._full(live.wanted(live.t)[0])
+            t = live.t
+        self.desk.show(q)
+        self.desk.view.ghosts(wanted[None], GHOST)
+        tool = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(wanted)[:3, 3])
+        row = np.array([[t, *error, *tau, tool]], dtype=np.float32)
+        self.desk.view.append(Samples("control", self._columns(), row))
+
+    def _columns(self) -> tuple[str, ...]:
+        """Return the names of the samples' numbers: time, errors and torques of the free joints, the tool's error."""
+        return ("t", *(f"{name}{i + 1}" for name in ("e", "tau") for i in self._free), "tool")
+
+    def _failed(self, live: Live, stop: threading.Event, error: str) -> None:
+        if stop.is_set():
+            return  # the lab ends, and its pages with it
+        if live is self._live and not self._stop.is_set():
+            self._error, self._thread, self.desk.running = error, None, False
+            self.publish()
+
+    def _end(self) -> None:
+        self._stop.set()
+        self.desk.running = False
+        thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(5.0)
+            self._thread = None
+            self.desk.view.ghosts(None)
+
+    def _forget(self) -> None:
+        """End a run of another arm."""
+        self._end()
+        with self._lock:
+            self._live, self.planar, self._error = None, False, None
+        self.publish()
+
+    def _full(self, q: Array) -> Array:
+        """Return the joint values of the whole arm."""
+        full = self._base.copy()
+        full[self._free] = q
+        return full
+
+    def _simulated(self, arm: Arm) -> Arm:
+        """Return the arm whose joints are free."""
+        if not self.planar:
+            return arm
+        return arm.lock({i: float(self._base[i]) for i in range(arm.n) if i not in self._free})
+
+    def _plant(self, arm: Arm) -> Arm:
+        simulated = self._simulated(arm)
+        return simulated.with_payload(self.settings.payload) if self.settings.payload else simulated
+
+    def _apply(self, live: Live, arm: Arm) -> None:
+        settings = self.settings
+        controller = make_controller(
+            settings.controller, live.arm.description, settings.bandwidth, settings.damping, live.q
+        )
+        live.take(FrictionCompensation(controller, live.arm) if settings.compensate else controller)
+        live.wanted = self._wanted(live, arm)
+
+    def _wanted(self, live: Live, arm: Arm) -> Wanted:
+        """Return what the run follows from now on."""
+        begin, free = live.t, self._free
+        held = live.wanted(begin)[0] if live.t else live.q.copy()
+        still = np.zeros(len(free))
+        if self.settings.reference == "target":
+            return lambda t: (self._aimed(held), still, still)
+        if self.settings.reference == "motion":
+            motion = self.motions.motion
+            if motion is None:
+                raise ValueError("control: there is no motion to follow; expected one planned first")
+            return lambda t: _repeated(motion, t - begin, free)
+        if self.settings.reference == "sine":
+            size = np.where(arm.description.numbers.prismatic, AMPLITUDE * arm.description.reach, AMPLITUDE)[free]
+            w = 2 * np.pi * FREQUENCY
+
+            def sine(t: float) -> tuple[Array, Array, Array]:
+                s = w * (t - begin)
+                # It begins at rest: 1 - cos.
+                return held + size * (1 - np.cos(s)) / 2, size * w * np.sin(s) / 2, size * w * w * np.cos(s) / 2
+
+            return sine
+        return lambda t: (held, still, still)
+
+    def _aimed(self, held: Array) -> Array:
+        aimed = self.desk.aimed
+        return held if aimed is None else aimed[self._free]
+
+
+GHOST = (0.55, 0.6, 0.68)
+"""Red, green and blue of the reference."""
+
+
+def _repeated(motion: Any, t: float, free: list[int]) -> tuple[Array, Array, Array]:
+    """Return a motion that is held for a second at its end, and goes back the same way."""
+    rest = 1.0
+    period = 2 * (motion.duration + rest)
+    s = t % period
+    back = s >= period / 2
+    if back:
+        s -= period / 2
+    s = min(s, motion.duration)
+    at = motion.duration - s if back else s
+    sign = -1.0 if back else 1.0
+    return motion.q(at)[free], sign * motion.qd(at)[free], motion.qdd(at)[free]

@@ -1,0 +1,129 @@
+"""What all pages of a lab show: one arm in one state, and what is known about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.description import Array, pose_parts
+from dhkit.kinematics import classify, freedoms, singular_values
+from dhkit.viewer import View
+
+__all__ = ["Desk", "listed"]
+
+SINGULAR = 1e-3
+"""Smallest over largest singular value of the Jacobian (m and rad): below it a state is told as singular."""
+
+
+def listed(array: Array | None) -> list[Any] | None:
+    """Return an array as JSON has it: infinities and NaN are null."""
+    if array is None:
+        return None
+    return [listed(row) if np.ndim(row) else (float(row) if np.isfinite(row) else None) for row in array]
+
+
+class Desk:
+    """One arm in one state on all pages.
+
+    Parameters
+    ----------
+    arm
+        The arm.
+    view
+        Where it is shown; its pages have panels.
+    """
+
+    def __init__(self, arm: Arm, view: View) -> None:
+        self.arm, self.view = arm, view
+        self.assumed_bodies = False
+        self.order = "XYZ"
+        self.q = self.first(arm)
+        self.running = False
+        """Whether a simulation moves the arm."""
+        self.aimed: Array | None = None
+        """Joint values at the target of the tool, which a simulation may follow, shape (n,)."""
+        self.changed: list[Callable[[], None]] = []
+        """Called after another arm has taken this one's place."""
+
+    @staticmethod
+    def first(arm: Arm) -> Array:
+        """Return the joint values that an arm is first shown in, shape (n,)."""
+        ready = arm.configurations.get("ready")
+        return np.zeros(arm.n) if ready is None else np.array(ready)
+
+    def replace(self, arm: Arm, q: Array | None = None) -> None:
+        """Put another arm in the place of this one."""
+        kept = (
+            q if q is not None else self.q if arm.description.kinds == self.arm.description.kinds else self.first(arm)
+        )
+        self.arm, self.q, self.aimed = arm, kept, None
+        self.view.replace(arm.description)
+        self.publish()
+        for call in self.changed:
+            call()
+
+    def named(self) -> dict[str, Array]:
+        """Return the arm's configurations by name, zero first."""
+        return {"zero": np.zeros(self.arm.n)} | {name: np.array(q) for name, q in self.arm.configurations.items()}
+
+    def show(self, q: Array) -> None:
+        """Show joint values, shape (n,)."""
+        self.q = q.copy()
+        self.view.show(self.q)
+        self.publish_state()
+
+    def publish(self) -> None:
+        """Tell the pages everything about the arm, and its state."""
+        description, numbers = self.arm.description, self.arm.description.numbers
+        bounds = zip(numbers.lower, numbers.upper, numbers.velocity, numbers.effort, strict=True)
+        self.view.panel(
+            "arm",
+            {
+                "name": description.name,
+                "n": description.n,
+                "joints": [
+                    {"name": joint.name, "unit": "m" if slides else "rad"}
+                    | dict(zip(("lower", "upper", "velocity", "effort"), listed(np.array(row)) or (), strict=True))
+                    for joint, slides, row in zip(description.joints, numbers.prismatic, bounds, strict=True)
+                ],
+                "configurations": [*self.named(), "random"],
+                "named": {name: q.tolist() for name, q in self.named().items()},
+                "family": self.arm.family,
+                "closed_form": classify(description).fit is not None,
+                "bodies": all(joint.bodies for joint in description.joints),
+                "assumed_bodies": self.assumed_bodies,
+                "reach": description.reach,
+            },
+        )
+        self.show(self.q)
+
+    def publish_state(self) -> None:
+        """Tell the pages the numbers of the state on show."""
+        numbers = self.arm.description.numbers
+        outside = np.flatnonzero((self.q < numbers.lower) | (self.q > numbers.upper))
+        self.view.panel("joints", {"q": self.q.tolist(), "within": not len(outside), "outside": outside.tolist()})
+        T = self.arm.fk(self.q)
+        xyz, euler = pose_parts(T, order=self.order)
+        self.view.panel(
+            "tool",
+            {
+                "T": T.ravel().tolist(),
+                "xyz": xyz.tolist(),
+                "euler": euler.tolist(),
+                "order": self.order,
+                "manipulability": float(self.arm.manipulability(self.q)),
+                "singular": self.singular(),
+            },
+        )
+
+    def singular(self) -> str | None:
+        """Return what is said of a state that is singular, or None."""
+        description = self.arm.description
+        sigma = singular_values(description, self.q, "whole")
+        rank = freedoms(description, "whole")
+        if rank < 1 or sigma[rank - 1] >= SINGULAR * sigma[0]:
+            return None
+        return "singular: the tool cannot move in one of its directions here"

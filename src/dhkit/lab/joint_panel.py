@@ -1,0 +1,43 @@
+"""The panel of joints: values by slider and number, named configurations, random ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dhkit.lab.desk import Desk
+from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
+
+__all__ = ["JointPanel"]
+
+
+class JointPanel:
+    """Requests ``joints.…``."""
+
+    def __init__(self, desk: Desk, seed: int = 0) -> None:
+        self.desk = desk
+        self._random = np.random.default_rng(seed)
+
+    def set(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Show joint values; those outside limits are shown too, and marked."""
+        q = Fields("joints.set", data, ["q"]).vector("q", self.desk.arm.n, LARGEST_JOINT_VALUE)
+        self.desk.show(q)
+        return {}
+
+    def named(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Show a configuration by its name, zero, or random joint values inside the limits."""
+        arm = self.desk.arm
+        name = Fields("joints.named", data, ["name"]).choice("name", ["zero", "random", *arm.configurations])
+        if name == "random":
+            numbers = arm.description.numbers
+            free = np.where(numbers.prismatic, arm.description.reach or 1.0, np.pi)
+            lower, upper = (
+                np.where(np.isfinite(bound), bound, side * free)
+                for bound, side in ((numbers.lower, -1), (numbers.upper, 1))
+            )
+            q = self._random.uniform(lower, upper)
+        else:
+            q = np.array(arm.configurations.get(name, np.zeros(arm.n)))
+        self.desk.show(q)
+        return {"q": q.tolist()}

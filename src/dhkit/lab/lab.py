@@ -1,0 +1,146 @@
+"""The lab: panels beside an arm in the browser, whose requests Python answers."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+from dhkit.arm import Arm
+from dhkit.errors import ModelError
+from dhkit.lab.control_panel import ControlPanel
+from dhkit.lab.desk import Desk
+from dhkit.lab.fields import Fields
+from dhkit.lab.jobs import Jobs
+from dhkit.lab.joint_panel import JointPanel
+from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.python_lines import python_lines
+from dhkit.lab.table_panel import TablePanel
+from dhkit.lab.tool_panel import ToolPanel
+from dhkit.viewer import View
+
+__all__ = ["Lab"]
+
+
+class Lab:
+    """An arm that a person moves, drives, edits and controls in the browser.
+
+    The server runs from the beginning, on this machine's loopback interface alone, with a random token in its address;
+    all pages show the same arm, and a page that is loaded anew the present state.
+
+    Parameters
+    ----------
+    arm
+        The arm.
+    port, token
+        Where the page is, for pages that are to find it again; any free port and a new token unless given.
+
+    Raises
+    ------
+    ModelError
+        A mesh that cannot be read, or the server did not start.
+
+    Examples
+    --------
+    >>> with Lab(Arm.load("planar2r")) as lab:
+    ...     lab.answer("joints.set", {"q": [0.1, 0.2]})
+    {}
+    """
+
+    def __init__(self, arm: Arm, port: int = 0, token: str | None = None) -> None:
+        self._lock = threading.RLock()
+        self._closed = False
+        self.view = View(arm.description, answer=self.answer, port=port, token=token)
+        self.desk = Desk(arm, self.view)
+        jobs = Jobs(lambda state: self.view.panel("job", state))
+        joints = JointPanel(self.desk)
+        self._tool = ToolPanel(self.desk)
+        table = TablePanel(self.desk)
+        self._motions = MotionPanel(self.desk, jobs)
+        self._control = ControlPanel(self.desk, self._motions)
+        self._requests: dict[str, Callable[[dict[str, Any]], Any]] = {
+            "joints.set": joints.set,
+            "joints.named": joints.named,
+            "tool.target": self._tool.target,
+            "tool.pose": self._tool.pose,
+            "tool.jog": self._tool.jog,
+            "tool.choose": self._tool.choose,
+            "tool.order": self._tool.order,
+            "tool.clear": self._tool.clear,
+            "table.edit": table.edit,
+            "table.convention": table.convention,
+            "table.undo": table.undo,
+            "table.redo": table.redo,
+            "table.reset": table.reset,
+            "table.steps": table.steps,
+            "table.download": table.download,
+            "motion.plan": self._motions.plan,
+            "motion.cancel": self._motions.cancel,
+            "motion.clear": self._motions.clear,
+            "motion.file": self._motions.file,
+            "motion.play": self._motions.play,
+            "motion.show": self._motions.show,
+            "motion.download": self._motions.download,
+            "waypoints.add": self._motions.add,
+            "waypoints.remove": self._motions.remove,
+            "waypoints.go": self._motions.go,
+            "waypoints.clear": self._motions.forget,
+            "control.start": self._control.start,
+            "control.change": self._control.change,
+            "control.pause": self._control.pause,
+            "control.stop": self._control.stop,
+            "control.push": self._control.push,
+            "control.download": self._control.download,
+            "bodies.assume": self._control.assume,
+            "arm.planar": self._control.lock_to_planar,
+            "python": self._python,
+        }
+        self.desk.publish()
+        self.view.panel("target", None)
+        table.publish()
+        self._motions.publish()
+        self._control.publish()
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds the page; the token in it is the permission to use it."""
+        return self.view.url
+
+    def answer(self, name: str, data: dict[str, Any]) -> Any:
+        """Return the answer to a page's request.
+
+        Raises
+        ------
+        ValueError
+            No such request, or a field that does not fit.
+        DhkitError
+            What is asked for cannot be done.
+        """
+        request = self._requests.get(name)
+        if request is None:
+            raise ValueError(f"no request {name[:40]!r}")
+        with self._lock:
+            if self._closed:
+                raise ModelError("the lab is closed")
+            return request(data)
+
+    def close(self) -> None:
+        """End what runs, and the server."""
+        with self._lock:
+            self._closed = True
+        self._motions.close()
+        self._control.close()
+        self.view.close()
+
+    def __enter__(self) -> Lab:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _python(self, data: dict[str, Any]) -> dict[str, Any]:
+        Fields("python", data, [])
+        return {"text": python_lines(self.desk, self._tool, self._motions, self._control)}

@@ -1,0 +1,287 @@
+"""The panel of motions: planned, taught or read from a file, played and plotted with their limits."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.description import Array
+from dhkit.errors import DescriptionError, DhkitError
+from dhkit.lab.desk import Desk, listed
+from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
+from dhkit.lab.jobs import Job, Jobs
+from dhkit.lab.tool_panel import solved
+from dhkit.planning import Progress
+from dhkit.trajectories import Trajectory, read_motion
+
+__all__ = ["MotionPanel"]
+
+KINDS = ("quintic", "trapezoidal", "least-time", "line", "circle")
+GOAL = ("q", "T", "waypoints")
+LONGEST = 600.0
+"""s of a motion."""
+SHOWN = 401
+"""Samples that are plotted."""
+CHECKED = 101
+"""Samples at which links are kept from each other."""
+MOST_WAYPOINTS = 100
+LONGEST_FILE = 700_000
+"""Bytes of a file in base64."""
+SUFFIXES = (".csv", ".mat", ".npz", ".yaml", ".yml")
+CIRCLE = 0.15
+"""Radius of a circle, over the reach, where no goal says more."""
+
+
+class MotionPanel:
+    """Requests ``motion.…`` and ``waypoints.…``."""
+
+    def __init__(self, desk: Desk, jobs: Jobs) -> None:
+        self.desk, self.jobs = desk, jobs
+        self.motion: Trajectory | None = None
+        self.kind = ""
+        self.waypoints: list[Array] = []
+        self._collisions = Jobs(lambda state: None)
+        desk.changed.append(self._forget)
+
+    def plan(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Plan a motion from the state on show; what takes long answers with the number of its job."""
+        fields = Fields("motion.plan", data, ["kind", "goal", "duration"])
+        kind = fields.choice("kind", KINDS)
+        duration = fields.number("duration", 1e-3, LONGEST) if "duration" in fields else None
+        arm, start = self.desk.arm, self.desk.q.copy()
+        given = data.get("goal")
+        goal = Fields("motion.plan", given if isinstance(given, dict) else {}, GOAL)
+        if kind == "circle":
+            return self._started(kind, lambda job: _circle(arm, start, duration))
+        if kind == "line":
+            T = goal.pose("T") if "T" in goal else arm.fk(goal.vector("q", arm.n, LARGEST_JOINT_VALUE))
+            return self._started(kind, lambda job: arm.straight_line(arm.fk(start), T, start, duration))
+        if "waypoints" in goal:
+            return self._through(kind, duration)
+        end = self._configuration(goal, arm, start)
+        if kind == "least-time":
+            return self._started("least time", lambda job: _quickest(arm, start, end, [], job))
+        make = arm.quintic if kind == "quintic" else arm.trapezoidal
+        self._take(make(start, end, duration), kind)
+        return {}
+
+    def cancel(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Cancel the job that runs."""
+        Fields("motion.cancel", data, [])
+        self.jobs.cancel()
+        return {}
+
+    def clear(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Take the motion away."""
+        Fields("motion.clear", data, [])
+        self.motion = None
+        self.desk.view.panel("motion", None)
+        self.desk.show(self.desk.q)
+        return {}
+
+    def file(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Read a motion that somebody has as a file; no path comes from the page."""
+        fields = Fields("motion.file", data, ["name", "content", "degrees"])
+        suffix = Path(fields.text("name")).suffix.lower()
+        if suffix not in SUFFIXES:
+            raise ValueError(f"motion.file: name ends in {suffix[:10]!r}; expected {', '.join(SUFFIXES)}")
+        try:
+            content = base64.b64decode(fields.text("content", LONGEST_FILE), validate=True)
+        except (binascii.Error, ValueError):
+            raise ValueError("motion.file: content is not in base64") from None
+        degrees = fields.flag("degrees", False)
+        with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
+            path = Path(folder) / f"file{suffix}"
+            path.write_bytes(content)
+            try:
+                motion = read_motion(path, self.desk.arm.description, degrees=degrees)
+            except DescriptionError as error:
+                raise ValueError(str(error).replace(str(path), fields.text("name"))) from None
+        if motion.duration > LONGEST:
+            raise ValueError(f"motion.file: it lasts {motion.duration:g} s; expected at most {LONGEST:g} s")
+        self._take(motion, "file")
+        return {}
+
+    def play(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Play the motion once more, where another state has taken its place."""
+        Fields("motion.play", data, [])
+        if self.motion is None:
+            raise ValueError("motion.play: there is no motion")
+        self.desk.view.play(self.motion)
+        return {}
+
+    def show(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Show the state at a time of the motion."""
+        time = Fields("motion.show", data, ["time"]).number("time", 0.0, LONGEST)
+        if self.motion is None:
+            raise ValueError("motion.show: there is no motion")
+        self.desk.show(self.motion.q(min(time, self.motion.duration)))
+        return {}
+
+    def download(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the motion as a file."""
+        kind = Fields("motion.download", data, ["format"]).choice("format", ("csv", "npz"))
+        motion = self.motion
+        if motion is None:
+            raise ValueError("motion.download: there is no motion")
+        with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
+            path = motion.save(Path(folder) / f"motion.{kind}")
+            content = base64.b64encode(path.read_bytes()).decode()
+        return {"name": f"{self.desk.arm.name}-motion.{kind}", "content": content}
+
+    def add(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Teach the state on show as a waypoint."""
+        Fields("waypoints.add", data, [])
+        if len(self.waypoints) >= MOST_WAYPOINTS:
+            raise ValueError(f"waypoints.add: {MOST_WAYPOINTS} waypoints are enough")
+        self.waypoints.append(self.desk.q.copy())
+        self._tell_waypoints()
+        return {}
+
+    def remove(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Forget a waypoint."""
+        del self.waypoints[Fields("waypoints.remove", data, ["index"]).whole("index", 0, len(self.waypoints) - 1)]
+        self._tell_waypoints()
+        return {}
+
+    def go(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Show a waypoint."""
+        index = Fields("waypoints.go", data, ["index"]).whole("index", 0, len(self.waypoints) - 1)
+        self.desk.show(self.waypoints[index])
+        return {}
+
+    def forget(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Forget all waypoints."""
+        Fields("waypoints.clear", data, [])
+        self.waypoints.clear()
+        self._tell_waypoints()
+        return {}
+
+    def close(self) -> None:
+        """End what runs."""
+        self.jobs.close()
+        self._collisions.close()
+
+    def publish(self) -> None:
+        """Tell the pages that there is nothing yet."""
+        self.desk.view.panel("motion", None)
+        self.desk.view.panel("job", None)
+        self._tell_waypoints()
+
+    def _configuration(self, goal: Fields, arm: Arm, start: Array) -> Array:
+        if "T" in goal:
+            found: Array = solved(arm, goal.pose("T"), start)[0].require(start)
+            return found
+        return goal.vector("q", arm.n, LARGEST_JOINT_VALUE)
+
+    def _through(self, kind: str, duration: float | None) -> dict[str, Any]:
+        arm, points = self.desk.arm, [x.copy() for x in self.waypoints]
+        if len(points) < 2:
+            raise ValueError("motion.plan: fewer than 2 waypoints; expected some to go through")
+        if kind == "least-time":
+            return self._started("least time", lambda job: _quickest(arm, points[0], points[-1], points[1:-1], job))
+        times = None if duration is None else np.linspace(0.0, duration, len(points))
+        self._take(arm.spline(np.array(points), times), "waypoints")
+        return {}
+
+    def _started(self, title: str, work: Any) -> dict[str, Any]:
+        return {"job": self.jobs.start(title, work, lambda motion: self._take(motion, title))}
+
+    def _take(self, motion: Trajectory, kind: str) -> None:
+        """Play a motion, and tell its numbers."""
+        if motion.duration > LONGEST:
+            raise ValueError(f"the motion lasts {motion.duration:g} s; expected at most {LONGEST:g} s")
+        self.motion, self.kind = motion, kind
+        arm = self.desk.arm
+        numbers = arm.description.numbers
+        times = np.linspace(0.0, motion.duration, SHOWN)
+        bodies = all(joint.bodies for joint in arm.description.joints)
+        self.desk.view.play(motion)
+        state = {
+            "kind": kind,
+            "duration": motion.duration,
+            "times": times.tolist(),
+            "q": motion.q(times).tolist(),
+            "qd": motion.qd(times).tolist(),
+            "tau": motion.tau(times).tolist() if bodies else None,
+            "limits": {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")},
+            "collisions": [],
+            "excess": _excess(arm, motion, times),
+        }
+        self.desk.view.panel("motion", state)
+        q = motion.q(np.linspace(0.0, motion.duration, CHECKED))
+
+        def tell(touching: list[int]) -> None:
+            if touching and self.motion is motion:
+                self.desk.view.panel("motion", state | {"collisions": touching})
+
+        # Told behind the motion: the first time it takes a second.
+        self._collisions.start("collisions", lambda job: _collisions(arm, q), tell)
+
+    def _tell_waypoints(self) -> None:
+        points = [{"name": f"waypoint {k}", "q": q.tolist()} for k, q in enumerate(self.waypoints, start=1)]
+        self.desk.view.panel("waypoints", points)
+
+    def _forget(self) -> None:
+        self.jobs.cancel()
+        self.motion = None
+        self.waypoints.clear()
+        self.publish()
+
+
+def _quickest(arm: Arm, start: Array, goal: Array, via: list[Array], job: Job) -> Trajectory:
+    def told(now: Progress) -> None:
+        job.progress(f"iteration {now.iteration}: {now.duration:.3f} s")
+
+    job.progress("making the program")
+    return arm.plan(start, goal, via=via, compare=False, progress=told)
+
+
+def _circle(arm: Arm, start: Array, duration: float | None) -> Trajectory:
+    """Return a full circle of the tool, about the axis along which the arm has most room: its own z, or the world's."""
+    T = arm.fk(start)
+    radius = CIRCLE * (arm.description.reach or 1.0)
+    wrong: DhkitError | None = None
+    for axis, towards in (((0.0, 0.0, 1.0), -T[:3, 3] * [1, 1, 0]), ((0.0, 1.0, 0.0), -T[:3, 3] * [1, 0, 1])):
+        length = float(np.linalg.norm(towards))
+        if length < 1e-9:
+            continue
+        try:
+            return arm.circle(T, T[:3, 3] + radius * towards / length, axis, q0=start, duration=duration)
+        except DhkitError as error:
+            wrong = error
+    raise wrong or DescriptionError("the tool stands on the base's axis; expected a place beside it")
+
+
+def _collisions(arm: Arm, q: Array) -> list[int]:
+    """Return the samples in which links touch each other; empty where that cannot be told."""
+    try:
+        return [int(k) for k in np.flatnonzero(arm.distance(q, self_collision=True).itself < 0)]
+    except DhkitError:
+        return []
+
+
+def _excess(arm: Arm, motion: Trajectory, times: Array) -> str | None:
+    """Return the limit that is exceeded most, in words, or None."""
+    numbers = arm.description.numbers
+    q, qd = motion.q(times), motion.qd(times)
+    shares = {
+        "speed": np.abs(qd).max(axis=0) / numbers.velocity,
+        "range": np.maximum(q - numbers.upper, numbers.lower - q).max(axis=0) + 1.0,
+    }
+    if all(joint.bodies for joint in arm.description.joints):
+        shares["torque"] = np.abs(motion.tau(times)).max(axis=0) / numbers.effort
+    worst = max(((float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items()))
+    share, name, joint = worst
+    if share <= 1 + 1e-6:
+        return None
+    who = arm.description.joints[joint].name
+    if name == "range":
+        return f"{who} leaves its range"
+    return f"the {name} of {who} is {100 * share:.0f} % of its limit"

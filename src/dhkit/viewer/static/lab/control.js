@@ -1,0 +1,138 @@
+// Controllers on the simulated arm in real time, with errors and torques as they come.
+
+import { bytes, fixed, h, onTyped, save, typed } from "./dom.js";
+import { Plot, legend } from "./plot.js";
+
+const FRICTIONS = [["none", "none"], ["smooth", "smooth"], ["stiction", "with stiction"]];
+const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joint"], ["motion", "the planned motion, to and fro"], ["target", "the tool's target"]];
+const WINDOW = 10; // s that are drawn
+const MOST = 36000; // rows that are kept: ten minutes
+const PLOT_EVERY = 100; // ms
+
+export class ControlPanel {
+  constructor(lab, root) {
+    this.lab = lab;
+    const change = (name, value) => this.lab.ask("control.change", { [name]: value });
+    const choice = (name, label, options) => {
+      const list = h("select", { onchange: () => change(name, list.value) }, options.map(([value, text]) => h("option", { value }, text)));
+      this[name] = list;
+      return h("label", {}, h("span", {}, label), list);
+    };
+    const number = (name, label, unit) => {
+      const input = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": label });
+      onTyped(input, (text) => (typed(text) === null ? this.show() : change(name, typed(text))));
+      this[name] = input;
+      return h("label", {}, h("span", {}, label), h("span", {}, input, ` ${unit}`));
+    };
+    this.compensate = h("input", { type: "checkbox", onchange: () => change("compensate", this.compensate.checked) });
+    this.start = h("button", { type: "button", class: "main", onclick: () => this.toggle() }, "Start");
+    this.pause = h("button", { type: "button", onclick: () => lab.ask("control.pause") }, "Pause");
+    this.assume = h("button", { type: "button", hidden: true, onclick: () => lab.ask("bodies.assume") }, "Assume uniform links");
+    this.planar = h("button", { type: "button", "aria-pressed": "false", title: "Joints 2 and 3 move, the others are locked: the two-link arm of many courses", onclick: () => lab.ask("arm.planar", { on: this.planar.getAttribute("aria-pressed") !== "true" }) }, "Only joints 2 and 3");
+    this.note = h("p", { class: "note", role: "status" });
+    this.link = h("select", { "aria-label": "What is pushed" });
+    this.force = [0, 1, 2].map((k) => h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": `Force along ${"xyz"[k]}, N`, value: k === 2 ? "-50" : "0" }));
+    this.time = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration of the push, s", value: "0.2" });
+    this.pushing = h("button", { type: "button", onclick: () => this.push() }, "Push");
+    this.errors = new Plot("errors", "mrad or mm");
+    this.torques = new Plot("drives", "N m or N");
+    this.legend = h("div", { class: "legends" });
+    const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+    root.append(
+      h("div", { class: "settings" }, choice("controller", "Controller", []), choice("reference", "Follows", REFERENCES), number("bandwidth", "Bandwidth", "rad/s"), number("damping", "Damping", ""), choice("friction", "Friction", FRICTIONS), number("payload", "Payload", "kg"), h("label", { class: "check" }, this.compensate, "The controller compensates friction")),
+      h("p", { class: "hint" }, "The controller does not know of the payload. The ghost is what it follows."),
+      h("div", { class: "buttons" }, this.start, this.pause, this.planar, this.assume),
+      this.note,
+      h("fieldset", { class: "push" }, h("legend", {}, "Push"), h("div", { class: "line" }, this.link, h("label", {}, "for ", this.time, " s"), this.pushing), h("div", { class: "three" }, this.force.map((input, k) => h("label", {}, h("span", {}, `${"xyz"[k]} [N]`), input)))),
+      this.legend, this.errors.root, this.torques.root,
+      h("div", { class: "buttons" }, download("csv"), download("npz")),
+    );
+    this.rows = [];
+    this.columns = [];
+  }
+
+  take_arm(arm) {
+    this.arm = arm;
+    this.link.replaceChildren(h("option", { value: "" }, "the tool"), ...arm.joints.map((joint, i) => h("option", { value: String(i + 1) }, `link ${i + 1}`)));
+    this.assume.hidden = arm.bodies;
+    this.planar.hidden = arm.n < 4;
+    this.start.disabled = !arm.bodies;
+    if (!arm.bodies) this.note.textContent = "This arm has no masses: nothing can be simulated until uniform links are assumed.";
+  }
+
+  take_control(control) {
+    this.state = control;
+    if (this.controller.options.length !== control.controllers.length) this.controller.replaceChildren(...control.controllers.map(({ name, title }) => h("option", { value: name }, title)));
+    this.show();
+  }
+
+  show() {
+    const { state } = this;
+    if (!state) return;
+    // A list that is open is left alone.
+    for (const name of ["controller", "reference", "friction"]) if (this[name].value !== state[name]) this[name].value = state[name];
+    for (const name of ["bandwidth", "damping", "payload"]) if (document.activeElement !== this[name]) this[name].value = String(state[name]);
+    this.compensate.checked = state.compensate;
+    this.start.textContent = state.running ? "Stop" : "Start";
+    this.pause.textContent = state.paused ? "Go on" : "Pause";
+    this.pause.disabled = this.pushing.disabled = !state.running;
+    this.planar.setAttribute("aria-pressed", String(state.planar));
+    const slow = state.running && state.speed < 0.95 ? `${fixed(state.speed, 2)} of real time` : null;
+    const time = state.running ? `${fixed(state.time, 1)} s` : null;
+    const words = [state.error, time, slow, state.note].filter(Boolean);
+    if (this.arm?.bodies) this.note.textContent = words.join("; ");
+    this.note.classList.toggle("bad", Boolean(state.error));
+  }
+
+  async toggle() {
+    await this.lab.settled();
+    this.lab.ask(this.state?.running ? "control.stop" : "control.start");
+  }
+
+  push() {
+    const force = this.force.map((input) => typed(input.value)), duration = typed(this.time.value);
+    if (force.some((x) => x === null) || duration === null) return this.lab.complain("push: expected numbers, in N and s");
+    this.lab.ask("control.push", { link: this.link.value === "" ? null : Number(this.link.value), force, duration });
+  }
+
+  async download(format) {
+    const answer = await this.lab.ask("control.download", { format });
+    if (answer) save(answer.name, bytes(answer.content), "application/octet-stream");
+  }
+
+  samples({ columns, rows, restart }) {
+    if (restart || columns.length !== this.columns.length) {
+      this.rows = [];
+      this.columns = columns;
+      const joints = (columns.length - 2) / 2, names = columns.slice(1, 1 + joints).map((name) => this.arm?.joints[Number(name.slice(1)) - 1]?.name ?? name);
+      this.names = names;
+      this.scales = columns.slice(1, 1 + joints).map((name) => (this.arm?.joints[Number(name.slice(1)) - 1]?.unit === "m" ? 1000 : 1000));
+      this.legend.replaceChildren(legend(names));
+    }
+    const width = columns.length;
+    for (let i = 0; i < rows.length; i += width) this.rows.push(rows.subarray(i, i + width));
+    if (this.rows.length > MOST) this.rows.splice(0, this.rows.length - MOST);
+    const now = performance.now();
+    if (!this.visible || now - (this.drawn ?? 0) < PLOT_EVERY) return;
+    this.drawn = now;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.rows.length || !this.names) return;
+    const end = this.rows[this.rows.length - 1][0], n = this.names.length;
+    let begin = this.rows.length - 1;
+    while (begin > 0 && this.rows[begin - 1][0] > end - WINDOW) begin--;
+    const rows = this.rows.slice(begin);
+    const column = (k, scale = 1) => rows.map((row) => row[k] * scale);
+    const times = column(0);
+    this.errors.set(this.names, [times, ...this.names.map((_, i) => column(1 + i, this.scales[i]))]);
+    this.torques.set(this.names, [times, ...this.names.map((_, i) => column(1 + n + i))]);
+  }
+
+  shown(visible) {
+    this.visible = visible;
+    if (visible) requestAnimationFrame(() => { this.draw(); this.errors.resize(); this.torques.resize(); });
+  }
+}
+

@@ -1,0 +1,131 @@
+// Sliders and numbers of the joints, with their limits.
+
+import { UNITS, fixed, h, onTyped, typed } from "./dom.js";
+
+const FREE = { rad: Math.PI, m: 1 }; // what a slider spans on either side where a joint has no limit
+const KEYS = { plain: 1, shift: 10, alt: 0.1 }; // arrow keys: degrees or mm
+
+export class JointPanel {
+  constructor(lab, root) {
+    this.lab = lab;
+    this.root = root;
+    this.rows = [];
+    this.list = h("div", { class: "joints" });
+    this.named = h("div", { class: "buttons", role: "group", "aria-label": "Configurations" });
+    this.angle = this.unitChoice("angle", ["deg", "rad"], "Angles in");
+    this.length = this.unitChoice("length", ["m", "mm", "in"], "Lengths in");
+    root.append(this.named, this.list, h("div", { class: "units" }, this.angle, this.length), h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
+  }
+
+  unitChoice(name, units, label) {
+    const choose = h("select", { onchange: () => this.lab.setUnits({ [name]: choose.value }) }, units.map((unit) => h("option", { value: unit, selected: this.lab.units[name] === unit }, unit === "deg" ? "degrees" : unit)));
+    return h("label", {}, `${label} `, choose);
+  }
+
+  take_arm(arm) {
+    this.arm = arm;
+    this.length.hidden = !arm.joints.some((joint) => joint.unit === "m");
+    this.angle.hidden = !arm.joints.some((joint) => joint.unit === "rad");
+    this.named.replaceChildren(...arm.configurations.map((name) => h("button", { type: "button", onclick: () => this.lab.ask("joints.named", { name }) }, name)));
+    this.rows = arm.joints.map((joint, i) => this.row(joint, i));
+    this.list.replaceChildren(...this.rows.map((row) => row.root));
+    this.q = new Array(arm.n).fill(0);
+  }
+
+  row(joint, i) {
+    const lower = joint.lower ?? -FREE[joint.unit], upper = joint.upper ?? FREE[joint.unit];
+    const slider = h("input", { type: "range", min: String(lower), max: String(upper), step: "any", value: "0", "aria-label": joint.name });
+    const number = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${joint.name}, value`, class: "number" });
+    const unit = h("span", { class: "unit" });
+    const low = h("span"), high = h("span");
+    slider.addEventListener("input", () => this.slide(i, Number(slider.value)));
+    slider.addEventListener("keydown", (event) => this.key(event, i));
+    onTyped(number, (text) => {
+      const value = typed(text);
+      if (value === null) {
+        this.lab.complain(`${joint.name}: found ${text.slice(0, 40)}; expected a number`);
+        return this.show();
+      }
+      const { scale } = this.unit(i);
+      this.rows[i].typed = { text: String(value), value: value / scale, scale };
+      this.set(i, value / scale);
+    });
+    number.addEventListener("keydown", (event) => {
+      if (event.key !== "ArrowUp" && event.key !== "ArrowDown") return;
+      this.key(event, i);
+      number.value = this.text(i);
+    });
+    const root = h("div", { class: "joint" }, h("span", { class: "name", title: joint.name }, joint.name), h("span", { class: "value" }, number, unit), slider, h("span", { class: "limits" }, low, high));
+    return { root, slider, number, unit, low, high, lower, upper, joint };
+  }
+
+  unit(i) {
+    return UNITS[this.arm.joints[i].unit === "m" ? this.lab.units.length : this.lab.units.angle];
+  }
+
+  key(event, i) {
+    const direction = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!direction) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const size = event.altKey ? KEYS.alt : event.shiftKey ? KEYS.shift : KEYS.plain;
+    this.set(i, this.q[i] + direction * size * (this.arm.joints[i].unit === "m" ? 1e-3 : Math.PI / 180));
+  }
+
+  // What is shown is what is sent: a slider moves by the last digit on show.
+  slide(i, value) {
+    const { scale, digits } = this.unit(i);
+    this.set(i, Number(fixed(value * scale, digits)) / scale);
+  }
+
+  set(i, value) {
+    this.q = this.q.slice();
+    this.q[i] = value;
+    this.show();
+    this.lab.ask("joints.set", { q: this.q });
+  }
+
+  take_joints({ q, outside }) {
+    if (!this.arm || q.length !== this.arm.n) return;
+    this.outside = new Set(outside);
+    this.lab.stage.warn(outside);
+    if (this.lab.page.player.active) return; // an animation is on show
+    const dragged = this.rows.some((row) => row.slider === document.activeElement && row.slider.matches(":active"));
+    if (!dragged) this.q = q.slice();
+    this.show();
+  }
+
+  // An animation shows these values; null: it is over.
+  moved(q) {
+    if (!q || !this.arm) return;
+    this.q = [...q];
+    if (!this.root.hidden) this.show();
+  }
+
+  // A value with the digits of its unit, or as it was typed.
+  text(i) {
+    const { scale, digits } = this.unit(i), { typed: exact } = this.rows[i];
+    return exact && exact.value === this.q[i] && exact.scale === scale ? exact.text : fixed(this.q[i] * scale, digits);
+  }
+
+  shown(visible) {
+    if (visible && this.arm) this.show();
+  }
+
+  show() {
+    this.rows.forEach((row, i) => {
+      const { scale, digits, sign } = this.unit(i), text = this.text(i);
+      if (document.activeElement !== row.number) row.number.value = text;
+      if (Number(row.slider.value) !== this.q[i]) row.slider.value = String(this.q[i]);
+      row.slider.setAttribute("aria-valuetext", `${text}${sign}`);
+      row.unit.textContent = sign.trim();
+      row.low.textContent = row.joint.lower === null ? "no limit" : fixed(row.lower * scale, Math.min(digits, 2));
+      row.high.textContent = row.joint.upper === null ? "" : fixed(row.upper * scale, Math.min(digits, 2));
+      row.root.classList.toggle("outside", Boolean(this.outside?.has(i)));
+    });
+  }
+
+  unitsChanged() {
+    if (this.arm) this.show();
+  }
+}

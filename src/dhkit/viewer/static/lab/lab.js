@@ -1,0 +1,159 @@
+// The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
+
+import { h } from "./dom.js";
+import { ControlPanel } from "./control.js";
+import { JointPanel } from "./joints.js";
+import { MotionPanel } from "./motion.js";
+import { Requests } from "./requests.js";
+import { TablePanel } from "./table.js";
+import { ToolPanel } from "./tool.js";
+
+const PANELS = [
+  ["joints", "Joints", JointPanel],
+  ["tool", "Tool", ToolPanel],
+  ["table", "DH table", TablePanel],
+  ["motion", "Motion", MotionPanel],
+  ["control", "Control", ControlPanel],
+];
+const SHORT = 6000; // ms that a message stays
+
+export class Lab {
+  constructor(page) {
+    this.page = page;
+    this.stage = page.stage;
+    this.state = {};
+    this.requests = new Requests(page.connection, (error) => this.complain(error));
+    this.units = { angle: remembered("angle", "deg"), length: remembered("length", "m") };
+    this.build();
+    document.body.classList.add("lab");
+    document.getElementById("readout").open = false;
+    this.stage.resize();
+  }
+
+  build() {
+    const tabs = [], bodies = [];
+    this.panels = PANELS.map(([name, title, Panel], k) => {
+      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
+      const body = h("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}`, hidden: true });
+      tabs.push(tab);
+      bodies.push(body);
+      return { name, tab, body, panel: new Panel(this, body) };
+    });
+    this.title = h("h1", {}, "");
+    this.family = h("p", { class: "family" });
+    this.copy = h("button", { type: "button", class: "quiet", title: "The lines of Python that do the same", onclick: () => this.copyPython() }, "Copy as Python");
+    this.message = h("p", { class: "message", role: "alert", hidden: true });
+    const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
+    document.body.prepend(root);
+    this.addViews();
+    this.open(Math.max(0, PANELS.findIndex(([name]) => name === remembered("tab", "joints"))));
+  }
+
+  addViews() {
+    const views = h("select", { "aria-label": "Look from", title: "Look from", onchange: () => { this.stage.look(views.value); views.value = ""; } }, h("option", { value: "", hidden: true }, "View"), ["front", "side", "top", "iso"].map((name) => h("option", { value: name }, name)));
+    document.getElementById("reset").before(views);
+  }
+
+  open(k) {
+    this.panels.forEach(({ tab, body, panel }, i) => {
+      tab.setAttribute("aria-selected", String(i === k));
+      tab.tabIndex = i === k ? 0 : -1;
+      body.hidden = i !== k;
+      panel.shown?.(i === k);
+    });
+    remember("tab", this.panels[k].name);
+  }
+
+  moveTab(event, k) {
+    const count = this.panels.length, next = { ArrowRight: (k + 1) % count, ArrowLeft: (k + count - 1) % count, Home: 0, End: count - 1 }[event.key];
+    if (next === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.open(next);
+    this.panels[next].tab.focus();
+  }
+
+  take({ name, data }) {
+    this.state[name] = data;
+    if (name === "arm") {
+      this.title.textContent = data.name;
+      const family = data.family ?? "no closed form: followed by iteration";
+      this.family.textContent = this.family.title = data.assumed_bodies ? `${family}; masses assumed` : family;
+    }
+    for (const { panel } of this.panels) panel[`take_${name}`]?.(data);
+  }
+
+  samples(message) {
+    for (const { panel } of this.panels) panel.samples?.(message);
+  }
+
+  // q: joint values that an animation shows at a time, or null when it is over.
+  moved(q, time) {
+    for (const { panel } of this.panels) panel.moved?.(q, time);
+  }
+
+  // What is on show becomes the state that Python has, where an animation has left it elsewhere.
+  async settled() {
+    const { player } = this.page;
+    if (!player.active || !this.state.motion) return;
+    player.pause();
+    await this.ask("motion.show", { time: player.time });
+  }
+
+  ask(name, data) {
+    return this.requests.ask(name, data);
+  }
+
+  complain(error) {
+    this.message.textContent = error;
+    this.message.hidden = false;
+    clearTimeout(this.quiet);
+    this.quiet = setTimeout(() => (this.message.hidden = true), SHORT);
+  }
+
+  async copyPython() {
+    const answer = await this.ask("python");
+    if (!answer) return;
+    try {
+      await navigator.clipboard.writeText(answer.text);
+      this.copy.textContent = "Copied";
+    } catch {
+      this.show("Python", answer.text);
+    }
+    setTimeout(() => (this.copy.textContent = "Copy as Python"), 1500);
+  }
+
+  show(title, text) {
+    const close = () => dialog.remove();
+    const area = h("textarea", { readOnly: true, rows: 14, "aria-label": title });
+    area.value = text;
+    const dialog = h("dialog", { class: "text" }, h("h2", {}, title), area, h("button", { type: "button", onclick: close }, "Close"));
+    document.body.append(dialog);
+    dialog.addEventListener("close", close);
+    dialog.showModal();
+    area.select();
+  }
+
+  setUnits(units) {
+    Object.assign(this.units, units);
+    remember("angle", this.units.angle);
+    remember("length", this.units.length);
+    for (const { panel } of this.panels) panel.unitsChanged?.();
+  }
+}
+
+export function remembered(name, otherwise) {
+  try {
+    return sessionStorage.getItem(`dhkit-${name}`) ?? otherwise;
+  } catch {
+    return otherwise;
+  }
+}
+
+export function remember(name, value) {
+  try {
+    sessionStorage.setItem(`dhkit-${name}`, value);
+  } catch {
+    // A page without storage forgets.
+  }
+}

@@ -1,0 +1,153 @@
+// Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
+
+import { base64Of, bytes, DEGREES, fixed, h, save, typed } from "./dom.js";
+import { Plot, legend } from "./plot.js";
+
+const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
+const LARGEST_FILE = 500000; // bytes
+
+export class MotionPanel {
+  constructor(lab, root) {
+    this.lab = lab;
+    this.kind = h("select", { "aria-label": "Kind of motion", onchange: () => this.fit() }, KINDS.map(([value, text]) => h("option", { value }, text)));
+    this.goal = h("select", { "aria-label": "Goal" });
+    this.duration = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration in seconds", placeholder: "shortest" });
+    this.go = h("button", { type: "button", class: "main", onclick: () => this.plan() }, "Plan from here");
+    this.job = h("p", { class: "note", role: "status" });
+    this.cancel = h("button", { type: "button", hidden: true, onclick: () => lab.ask("motion.cancel") }, "Cancel");
+    this.facts = h("p", { class: "facts" });
+    this.points = h("ol", { class: "points" });
+    this.file = h("input", { type: "file", accept: ".csv,.mat,.npz,.yaml,.yml", "aria-label": "File with a motion", onchange: () => this.read() });
+    this.degrees = h("input", { type: "checkbox" });
+    this.plots = { q: new Plot("joints", "° or m"), qd: new Plot("rates", "°/s or m/s"), tau: new Plot("torques", "N m or N") };
+    this.legend = h("div");
+    this.figures = h("div", { hidden: true }, this.legend, Object.values(this.plots).map((plot) => plot.root));
+    const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+    this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
+    this.files = h("div", { class: "buttons", hidden: true }, this.replay, download("csv"), download("npz"), h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"));
+    root.append(
+      h("div", { class: "line" }, this.kind, h("label", { class: "goal" }, "to ", this.goal)),
+      h("div", { class: "line" }, h("label", {}, "in ", this.duration, " s"), this.go, this.cancel),
+      this.job,
+      this.facts,
+      this.files,
+      this.figures,
+      h("fieldset", {}, h("legend", {}, "Waypoints"), h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"), h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear")), this.points),
+      h("fieldset", {}, h("legend", {}, "From a file"), h("label", { class: "line" }, this.file), h("label", { class: "line" }, this.degrees, " angles in degrees")),
+    );
+  }
+
+  take_arm(arm) {
+    this.arm = arm;
+    this.goals();
+  }
+
+  take_waypoints(points) {
+    this.waypoints = points;
+    this.points.replaceChildren(...points.map((point, index) => h("li", {}, h("button", { type: "button", class: "quiet", onclick: () => this.lab.ask("waypoints.go", { index }) }, point.name), h("button", { type: "button", class: "quiet", "aria-label": `Forget ${point.name}`, onclick: () => this.lab.ask("waypoints.remove", { index }) }, "×"))));
+    this.goals();
+  }
+
+  take_target(target) {
+    this.target = target;
+    this.goals();
+  }
+
+  goals() {
+    const before = this.goal.value;
+    const options = (this.arm?.configurations ?? []).filter((name) => name !== "random").map((name) => [`named ${name}`, name]);
+    if (this.target?.reached) options.push(["target", "the target"]);
+    (this.waypoints ?? []).forEach((point, k) => options.push([`waypoint ${k}`, point.name]));
+    if ((this.waypoints ?? []).length > 1) options.push(["waypoints", "through all waypoints"]);
+    this.goal.replaceChildren(...options.map(([value, text]) => h("option", { value }, text)));
+    if (options.some(([value]) => value === before)) this.goal.value = before;
+    this.fit();
+  }
+
+  fit() {
+    this.goal.disabled = this.kind.value === "circle";
+  }
+
+  async plan() {
+    const text = this.duration.value.trim(), duration = text === "" ? null : typed(text);
+    if (text !== "" && !(duration > 0)) return this.lab.complain(`duration ${text}: expected a positive number of seconds`);
+    await this.lab.settled();
+    const goal = this.chosen();
+    if (goal) this.lab.ask("motion.plan", { kind: this.kind.value, goal, duration });
+  }
+
+  chosen() {
+    const value = this.goal.value;
+    if (this.kind.value === "circle") return {};
+    if (value === "waypoints") return { waypoints: true };
+    if (value === "target") return this.kind.value === "line" ? { T: this.target.T } : { q: this.target.branches.find((branch) => branch.chosen).q };
+    if (value.startsWith("waypoint ")) return { q: this.waypoints[Number(value.slice(9))].q };
+    return { q: this.arm.named[value.slice(6)] };
+  }
+
+  async teach() {
+    await this.lab.settled();
+    this.lab.ask("waypoints.add");
+  }
+
+  play() {
+    const { player } = this.lab.page;
+    if (player.active) player.toggle();
+    else this.lab.ask("motion.play");
+  }
+
+  // An animation is at a time: so are the curves.
+  moved(q, time) {
+    if (!q || !this.visible) return;
+    for (const plot of Object.values(this.plots)) plot.mark(time);
+  }
+
+  async read() {
+    const [file] = this.file.files;
+    if (!file) return;
+    if (file.size > LARGEST_FILE) return this.lab.complain(`${file.name} has ${file.size} bytes; expected at most ${LARGEST_FILE}`);
+    await this.lab.ask("motion.file", { name: file.name, content: await base64Of(file), degrees: this.degrees.checked });
+    this.file.value = "";
+  }
+
+  async download(format) {
+    const answer = await this.lab.ask("motion.download", { format });
+    if (answer) save(answer.name, bytes(answer.content), "application/octet-stream");
+  }
+
+  take_job(job) {
+    this.cancel.hidden = !job?.running;
+    this.job.textContent = job ? (job.error ? `${job.title}: ${job.error}` : `${job.title}: ${job.progress || "begun"}`) : "";
+    this.job.classList.toggle("bad", Boolean(job?.error));
+  }
+
+  take_motion(motion) {
+    this.motion = motion;
+    this.files.hidden = this.figures.hidden = !motion;
+    this.facts.textContent = "";
+    if (!motion) return;
+    const touching = motion.collisions.length ? "links touch each other on the way" : null;
+    this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching].filter(Boolean).join("; ");
+    this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
+    this.draw();
+  }
+
+  draw() {
+    const { motion, arm } = this, { joints } = arm;
+    const names = joints.map((joint) => joint.name), scales = joints.map((joint) => (joint.unit === "m" ? 1 : DEGREES));
+    this.legend.replaceChildren(legend(names));
+    const curves = (rows, scale) => [motion.times, ...joints.map((_, i) => rows.map((row) => row[i] * scale[i]))];
+    const pairs = (lower, upper, scale) => joints.map((_, i) => [lower[i], upper[i]].map((x) => (x === null ? null : x * scale[i])));
+    const both = (limit, scale) => pairs(limit.map((x) => (x === null ? null : -x)), limit, scale);
+    const ones = joints.map(() => 1), { limits } = motion;
+    this.plots.q.set(names, curves(motion.q, scales), pairs(limits.lower, limits.upper, scales));
+    this.plots.qd.set(names, curves(motion.qd, scales), both(limits.velocity, scales));
+    this.plots.tau.root.hidden = !motion.tau;
+    if (motion.tau) this.plots.tau.set(names, curves(motion.tau, ones), both(limits.effort, ones));
+  }
+
+  shown(visible) {
+    this.visible = visible;
+    if (visible && this.motion) requestAnimationFrame(() => Object.values(this.plots).forEach((plot) => plot.resize()));
+  }
+}

@@ -1,0 +1,112 @@
+// The tool: its pose in numbers, a target that the arm follows, and the branches that reach it.
+
+import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
+import { Gizmo } from "./gizmo.js";
+
+const AXES = ["x", "y", "z"];
+const GHOSTS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988"]; // dhkit/viewer/overlays.py
+const ORDERS = ["XYZ", "ZYX", "ZYZ", "ZXZ", "xyz", "zyx", "zyz", "zxz"];
+
+export class ToolPanel {
+  constructor(lab, root) {
+    this.lab = lab;
+    this.fields = [];
+    this.gizmo = new Gizmo(lab.stage, (T) => lab.ask("tool.target", { T }), () => this.lab.state.target?.T);
+    this.pose = h("div", { class: "pose" });
+    const field = (label, k) => {
+      const input = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", class: "number", "aria-label": label });
+      onTyped(input, () => this.typed());
+      this.fields[k] = input;
+      return h("label", {}, h("span", {}, label), input);
+    };
+    this.order = h("select", { "aria-label": "Convention of Euler angles", onchange: () => lab.ask("tool.order", { order: this.order.value }) }, ORDERS.map((order) => h("option", { value: order }, order === order.toUpperCase() ? `${order} moving axes` : `${order} fixed axes`)));
+    this.pose.append(h("div", { class: "three" }, AXES.map((axis, k) => field(`${axis} [m]`, k))), h("div", { class: "three" }, ["A", "B", "C"].map((name, k) => field(`${name} [°]`, 3 + k))), h("label", { class: "line" }, "Euler angles ", this.order));
+    this.matrix = h("details", {}, h("summary", {}, "Matrix"), h("div"));
+    this.note = h("p", { class: "note", role: "status" });
+    this.grab = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.toggle() }, "Move the tool by a target");
+    this.clear = h("button", { type: "button", hidden: true, onclick: () => lab.ask("tool.clear") }, "Remove the target");
+    this.branches = h("div", { class: "branches", role: "group", "aria-label": "Branches" });
+    this.jog = this.jogs();
+    root.append(h("h2", {}, "Pose of the tool"), this.pose, this.matrix, h("div", { class: "buttons" }, this.grab, this.clear), this.note, this.jog, this.branches);
+  }
+
+  jogs() {
+    this.frame = h("select", { "aria-label": "Axes of a step" }, h("option", { value: "world" }, "world axes"), h("option", { value: "tool" }, "tool axes"));
+    this.step = h("select", { "aria-label": "Size of a step" }, [["1", "1 mm, 1°"], ["10", "10 mm, 10°"], ["0.1", "0.1 mm, 0.1°"]].map(([value, text]) => h("option", { value, selected: value === "10" }, text)));
+    const button = (axis, sign) => {
+      const turning = axis > 2;
+      const name = `${sign > 0 ? "+" : "\u2212"}${turning ? "r" : ""}${AXES[axis % 3]}`;
+      const label = `${turning ? "turn about" : "move along"} ${sign > 0 ? "plus" : "minus"} ${AXES[axis % 3]}`;
+      return h("button", { type: "button", "aria-label": label, onclick: () => this.jogged(axis, sign) }, name);
+    };
+    const rows = [0, 3].map((first) => h("div", { class: "jog" }, [0, 1, 2].map((k) => [button(first + k, 1), button(first + k, -1)])));
+    return h("fieldset", {}, h("legend", {}, "Step"), h("div", { class: "line" }, this.step, this.frame), rows);
+  }
+
+  async jogged(axis, sign) {
+    await this.lab.settled();
+    const size = Number(this.step.value) * sign;
+    this.lab.ask("tool.jog", { axis, step: axis > 2 ? size / DEGREES : size / 1000, frame: this.frame.value });
+  }
+
+  async toggle() {
+    await this.lab.settled();
+    const { tool } = this.lab.state;
+    if (!this.lab.state.target && tool) await this.lab.ask("tool.target", { T: tool.T });
+    else this.lab.ask("tool.clear");
+  }
+
+  typed() {
+    const values = this.fields.map((input) => typed(input.value));
+    if (values.some((value) => value === null)) {
+      this.lab.complain("pose of the tool: expected numbers, in m and degrees");
+      return this.show();
+    }
+    this.lab.ask("tool.pose", { xyz: values.slice(0, 3), euler: values.slice(3).map((x) => x / DEGREES), order: this.order.value });
+  }
+
+  take_tool(tool) {
+    this.tool = tool;
+    this.show();
+  }
+
+  show() {
+    if (!this.tool) return;
+    const { T, xyz, euler, order, singular } = this.tool;
+    [...xyz.map((x) => fixed(x, 5)), ...euler.map((x) => fixed(x * DEGREES, 3))].forEach((text, k) => {
+      if (document.activeElement !== this.fields[k]) this.fields[k].value = text;
+    });
+    this.order.value = order;
+    if (this.matrix.open || !this.matrix.lastChild.firstChild) this.matrix.lastChild.replaceChildren(matrix(T));
+    this.singular = singular;
+    this.remark();
+  }
+
+  remark() {
+    const target = this.lab.state.target;
+    const words = [target?.message, target?.message ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
+    this.note.textContent = words.filter(Boolean).join("; ");
+    this.note.classList.toggle("bad", Boolean(target && !target.reached));
+  }
+
+  take_target(target) {
+    this.clear.hidden = !target;
+    this.grab.hidden = Boolean(target);
+    this.gizmo.set(target?.T ?? null, target ? target.reached : true, this.lab.state.arm?.reach ?? 1);
+    const focused = document.activeElement?.dataset?.branch;
+    let ghosts = 0;
+    this.branches.replaceChildren(...(target?.branches ?? []).map((branch) => this.branch(branch, branch.chosen ? null : ghosts++)));
+    if (focused) this.branches.querySelector(`[data-branch="${CSS.escape(focused)}"]`)?.focus();
+    this.remark();
+  }
+
+  // ghost: its number among the ghosts in the scene, in whose colour it is marked.
+  branch(branch, ghost) {
+    const joints = this.lab.state.arm?.joints ?? [];
+    const values = branch.q.map((x, i) => (joints[i]?.unit === "m" ? `${fixed(x, 3)} m` : `${fixed(x * DEGREES, 1)}°`)).join("  ");
+    const choose = () => this.lab.ask("tool.choose", { branch: branch.name });
+    const button = h("button", { type: "button", "aria-pressed": String(branch.chosen), title: values, onclick: choose }, h("span", {}, h("i", { style: ghost === null ? null : `background:${GHOSTS[ghost % GHOSTS.length]}` }), branch.name), branch.within ? null : h("small", {}, "outside limits"));
+    button.dataset.branch = branch.name;
+    return button;
+  }
+}

@@ -1,0 +1,415 @@
+"""What a page can ask for: each panel's requests do what the API does, on several arms."""
+
+import base64
+import json
+import time
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from dhkit import Arm
+from dhkit.description import from_toml, pose_parts
+from dhkit.viewer.protocol import decode_animation, decode_ghosts, decode_pose
+from dhkit.viewer.session import Slot
+from dhkit.viewer.streams import Samples, decode_samples, decode_state
+
+ROBOTS = ["puma560", "planar2r", "cobra600", "stanford", "panda"]
+
+
+def states(lab):
+    """Return the latest state of every panel."""
+    server = lab.view._live()
+    found = {}
+    for slot, (_, message) in server._state.items():
+        if slot >= Slot.PANELS and not isinstance(message, Samples):
+            name, data = decode_state(message)
+            found[name] = data
+    return found
+
+
+def samples(lab):
+    server = lab.view._live()
+    return [m for _, m in server._state.values() if isinstance(m, Samples)]
+
+
+def shown(lab):
+    return decode_pose(lab.view._state[Slot.MOTION])
+
+
+def wait_for(what, seconds=20.0):
+    deadline = time.monotonic() + seconds
+    while not (found := what()):
+        assert time.monotonic() < deadline, "it did not come"
+        time.sleep(0.02)
+    return found
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_joints_are_shown_as_they_were_set(name, open_lab):
+    lab = open_lab(name)
+    arm = lab.desk.arm
+    q = np.random.default_rng(1).uniform(-1, 1, arm.n)
+    lab.answer("joints.set", {"q": q.tolist()})
+    assert np.array_equal(states(lab)["joints"]["q"], q)
+    assert np.allclose(shown(lab).q, q, atol=1e-6)
+    tool = states(lab)["tool"]
+    assert np.array_equal(tool["T"], arm.fk(q).ravel())
+    xyz, euler = pose_parts(arm.fk(q))
+    assert np.array_equal(tool["xyz"], xyz) and np.array_equal(tool["euler"], euler)
+    numbers = arm.description.numbers
+    beyond = np.where(np.isfinite(numbers.upper), numbers.upper + 0.1, 0.0)
+    lab.answer("joints.set", {"q": beyond.tolist()})
+    assert states(lab)["joints"]["outside"] == np.flatnonzero(beyond > numbers.upper).tolist()
+    for configuration in states(lab)["arm"]["configurations"]:
+        lab.answer("joints.named", {"name": configuration})
+    q = np.array(states(lab)["joints"]["q"])
+    assert np.all((q >= numbers.lower) & (q <= numbers.upper))  # the last was random
+    json.dumps(states(lab), allow_nan=False)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_arm_follows_the_target(name, open_lab):
+    lab = open_lab(name)
+    arm = lab.desk.arm
+    q = np.clip(np.full(arm.n, 0.4), arm.description.numbers.lower, arm.description.numbers.upper)
+    if name == "panda":
+        q = np.array([0.1, -0.5, 0.2, -2.0, 0.1, 1.6, 0.7])
+    lab.answer("joints.set", {"q": q.tolist()})
+    lab.answer("tool.target", {"T": arm.fk(q).ravel().tolist()})
+    target = states(lab)["target"]
+    assert target["reached"] and target["distance"] < 1e-9
+    branches = target["branches"]
+    assert sum(branch["chosen"] for branch in branches) == 1
+    if name == "puma560":
+        assert len(branches) == 8
+        assert len(decode_ghosts(lab.view._state[Slot.GHOSTS]).transforms) == 7
+    for branch in branches:
+        T = arm.fk(np.array(branch["q"]))
+        assert np.abs(T[:3, 3] - arm.fk(q)[:3, 3]).max() < 1e-9
+    before = arm.fk(lab.desk.q)
+    answer = lab.answer("tool.jog", {"axis": 0, "step": -0.01, "frame": "world"})
+    assert answer["reached"]
+    assert np.allclose(arm.fk(lab.desk.q)[:3, 3] - before[:3, 3], [-0.01, 0, 0], atol=1e-9)
+    answer = lab.answer("tool.pose", {"xyz": [50.0, 0.0, 0.0], "euler": [0.0, 0.0, 0.0]})
+    assert not answer["reached"] and answer["message"]
+    lab.answer("tool.clear", {})
+    assert states(lab)["target"] is None
+    assert len(decode_ghosts(lab.view._state[Slot.GHOSTS]).transforms) == 0
+
+
+def test_another_branch_can_be_chosen_and_is_kept(open_lab):
+    lab = open_lab("puma560")
+    q = np.array([0.3, 0.8, -0.9, 0.4, 0.6, 0.2])
+    T = lab.desk.arm.fk(q)
+    lab.answer("joints.set", {"q": q.tolist()})
+    lab.answer("tool.target", {"T": T.ravel().tolist()})
+    other = next(b["name"] for b in states(lab)["target"]["branches"] if not b["chosen"] and b["within"])
+    lab.answer("tool.choose", {"branch": other})
+    assert states(lab)["target"]["chosen"] == other
+    T[0, 3] += 0.005
+    lab.answer("tool.target", {"T": T.ravel().tolist()})
+    assert states(lab)["target"]["chosen"] == other
+    with pytest.raises(ValueError, match="expected a branch that reaches"):
+        lab.answer("tool.choose", {"branch": "upside down"})
+
+
+def test_the_target_of_a_planar_arm_stays_in_its_plane(open_lab):
+    lab = open_lab("planar2r")
+    T = lab.desk.arm.fk([0.3, 0.5])
+    T[2, 3] += 0.2
+    lab.answer("tool.target", {"T": T.ravel().tolist()})
+    target = states(lab)["target"]
+    assert target["snapped"] and target["reached"] and abs(target["T"][11]) < 1e-12
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_an_edit_of_the_table_is_that_of_the_api(name, open_lab):
+    lab = open_lab(name)
+    first = lab.desk.arm
+    lab.answer("table.edit", {"row": 1, "column": "a", "text": "0.5 + 1*inch"})
+    arm = lab.desk.arm
+    assert arm.description.numbers.a[1] == pytest.approx(0.5254, abs=1e-15)
+    q = lab.desk.q
+    assert np.abs(np.array(states(lab)["tool"]["T"]).reshape(4, 4) - arm.fk(q)).max() < 1e-12
+    assert len(states(lab)["table"]["A"]) == arm.n
+    chain = np.eye(4)
+    for A in states(lab)["table"]["A"]:
+        chain = chain @ np.array(A).reshape(4, 4)
+    assert np.abs(arm.description.numbers.T_world_base @ chain - arm.frames(q)[-1]).max() < 1e-12
+    lab.answer("table.undo", {})
+    assert lab.desk.arm.description == first.description
+    lab.answer("table.redo", {})
+    assert lab.desk.arm.description.numbers.a[1] == arm.description.numbers.a[1]
+    lab.answer("table.convention", {"convention": "modified"})
+    assert lab.desk.arm.description.convention.value == "modified"
+    text = lab.answer("table.download", {"format": "toml"})["text"]
+    assert from_toml(text) == lab.desk.arm.description
+    assert "<robot" in lab.answer("table.download", {"format": "urdf"})["text"]
+    lab.answer("table.reset", {})
+    assert lab.desk.arm.description == first.description
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_four_steps_lead_from_one_frame_to_the_next(convention, open_lab):
+    lab = open_lab("stanford")
+    lab.answer("table.convention", {"convention": convention})
+    lab.answer("joints.set", {"q": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]})
+    frames = lab.desk.arm.frames(lab.desk.q)
+    for row in range(6):
+        answer = lab.answer("table.steps", {"row": row})
+        first, *_, last = (np.array(step["T"]).reshape(4, 4) for step in answer["steps"])
+        assert len(answer["steps"]) == 5
+        assert np.abs(first - frames[row]).max() < 1e-12 and np.abs(last - frames[row + 1]).max() < 1e-12
+
+
+def test_an_impossible_entry_is_marked_and_the_last_good_arm_stands(open_lab):
+    lab = open_lab("puma560")
+    lab.answer("table.edit", {"row": 1, "column": "a", "text": "0.5"})
+    good = lab.desk.arm
+    for text in ("", "1/0", "x", "__import__('os')", "1e400", "9" * 199, "pi/"):
+        assert lab.answer("table.edit", {"row": 2, "column": "d", "text": text})["error"]
+        table = states(lab)["table"]
+        assert [(e["row"], e["column"]) for e in table["errors"]] == [(2, "d")]
+        assert table["rows"][2]["d"] == text.strip()
+        assert lab.desk.arm is good
+    lab.answer("table.edit", {"row": 2, "column": "d", "text": "0.2"})
+    assert not states(lab)["table"]["errors"] and lab.desk.arm.description.numbers.d[2] == 0.2
+
+
+def test_an_arm_that_loses_its_closed_form_is_followed_by_iteration(open_lab):
+    lab = open_lab("puma560")
+    begin = time.perf_counter()
+    lab.answer("table.edit", {"row": 4, "column": "d", "text": "0.01"})
+    assert time.perf_counter() - begin < 5
+    assert "no closed form" in states(lab)["table"]["note"]
+    q = np.array([0.3, 0.8, -0.9, 0.4, 0.6, 0.2])
+    lab.answer("joints.set", {"q": q.tolist()})
+    lab.answer("tool.target", {"T": lab.desk.arm.fk(q).ravel().tolist()})
+    target = states(lab)["target"]
+    assert target["numeric"] and target["reached"] and len(target["branches"]) == 1
+
+
+@pytest.mark.parametrize("name", ["puma560", "planar2r", "stanford"])
+def test_motions_are_those_of_the_api(name, open_lab):
+    lab = open_lab(name)
+    arm = lab.desk.arm
+    start = lab.desk.q.copy()
+    goal = start + 0.2
+    for kind in ("quintic", "trapezoidal"):
+        lab.answer("motion.plan", {"kind": kind, "goal": {"q": goal.tolist()}, "duration": 1.5})
+        motion = states(lab)["motion"]
+        mine = getattr(arm, kind)(start, goal, 1.5)
+        assert motion["duration"] == mine.duration == 1.5
+        assert np.abs(np.array(motion["q"]) - mine.q(np.array(motion["times"]))).max() < 1e-12
+        assert np.abs(np.array(motion["tau"]) - mine.tau(np.array(motion["times"]))).max() < 1e-9
+        assert decode_animation(lab.view._state[Slot.MOTION]).times[-1] == 1.5
+    content = base64.b64decode(lab.answer("motion.download", {"format": "csv"})["content"])
+    lab.answer("motion.file", {"name": "again.csv", "content": base64.b64encode(content).decode()})
+    assert states(lab)["motion"]["kind"] == "file"
+    lab.answer("motion.show", {"time": 0.75})
+    assert np.abs(lab.desk.q - (start + goal) / 2).max() < 1e-3
+    lab.answer("motion.clear", {})
+    assert states(lab)["motion"] is None
+
+
+def test_long_work_is_a_job_that_can_be_cancelled(open_lab):
+    lab = open_lab("puma560")
+    lab.answer("joints.named", {"name": "nominal"})
+    goal = {"q": lab.desk.arm.configurations["ready"].tolist()}
+    lab.answer("motion.plan", {"kind": "least-time", "goal": goal})
+    assert wait_for(lambda: states(lab)["job"])["running"]
+    lab.answer("motion.cancel", {})
+    assert states(lab)["job"] is None and states(lab)["motion"] is None
+    lab.answer("motion.plan", {"kind": "least-time", "goal": goal})
+    motion = wait_for(lambda: states(lab)["motion"])
+    assert motion["kind"] == "least time" and motion["excess"] is None
+    assert motion["duration"] < lab.desk.arm.quintic(lab.desk.arm.configurations["nominal"], goal["q"]).duration
+    far = np.eye(4)
+    far[0, 3] = 9.0
+    lab.answer("motion.plan", {"kind": "line", "goal": {"T": far.ravel().tolist()}})
+    job = wait_for(lambda: (states(lab)["job"] or {}).get("error") and states(lab)["job"])
+    assert not job["running"]
+
+
+def test_waypoints_are_taught_and_replayed(open_lab):
+    lab = open_lab("planar2r")
+    places = [[0.1, 0.2], [0.5, 0.3], [0.7, -0.2]]
+    for q in places:
+        lab.answer("joints.set", {"q": q})
+        lab.answer("waypoints.add", {})
+    lab.answer("waypoints.go", {"index": 0})
+    assert lab.desk.q.tolist() == places[0]
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"waypoints": True}, "duration": 2.0})
+    q = np.array(states(lab)["motion"]["q"])
+    for place in places:
+        assert np.abs(q - place).max(axis=1).min() < 5e-3
+    lab.answer("waypoints.remove", {"index": 1})
+    assert [point["q"] for point in states(lab)["waypoints"]] == [places[0], places[2]]
+    lab.answer("waypoints.clear", {})
+    assert states(lab)["waypoints"] == []
+
+
+def test_a_log_of_matlab_is_a_motion(open_lab, tmp_path):
+    lab = open_lab("planar2r")
+    t = np.linspace(0, 1, 51)
+    savemat(tmp_path / "log.mat", {"tout": t, "q": np.degrees(np.column_stack([np.sin(t), np.cos(t)]))})
+    content = base64.b64encode((tmp_path / "log.mat").read_bytes()).decode()
+    lab.answer("motion.file", {"name": "log.mat", "content": content, "degrees": True})
+    assert np.abs(np.array(states(lab)["motion"]["q"])[0] - [0, 1]).max() < 1e-9
+
+
+def test_a_controller_runs_in_real_time_and_is_changed_on_the_way(open_lab):
+    lab = open_lab("puma560")
+    lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
+    wait_for(lambda: samples(lab) and len(samples(lab)[0].rows) > 30)
+    lab.answer("control.push", {"link": None, "force": [0, 0, -100], "duration": 0.1})
+    lab.answer("control.change", {"controller": "pid", "payload": 2.0, "friction": "stiction", "compensate": True})
+    wait_for(lambda: samples(lab)[0].rows[-1, 0] > 1.5)
+    lab.answer("control.pause", {})
+    state = states(lab)["control"]
+    assert state["running"] and state["paused"] and state["error"] is None and state["controller"] == "pid"
+    rows = samples(lab)[0]
+    assert rows.columns[:2] == ("t", "e1") and rows.columns[-1] == "tool" and len(rows.columns) == 14
+    assert np.all(np.diff(rows.rows[:, 0]) > 0)
+    assert np.abs(rows.rows[5:30, 1:7]).max() < 1e-3  # computed torque follows
+    decode_samples(rows.encoded())
+    assert len(decode_ghosts(lab.view._state[Slot.GHOSTS]).transforms) == 1
+    download = lab.answer("control.download", {"format": "csv"})
+    assert base64.b64decode(download["content"]).startswith(b"# dhkit simulation")
+    lab.answer("control.stop", {})
+    assert not states(lab)["control"]["running"]
+
+
+def test_joints_2_and_3_alone(open_lab):
+    lab = open_lab("puma560_cao")
+    before = lab.desk.q.copy()
+    lab.answer("arm.planar", {"on": True})
+    lab.answer("control.start", {"controller": "pd-gravity", "reference": "sine"})
+    wait_for(lambda: samples(lab) and len(samples(lab)[0].rows) > 30)
+    lab.answer("control.stop", {})
+    assert samples(lab)[0].columns == ("t", "e2", "e3", "tau2", "tau3", "tool")
+    moved = np.flatnonzero(lab.desk.q != before)
+    assert set(moved) == {1, 2}
+    with pytest.raises(ValueError, match="expected at least 4"):
+        open_lab("planar2r").answer("arm.planar", {"on": True})
+
+
+def test_an_arm_without_bodies_gets_uniform_links_that_are_called_assumed(open_lab):
+    arm = Arm.from_dh([(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)])
+    lab = open_lab(arm)
+    assert not states(lab)["arm"]["bodies"]
+    with pytest.raises(ValueError, match="no bodies"):
+        lab.answer("control.start", {})
+    lab.answer("bodies.assume", {})
+    assert states(lab)["arm"]["bodies"] and states(lab)["arm"]["assumed_bodies"]
+    lab.answer("control.start", {})
+    wait_for(lambda: samples(lab) and len(samples(lab)[0].rows) > 3)
+    assert "assumed" in states(lab)["control"]["note"]
+    lab.answer("control.stop", {})
+
+
+def test_the_lines_of_python_do_the_same(open_lab):
+    lab = open_lab("planar2r")
+    lab.answer("joints.set", {"q": [0.3, 0.5]})
+    lab.answer("tool.target", {"T": lab.desk.arm.fk([0.3, 0.5]).ravel().tolist()})
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": [0.5, 0.1]}, "duration": 1.0})
+    text = lab.answer("python", {})["text"]
+    space = {}
+    exec(text, space)
+    assert np.allclose(space["q"], [0.3, 0.5], atol=1e-12) and space["motion"].duration == 1.0
+
+
+BAD = {
+    "joints.set": [
+        {},
+        {"q": None},
+        {"q": [1] * 5},
+        {"q": "ready"},
+        {"q": [1, 2, 3, 4, 5, "6"]},
+        {"q": [True] * 6},
+        {"q": [1e9] * 6},
+        {"p": [0] * 6},
+    ],
+    "joints.named": [{}, {"name": 1}, {"name": "nowhere"}, {"name": None}],
+    "tool.target": [
+        {},
+        {"T": [0] * 16},
+        {"T": [1] * 15},
+        {"T": list(range(16))},
+        {"T": [1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+        {"T": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+    ],
+    "tool.pose": [{}, {"xyz": [0, 0], "euler": [0, 0, 0]}, {"xyz": [0, 0, 0], "euler": [0, 0, 0], "order": "ABC"}],
+    "tool.jog": [
+        {},
+        {"axis": 6, "step": 0},
+        {"axis": 0.5, "step": 1},
+        {"axis": 0, "step": "far"},
+        {"axis": 0, "step": 1, "frame": "moon"},
+    ],
+    "tool.choose": [{}, {"branch": 3}, {"branch": "left"}],
+    "tool.order": [{}, {"order": "XXX"}],
+    "table.edit": [
+        {},
+        {"row": 6, "column": "a", "text": "1"},
+        {"row": 0, "column": "b", "text": "1"},
+        {"row": 0, "column": "a", "text": 1},
+        {"row": 0, "column": "a", "text": "1" * 201},
+        {"row": -1, "column": "a", "text": "1"},
+    ],
+    "table.convention": [{}, {"convention": "mine"}],
+    "table.undo": [{}, {"x": 1}],
+    "table.steps": [{}, {"row": 6}],
+    "table.download": [{}, {"format": "exe"}, {"format": "../toml"}],
+    "motion.plan": [
+        {},
+        {"kind": "quintic"},
+        {"kind": "quintic", "goal": {"q": [1]}},
+        {"kind": "quintic", "goal": {"q": [0] * 6}, "duration": -1},
+        {"kind": "quintic", "goal": {"q": [0] * 6}, "duration": 1e9},
+        {"kind": "jump", "goal": {"q": [0] * 6}},
+        {"kind": "quintic", "goal": [1]},
+        {"kind": "quintic", "goal": {"waypoints": True}},
+    ],
+    "motion.file": [
+        {},
+        {"name": "x.exe", "content": ""},
+        {"name": "x.csv", "content": "%%%"},
+        {"name": "x.csv", "content": ""},
+        {"name": "../../x.npz", "content": "AAAA"},
+        {"name": "x.csv", "content": "A" * 800_000},
+    ],
+    "motion.show": [{}, {"time": 0.5}, {"time": -1}],
+    "motion.download": [{}, {"format": "csv"}, {"format": "py"}],
+    "waypoints.remove": [{}, {"index": 0}],
+    "control.start": [
+        {"controller": "mine"},
+        {"bandwidth": 0},
+        {"bandwidth": 1e9},
+        {"payload": -1},
+        {"reference": "moon"},
+        {"friction": 3},
+        {"compensate": "yes"},
+        {"reference": "motion"},
+    ],
+    "control.push": [{}, {"force": [0, 0, 1]}, {"link": 9, "force": [0, 0, 1]}, {"force": [1e9, 0, 0]}],
+    "control.download": [{}, {"format": "csv"}],
+    "arm.planar": [{}, {"on": "yes"}],
+    "no.such": [{}],
+}
+
+
+def test_what_is_wrong_is_one_line_and_changes_nothing(open_lab):
+    lab = open_lab("puma560")
+    before = {name: data for name, data in states(lab).items() if name != "control"}
+    count = 0
+    for name, wrongs in BAD.items():
+        for data in wrongs:
+            count += 1
+            with pytest.raises(ValueError) as caught:  # noqa: PT011 - the class is the test
+                lab.answer(name, data)
+            assert "\n" not in str(caught.value) and len(str(caught.value)) < 300, (name, data)
+    assert count >= 60
+    assert {name: data for name, data in states(lab).items() if name != "control"} == before
+    assert not states(lab)["control"]["running"]
