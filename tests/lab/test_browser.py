@@ -19,8 +19,6 @@ from dhkit import Arm
 from dhkit.description import pose
 
 pytestmark = pytest.mark.slow
-unsettled = only_accepting
-"""For tests of the page, which is not finished, that take long or fail on a busy machine: in `make accept`."""
 
 PANELS = ["joints", "tool", "table", "motion", "control"]
 DEGREE = math.pi / 180
@@ -120,7 +118,6 @@ def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(visit):
     assert np.abs(np.delete(lab.desk.q - lab.desk.first(lab.desk.arm), 1)).max() == 0
 
 
-@unsettled
 def test_a_number_is_typed_and_a_wrong_one_is_refused(visit):
     lab, page = visit("puma560")
     write(page, "waist, value", "-33.125")
@@ -135,7 +132,6 @@ def test_a_number_is_typed_and_a_wrong_one_is_refused(visit):
     page.until("document.querySelector('.joint').classList.contains('outside')")
 
 
-@unsettled
 def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
     lab, page = visit("puma560")
     q = lab.desk.q.copy()
@@ -149,7 +145,6 @@ def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
         assert page.evaluate(f"{labelled('elbow, value')}.value") == f"{q[2] / DEGREE:.2f}"
 
 
-@unsettled
 def test_units_change_what_is_shown_and_not_the_arm(visit):
     lab, page = visit("stanford")
     before = lab.desk.q.copy()
@@ -167,7 +162,7 @@ def test_units_change_what_is_shown_and_not_the_arm(visit):
     wait_for(lambda: abs(lab.desk.q[slide] - 12.5 * 0.0254) < 1e-15)
 
 
-@unsettled
+@only_accepting
 def test_configurations_by_name(visit):
     lab, page = visit("puma560")
     for name, q in lab.desk.named().items():
@@ -240,6 +235,11 @@ def at_target(lab):
     return np.abs(T - goal).max()
 
 
+def reached(lab):
+    """Return whether the tool is where the target is; an arm of few joints cannot turn as it does."""
+    return np.abs(lab.desk.arm.fk(lab.desk.q) - lab._tool.T)[:3, 3].max() < 1e-5
+
+
 def count_states(page, name):
     page.evaluate(
         "(() => { const take = dhkit.lab.take; globalThis.came = []; globalThis.cameras = new Set();"
@@ -247,7 +247,7 @@ def count_states(page, name):
     )
 
 
-@unsettled
+@only_accepting
 @pytest.mark.parametrize("turns", [False, True], ids=["arrow", "ring"])
 def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, turns):
     before = yardstick()
@@ -286,7 +286,6 @@ def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, turns):
     assert np.abs(np.array(xyz[:3]) - lab.desk.arm.fk(q)[:3, 3]).max() < PRINTED
 
 
-@unsettled
 def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
     lab, page = visit("puma560")
     lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
@@ -305,7 +304,6 @@ def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
     page.until(f"dhkit.lab.state.target.chosen === {json.dumps(inside)}")
 
 
-@unsettled
 def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
     lab, page = visit("puma560")
     lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
@@ -327,7 +325,6 @@ def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
     page.until("!document.querySelector('.branches button')")
 
 
-@unsettled
 def test_the_tool_is_jogged_in_the_axes_of_world_and_tool(visit):
     lab, page = visit("puma560")
     lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
@@ -388,7 +385,6 @@ def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(visit):
     wait_for(lambda: lab.desk.arm.description.convention.value == "standard")
 
 
-@unsettled
 def test_letters_in_a_field_are_no_shortcuts(visit):
     _, page = visit("puma560")
     panel(page, "table")
@@ -396,7 +392,6 @@ def test_letters_in_a_field_are_no_shortcuts(visit):
     page.until(f"{labelled('d of row 1')}.value === 'sqrt(2)/2'")
 
 
-@unsettled
 def test_two_edits_in_a_row_are_both_made(visit):
     lab, page = visit("puma560")
     panel(page, "table")
@@ -412,7 +407,7 @@ def test_two_edits_in_a_row_are_both_made(visit):
     wait_for(lambda: lab.desk.arm.description.numbers.a[1] == 0.5 and lab.desk.arm.description.numbers.alpha[1] == 0.1)
 
 
-@unsettled
+@only_accepting
 def test_the_four_transforms_of_a_row_are_animated(visit):
     lab, page = visit("puma560")
     panel(page, "table")
@@ -440,7 +435,6 @@ def plots(page, name):
     )
 
 
-@unsettled
 def test_a_motion_is_planned_played_scrubbed_and_taken_over(visit):
     lab, page = visit("puma560")
     panel(page, "motion")
@@ -469,7 +463,7 @@ def test_a_motion_is_planned_played_scrubbed_and_taken_over(visit):
     page.until("dhkit.lab.state.motion === null")
 
 
-@unsettled
+@only_accepting
 def test_waypoints_are_taught_and_gone_through(visit):
     lab, page = visit("puma560")
     for k, name in enumerate(("ready", "zero", "nominal"), start=1):
@@ -491,7 +485,7 @@ def test_waypoints_are_taught_and_gone_through(visit):
     page.until("document.querySelectorAll('.points li').length === 2")
 
 
-@unsettled
+@only_accepting
 def test_a_least_time_motion_is_planned_in_the_background(visit):
     lab, page = visit("planar2r")
     panel(page, "motion")
@@ -508,7 +502,6 @@ def test_a_least_time_motion_is_planned_in_the_background(visit):
     assert page.evaluate("dhkit.lab.state.job?.error ?? null") is None
 
 
-@unsettled
 def test_a_file_is_chosen(visit, tmp_path):
     lab, page = visit("puma560")
     saved = lab.desk.arm.quintic(np.zeros(6), lab.desk.q, 2.0).save(tmp_path / "mine.csv")
@@ -561,7 +554,6 @@ def labelled_list(text):
     )
 
 
-@unsettled
 def test_joints_2_and_3_alone_and_an_arm_without_bodies(visit):
     _, page = visit("puma560")
     panel(page, "control")
@@ -611,7 +603,7 @@ def enter_again(page, lab):
     page.settle()
 
 
-@unsettled
+@only_accepting
 def test_every_control_is_reached_by_the_keyboard(visit):
     lab, page = visit("puma560")
     lab.answer("tool.jog", {"axis": 2, "step": -0.05, "frame": "world"})
@@ -686,7 +678,6 @@ def test_names_with_html_are_text_everywhere(visit):
     assert page.evaluate("document.title").startswith(HOSTILE)
 
 
-@unsettled
 def test_a_lost_connection_is_said_and_a_wish_meanwhile_too(visit):
     lab, page = visit("planar2r")
     lab.close()
@@ -719,7 +710,7 @@ def act(page, lab, name):
         time.sleep(1.2)
     if name == "motion":
         lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": nearby(lab).tolist()}})
-        page.until("dhkit.lab.state.motion && dhkit.player.time > 0.3")
+        page.until("dhkit.lab.state.motion && dhkit.player.time > Math.min(0.3, 0.9 * dhkit.lab.state.motion.duration)")
         wait_for(lambda: plots(page, "motion") >= 2)
     if name == "control":
         lab.answer("motion.clear", {})
@@ -757,7 +748,7 @@ def folder(tmp_path):
     return chosen
 
 
-@unsettled
+@only_accepting
 @pytest.mark.parametrize(("width", "height", "dark"), LAYOUTS)
 def test_nothing_is_clipped_or_covered(visit, tmp_path, width, height, dark):
     lab, page = visit("puma560", width=width, height=height, dark=dark)
@@ -768,11 +759,11 @@ def test_nothing_is_clipped_or_covered(visit, tmp_path, width, height, dark):
         assert page.evaluate(OVERLAPPING) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         pictures.append(page.screenshot())
-        assert (pictures[-1][height // 2, width - 4].mean() < 80) == dark
+        assert (np.median(pictures[-1].mean(axis=2)) < 80) == dark
     sheet(pictures, folder(tmp_path) / f"puma560-{width}-{'dark' if dark else 'light'}.png")
 
 
-@unsettled
+@only_accepting
 @pytest.mark.parametrize("name", ["planar2r", "cobra600", "stanford", "panda"])
 def test_other_arms_have_their_panels_too(visit, tmp_path, name):
     lab, page = visit(name, width=900, height=700)
@@ -785,7 +776,7 @@ def test_other_arms_have_their_panels_too(visit, tmp_path, name):
     assert count >= 1
     axis = 0
     page.click(labelled("move along plus x"))
-    wait_for(lambda: (lab._tool.T is not None and at_target(lab) < 1e-5) or told(page, "target")["message"])
+    wait_for(lambda: lab._tool.T is not None and (reached(lab) or told(page, "target")["message"]))
     pictures.append(page.screenshot())
     act(page, lab, "table")
     write(page, "a of row 2" if n == 2 else "d of row 1", "0.41")
@@ -836,7 +827,7 @@ def drawn(page, seconds):
     return (page.evaluate("pictures") - before) / (time.monotonic() - started)
 
 
-@unsettled
+@only_accepting
 def test_gate_from_slider_to_picture(visit):
     before = yardstick()
     _, page = visit("puma560")
@@ -863,7 +854,7 @@ def test_gate_from_slider_to_picture(visit):
     assert p95 < 60 * slack(before)
 
 
-@unsettled
+@only_accepting
 def test_gate_of_a_running_controller(visit):
     before = yardstick()
     lab, page = visit("puma560", width=860, height=720)
@@ -877,7 +868,7 @@ def test_gate_of_a_running_controller(visit):
     page.click(button("Stop"))
 
 
-@unsettled
+@only_accepting
 def test_gate_of_eight_ghosts(visit):
     before = yardstick()
     lab, page = visit("puma560", width=640, height=480)
@@ -903,7 +894,7 @@ def test_gate_of_eight_ghosts(visit):
     assert rate > 25 / slack(before)
 
 
-@unsettled
+@only_accepting
 def test_gate_of_an_edit(visit):
     before = yardstick()
     lab, page = visit("puma560")

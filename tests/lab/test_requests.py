@@ -281,6 +281,47 @@ def test_a_controller_runs_in_real_time_and_is_changed_on_the_way(open_lab):
     assert not states(lab)["control"]["running"]
 
 
+def test_a_running_controller_takes_the_sliders_as_its_setpoint(open_lab):
+    lab = open_lab("puma560")
+    lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
+    goal = lab.desk.q + np.array([0.4, 9, 9, 9, 9, 9])
+    lab.answer("joints.set", {"q": goal.tolist(), "joint": 0})
+    assert states(lab)["control"]["reference"] == "hold"
+    wait_for(lambda: abs(lab.desk.q[0] - goal[0]) < 1e-6)
+    assert np.abs(lab.desk.q[1:] - goal[1:]).min() > 8  # joints that nobody moved are held
+    ready = lab.desk.arm.configurations["ready"]
+    lab.answer("joints.named", {"name": "ready"})
+    wait_for(lambda: np.abs(lab.desk.q - ready).max() < 1e-6)
+    lab.answer("control.stop", {})
+    lab.answer("joints.set", {"q": goal.tolist()})
+    assert np.array_equal(lab.desk.q, goal)
+
+
+def test_links_that_touch_are_told_once_the_arm_has_settled(open_lab):
+    lab = open_lab("puma560")
+    arm = lab.desk.arm
+    numbers = arm.description.numbers
+    states_of_arm = np.random.default_rng(1).uniform(numbers.lower, numbers.upper, (60, arm.n))
+    lab.answer("joints.set", {"q": states_of_arm[0].tolist()})
+    wait_for(lambda: lab.desk._contacts._arm is arm)
+    apart = arm.distance(states_of_arm, self_collision=True).itself
+    assert (apart < 0).any() and (apart > 0).any()
+    for q, gap in zip(states_of_arm, apart, strict=True):
+        lab.answer("joints.set", {"q": q.tolist()})
+        links = states(lab)["joints"]["touching"]
+        assert bool(links) == (gap < 0)
+        if links:
+            assert links == links_of(arm.distance(q, self_collision=True).pair)
+    touching = states_of_arm[np.argmin(apart)]
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": touching.tolist()}})
+    wait_for(lambda: states(lab)["motion"]["touching"])
+    assert states(lab)["motion"]["touching"][-1] == links_of(arm.distance(touching, self_collision=True).pair)
+
+
+def links_of(pair):
+    return [0 if name == "the base" else int(name.split()[1]) for name in pair]
+
+
 def test_joints_2_and_3_alone(open_lab):
     lab = open_lab("puma560_cao")
     before = lab.desk.q.copy()
@@ -325,6 +366,8 @@ BAD = {
         {},
         {"q": None},
         {"q": [1] * 5},
+        {"q": [0] * 6, "joint": 6},
+        {"q": [0] * 6, "joint": "waist"},
         {"q": "ready"},
         {"q": [1, 2, 3, 4, 5, "6"]},
         {"q": [True] * 6},

@@ -1,44 +1,41 @@
-"""Laws of a session: a page ends with the latest of everything, and never has two messages to draw."""
+"""Laws of a session: a page ends with the latest of everything, and no lane has two messages to draw."""
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from dhkit.viewer.session import Session, Slot
 
-offers = st.lists(st.one_of(st.sampled_from(Slot), st.just("shown")), max_size=40)
+PANELS = [Slot.PANELS, Slot.PANELS + 3]
+SLOTS = [*(slot for slot in Slot if slot < Slot.PANELS), *PANELS]
+offers = st.lists(st.one_of(st.sampled_from(SLOTS), st.sampled_from(["picture shown", "panel shown"])), max_size=40)
 
 
-@given(offers, st.sets(st.sampled_from(Slot)))
-def test_the_latest_wins_and_one_is_under_way(steps, replayed):
-    latest = {slot: (k, b"old %d" % slot) for k, slot in enumerate(sorted(replayed), start=1)}
+@given(offers, st.sets(st.sampled_from(SLOTS)))
+def test_the_latest_wins_and_one_a_lane_is_under_way(steps, replayed):
+    latest = {slot: (k, b"old %d" % k) for k, slot in enumerate(sorted(replayed), start=1)}
     session = Session(latest)
-    page, under_way, sequence = {}, None, 100
-    names = {message: slot for slot, (_, message) in latest.items()}
+    sent = {message: (slot, sequence) for slot, (sequence, message) in latest.items()}
+    page, under_way = {}, {}
 
     def pump():
-        nonlocal under_way
-        message = session.next()
-        if message is not None:
-            assert under_way is None
-            slot = names[message]
-            under_way = latest_sequences[message]
+        while (message := session.next()) is not None:
+            slot, sequence = sent[message]
+            lane = "panel shown" if slot in PANELS else "picture shown"
+            assert lane not in under_way
+            under_way[lane] = sequence
             page[slot] = message
 
-    latest_sequences = {message: k for k, message in latest.values()}
     pump()
-    for step in steps:
-        if step == "shown":
-            session.shown(under_way if under_way is not None else 0)
-            under_way = None
+    for sequence, step in enumerate(steps, start=100):
+        if isinstance(step, str):
+            session.shown(under_way.pop(step, 0))
         else:
-            sequence += 1
             message = b"%d" % sequence
-            latest[step], names[message], latest_sequences[message] = (sequence, message), step, sequence
+            latest[step], sent[message] = (sequence, message), (step, sequence)
             session.offer(step, sequence, message)
         pump()
-    while under_way is not None:
-        session.shown(under_way)
-        under_way = None
+    while under_way:
+        session.shown(under_way.popitem()[1])
         pump()
     assert session.settled
     assert page == {slot: message for slot, (_, message) in latest.items()}

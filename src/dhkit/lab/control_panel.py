@@ -7,7 +7,7 @@ import logging
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +110,7 @@ class ControlPanel:
         self._speed = 1.0
         self._error: str | None = None
         desk.changed.append(self._forget)
+        desk.steer = self._steer
 
     def start(self, data: dict[str, Any]) -> dict[str, Any]:
         """Simulate from the state on show."""
@@ -351,6 +352,20 @@ class ControlPanel:
 
             return sine
         return lambda t: (held, still, still)
+
+    def _steer(self, q: Array, joint: int | None) -> None:
+        """Show joint values that a person asks for, or have the run hold them: of one joint, or of all."""
+        with self._lock:
+            live = self._live
+            if live is None or not self.desk.running:
+                self.desk.show(q)
+                return
+            held, still = live.wanted(live.t)[0].copy(), np.zeros(len(self._free))
+            asked = [k for k, i in enumerate(self._free) if joint in (None, i)]
+            held[asked] = q[self._free][asked]
+            self.settings = replace(self.settings, reference="hold")
+            live.wanted = lambda t: (held, still, still)
+        self.publish()
 
     def _aimed(self, held: Array) -> Array:
         aimed = self.desk.aimed

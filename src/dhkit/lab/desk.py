@@ -10,6 +10,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array, pose_parts
 from dhkit.kinematics import classify, freedoms, singular_values
+from dhkit.lab.contacts import Contacts
 from dhkit.viewer import View
 
 __all__ = ["Desk", "listed"]
@@ -43,6 +44,9 @@ class Desk:
         self.q = self.first(arm)
         self.running = False
         """Whether a simulation moves the arm."""
+        self.steer: Callable[[Array, int | None], None] = lambda q, joint: self.show(q)
+        """What is done with the joint values, shape (n,), that a person asks for; the joint, from 0, if it is one."""
+        self._contacts = Contacts()
         self.aimed: Array | None = None
         """Joint values at the target of the tool, which a simulation may follow, shape (n,)."""
         self.changed: list[Callable[[], None]] = []
@@ -98,14 +102,24 @@ class Desk:
                 "reach": description.reach,
             },
         )
+        self._contacts.prepare(self.arm, self.publish_state)
         self.show(self.q)
 
     def publish_state(self) -> None:
         """Tell the pages the numbers of the state on show."""
-        numbers = self.arm.description.numbers
-        outside = np.flatnonzero((self.q < numbers.lower) | (self.q > numbers.upper))
-        self.view.panel("joints", {"q": self.q.tolist(), "within": not len(outside), "outside": outside.tolist()})
-        T = self.arm.fk(self.q)
+        arm, q = self.arm, self.q  # another thread may replace them meanwhile
+        numbers = arm.description.numbers
+        outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper))
+        self.view.panel(
+            "joints",
+            {
+                "q": q.tolist(),
+                "within": not len(outside),
+                "outside": outside.tolist(),
+                "touching": self._contacts.links(arm, q),
+            },
+        )
+        T = arm.fk(q)
         xyz, euler = pose_parts(T, order=self.order)
         self.view.panel(
             "tool",
@@ -114,16 +128,20 @@ class Desk:
                 "xyz": xyz.tolist(),
                 "euler": euler.tolist(),
                 "order": self.order,
-                "manipulability": float(self.arm.manipulability(self.q)),
-                "singular": self.singular(),
+                "manipulability": float(arm.manipulability(q)),
+                "singular": _singular(arm, q),
             },
         )
 
-    def singular(self) -> str | None:
-        """Return what is said of a state that is singular, or None."""
-        description = self.arm.description
-        sigma = singular_values(description, self.q, "whole")
-        rank = freedoms(description, "whole")
-        if rank < 1 or sigma[rank - 1] >= SINGULAR * sigma[0]:
-            return None
-        return "singular: the tool cannot move in one of its directions here"
+    def close(self) -> None:
+        """End what runs in the background."""
+        self._contacts.close()
+
+
+def _singular(arm: Arm, q: Array) -> str | None:
+    """Return what is said of a state that is singular, or None."""
+    sigma = singular_values(arm.description, q, "whole")
+    rank = freedoms(arm.description, "whole")
+    if rank < 1 or sigma[rank - 1] >= SINGULAR * sigma[0]:
+        return None
+    return "singular: the tool cannot move in one of its directions here"

@@ -42,8 +42,19 @@ class Job:
         self.text = text
         self._tell(self)
 
+    def wait(self, seconds: float) -> None:
+        """Wait for a time.
+
+        Raises
+        ------
+        Cancelled
+            Nobody wants it any more.
+        """
+        if self._cancelled.wait(seconds):
+            raise Cancelled
+
     def cancel(self) -> None:
-        """End it at its next :meth:`progress`."""
+        """End it at its next :meth:`progress` or :meth:`wait`."""
         self._cancelled.set()
 
     @property

@@ -20,9 +20,10 @@ class JointPanel:
         self._random = np.random.default_rng(seed)
 
     def set(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Show joint values; those outside limits are shown too, and marked."""
-        q = Fields("joints.set", data, ["q"]).vector("q", self.desk.arm.n, LARGEST_JOINT_VALUE)
-        self.desk.show(q)
+        """Move the arm to joint values; those outside limits are marked. A simulation takes them as its setpoint."""
+        fields, n = Fields("joints.set", data, ["q", "joint"]), self.desk.arm.n
+        q = fields.vector("q", n, LARGEST_JOINT_VALUE)
+        self.desk.steer(q, fields.whole("joint", 0, n - 1) if "joint" in fields else None)
         return {}
 
     def named(self, data: dict[str, Any]) -> dict[str, Any]:
@@ -39,5 +40,5 @@ class JointPanel:
             q = self._random.uniform(lower, upper)
         else:
             q = np.array(arm.configurations.get(name, np.zeros(arm.n)))
-        self.desk.show(q)
+        self.desk.steer(q, None)
         return {"q": q.tolist()}

@@ -131,6 +131,7 @@ class Lab:
             self._closed = True
         self._motions.close()
         self._control.close()
+        self.desk.close()
         self.view.close()
 
     def __enter__(self) -> Lab:

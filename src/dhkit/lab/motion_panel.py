@@ -13,6 +13,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, DhkitError
+from dhkit.lab.contacts import touching
 from dhkit.lab.desk import Desk, listed
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.lab.jobs import Job, Jobs
@@ -46,7 +47,7 @@ class MotionPanel:
         self.motion: Trajectory | None = None
         self.kind = ""
         self.waypoints: list[Array] = []
-        self._collisions = Jobs(lambda state: None)
+        self._contacts = Jobs(lambda state: None)
         desk.changed.append(self._forget)
 
     def plan(self, data: dict[str, Any]) -> dict[str, Any]:
@@ -166,7 +167,7 @@ class MotionPanel:
     def close(self) -> None:
         """End what runs."""
         self.jobs.close()
-        self._collisions.close()
+        self._contacts.close()
 
     def publish(self) -> None:
         """Tell the pages that there is nothing yet."""
@@ -211,18 +212,18 @@ class MotionPanel:
             "qd": motion.qd(times).tolist(),
             "tau": motion.tau(times).tolist() if bodies else None,
             "limits": {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")},
-            "collisions": [],
+            "touching": None,
             "excess": _excess(arm, motion, times),
         }
         self.desk.view.panel("motion", state)
         q = motion.q(np.linspace(0.0, motion.duration, CHECKED))
 
-        def tell(touching: list[int]) -> None:
-            if touching and self.motion is motion:
-                self.desk.view.panel("motion", state | {"collisions": touching})
+        def tell(links: list[list[int]]) -> None:
+            if any(links) and self.motion is motion:
+                self.desk.view.panel("motion", state | {"touching": links})
 
         # Told behind the motion: the first time it takes a second.
-        self._collisions.start("collisions", lambda job: _collisions(arm, q), tell)
+        self._contacts.start("contacts", lambda job: touching(arm, q), tell)
 
     def _tell_waypoints(self) -> None:
         points = [{"name": f"waypoint {k}", "q": q.tolist()} for k, q in enumerate(self.waypoints, start=1)]
@@ -257,14 +258,6 @@ def _circle(arm: Arm, start: Array, duration: float | None) -> Trajectory:
         except DhkitError as error:
             wrong = error
     raise wrong or DescriptionError("the tool stands on the base's axis; expected a place beside it")
-
-
-def _collisions(arm: Arm, q: Array) -> list[int]:
-    """Return the samples in which links touch each other; empty where that cannot be told."""
-    try:
-        return [int(k) for k in np.flatnonzero(arm.distance(q, self_collision=True).itself < 0)]
-    except DhkitError:
-        return []
 
 
 def _excess(arm: Arm, motion: Trajectory, times: Array) -> str | None:

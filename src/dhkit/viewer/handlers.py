@@ -148,8 +148,7 @@ class Page(Guarded, WebSocketHandler):
 
     def send(self) -> None:
         """Send what may be sent."""
-        message = self.session.next()
-        if message is not None:
+        while (message := self.session.next()) is not None:
             self._write(message, binary=True)
 
     def say(self, message: dict[str, Any]) -> asyncio.Future[None] | None:

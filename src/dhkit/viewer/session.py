@@ -35,7 +35,10 @@ class Slot(IntEnum):
 
 
 class Session:
-    """Messages on their way to one page: at most one that it has not drawn yet, and per slot only the latest waits.
+    """Messages on their way to one page, in two lanes: pictures, and the states and samples of panels.
+
+    A lane has at most one message that the page has not drawn yet, and per slot only the latest waits. A panel's state
+    is taken at once where a picture waits for the display, so that neither lane waits for the other.
 
     Examples
     --------
@@ -47,6 +50,9 @@ class Session:
     >>> session.offer(Slot.MOTION, 3, b"third")
     >>> session.next() is None
     True
+    >>> session.offer(Slot.PANELS, 4, b"a panel's state")
+    >>> session.next()
+    b"a panel's state"
     >>> session.shown(1)
     >>> session.next()
     b'third'
@@ -56,12 +62,13 @@ class Session:
         # A new page needs the slots in their order; later whatever has waited longest is next, or poses that come as
         # fast as they are drawn would leave nothing else a turn.
         self._waiting = {slot: (slot, sequence, message) for slot, (sequence, message) in state.items()}
-        self._unshown: int | None = None
+        self._unshown: dict[bool, int] = {}
+        """Sequence numbers under way, by whether they are of a panel."""
 
     @property
     def settled(self) -> bool:
         """Whether the page has drawn everything."""
-        return not self._waiting and self._unshown is None
+        return not self._waiting and not self._unshown
 
     def offer(self, slot: int, sequence: int, message: bytes | Samples) -> None:
         """Take a message in place of the one that waits in its slot; samples join those that wait."""
@@ -71,17 +78,23 @@ class Session:
         self._waiting[slot] = (turn, sequence, message)
 
     def next(self) -> bytes | None:
-        """Return the message to send now; None while one is not drawn yet, or nothing waits."""
-        if self._unshown is not None or not self._waiting:
+        """Return a message to send now; None where each lane has one under way, or nothing waits."""
+        free = [slot for slot in self._waiting if _of_panel(slot) not in self._unshown]
+        if not free:
             return None
-        slot = min(self._waiting, key=lambda slot: self._waiting[slot][0])
-        _, self._unshown, message = self._waiting.pop(slot)
-        return stamped(message.encoded(), self._unshown) if isinstance(message, Samples) else message
+        slot = min(free, key=lambda slot: self._waiting[slot][0])
+        _, sequence, message = self._waiting.pop(slot)
+        self._unshown[_of_panel(slot)] = sequence
+        return stamped(message.encoded(), sequence) if isinstance(message, Samples) else message
 
     def shown(self, sequence: int) -> None:
-        """Take note that the page has drawn a message; of another than the one under way, nothing."""
-        if sequence == self._unshown:
-            self._unshown = None
+        """Take note that the page has drawn a message; of one that is not under way, nothing."""
+        self._unshown = {lane: number for lane, number in self._unshown.items() if number != sequence}
+
+
+def _of_panel(slot: int) -> bool:
+    """Return whether a slot is a panel's."""
+    return slot >= Slot.PANELS
 
 
 def _turn(slot: int, sequence: int) -> int:

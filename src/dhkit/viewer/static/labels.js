@@ -1,4 +1,4 @@
-// The names of frames, written beside their origins.
+// Names written beside points of the scene: of frames, and of ghosts.
 
 const GAP = 9, HEIGHT = 20; // px
 
@@ -11,12 +11,17 @@ export class Labels {
 
   set(labels) {
     this.container.replaceChildren();
-    this.labels = labels.map(({ frame, text }) => {
+    this.labels = labels.map(({ frame, text, color }) => {
       const element = document.createElement("span");
       element.textContent = text;
+      if (color) element.style.borderLeft = `4px solid ${color}`;
       this.container.append(element);
       return { frame, element, width: 0 };
     });
+  }
+
+  get count() {
+    return this.labels.length;
   }
 
   show(visible) {

@@ -12,7 +12,7 @@ const STEP = 1 / 30; // s that an arrow key moves an animation
 
 class Page {
   constructor() {
-    this.stage = new Stage(element("pane"), element("labels"), insets);
+    this.stage = new Stage(element("pane"), element("labels"), element("names"), insets);
     this.readout = new Readout(element("readout"));
     this.player = new Player(element("player"), { show: (time) => this.showTime(time) });
     this.motion = null; // what is on show: {q, positions, quaternions}, for an animation with times and more
@@ -42,9 +42,9 @@ class Page {
     }
     take[message.type]();
     this.drawn.push(message.sequence);
-    // A page in the background draws nothing; it has the state all the same. Ghosts beside panels are drawn in the same
-    // picture as the pose that follows, not each in one of its own.
-    if (document.hidden || (this.lab && message.type === GHOSTS)) this.acknowledge();
+    // A page in the background draws nothing; it has the state all the same. Beside panels what comes with a pose (an
+    // edited arm, ghosts) is drawn in the pose's picture, not each in one of its own.
+    if (document.hidden || (this.lab && message.type !== POSE)) this.acknowledge();
   }
 
   // Panels are loaded where Python answers requests; what they are told meanwhile waits.
@@ -76,11 +76,11 @@ class Page {
       this.stage.drawn.clear();
       this.stage.forget();
       this.takeOverlay(() => this.stage.setCompanion(null));
+      this.lab?.moved(null);
     }
     this.motion = { q: message.q, ...placements(message.transforms, THREE) };
     this.stage.include(this.motion);
     this.showState(this.motion);
-    this.lab?.moved(null);
     if (this.lab) this.stage.trail.append(this.motion.positions.slice(-3));
   }
 

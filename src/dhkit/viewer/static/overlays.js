@@ -30,6 +30,10 @@ export class Overlays {
     for (const layer of Object.values(this.layers)) if (layer.group.visible) box.union(layer.box);
   }
 
+  get shown() {
+    return this.skeletons.group.visible;
+  }
+
   show(visible) {
     for (const { group } of [this.skeletons, ...Object.values(this.layers)]) group.visible = visible;
   }

@@ -2,6 +2,7 @@
 
 import { corners, inView, localBox } from "./boxes.js";
 import { Labels } from "./labels.js";
+import { placements } from "./messages.js";
 import { Overlays } from "./overlays.js";
 import { Quality, drawnInSoftware } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
@@ -21,7 +22,7 @@ const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/
 
 export class Stage {
   // insets(): how many px at the left, top, right and bottom are covered by panels.
-  constructor(pane, labels, insets) {
+  constructor(pane, labels, names, insets) {
     this.pane = pane;
     this.insets = insets;
     // Without a graphics processor smooth edges halve the number of pictures: they wait until nothing moves.
@@ -35,6 +36,8 @@ export class Stage {
     this.fine = false; // whether the picture on show is drawn finely
     this.changed = 0; // ms, when the last picture of a motion was drawn
     this.labels = new Labels(labels);
+    this.names = new Labels(names); // of ghosts
+    this.anchors = []; // where each ghost is named
     this.nodes = [];
     this.old = []; // materials of a scene that is gone
     this.seen = new THREE.Box3();
@@ -152,6 +155,7 @@ export class Stage {
     this.up = new THREE.Vector3(...about.up);
     this.labels.set(about.labels);
     this.boxes = this.nodes.map((n) => localBox(n));
+    this.warned = null;
     this.seen.makeEmpty();
     this.framed.makeEmpty();
     this.setUp();
@@ -346,12 +350,16 @@ export class Stage {
     return axes;
   }
 
-  // Tint the links of some joints, counted from 0, as being where they must not be.
-  warn(joints) {
-    const color = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--accent").trim());
-    this.nodes.slice(1, -1).forEach((node, i) => {
-      const on = joints.includes(i);
-      for (const part of node.children) if (part.name !== "frame") part.traverse((object) => object.material?.emissive?.copy(color).multiplyScalar(on ? 0.55 : 0));
+  // Tint links: those of joints beyond a limit, counted from 0, and those that touch each other, 0 for the base.
+  warn(joints, touching) {
+    const key = `${joints}|${touching}`;
+    if (this.warned === key) return;
+    this.warned = key;
+    const style = getComputedStyle(document.documentElement), color = (name) => new THREE.Color(style.getPropertyValue(name).trim());
+    const limit = color("--accent"), contact = color("--contact"), none = new THREE.Color(0);
+    this.nodes.slice(0, -1).forEach((node, i) => {
+      const glow = touching.includes(i) ? contact : joints.includes(i - 1) ? limit : none;
+      for (const part of node.children) if (part.name !== "frame") part.traverse((object) => object.material?.emissive?.copy(glow).multiplyScalar(0.55));
     });
     this.dirty();
   }
@@ -381,7 +389,15 @@ export class Stage {
   setGhosts(message) {
     const { nodes } = this;
     this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
+    this.anchors = anchors(placements(message.transforms, THREE).positions, nodes.length);
     this.overlaid();
+  }
+
+  // names: of the ghosts, {text, color} each, in their order.
+  nameGhosts(names) {
+    this.names.set(names.map((name, frame) => ({ frame, ...name })));
+    this.names.show(this.overlays.shown);
+    this.dirty();
   }
 
   // A ghost that moves along with a motion, or null for none.
@@ -402,6 +418,7 @@ export class Stage {
 
   showOverlays(visible) {
     this.overlays.show(visible);
+    this.names.show(visible);
     this.overlaid();
   }
 
@@ -422,6 +439,8 @@ export class Stage {
     for (const material of this.old.splice(0)) material.dispose();
     this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
+    const named = this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
+    this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));
   }
 
   // Draw a picture that has not changed for a while at a higher resolution, which the browser averages.
@@ -438,6 +457,20 @@ export class Stage {
     if (p.z > 1) return null;
     return { x: ((p.x + 1) * this.pane.clientWidth) / 2, y: ((1 - p.y) * this.pane.clientHeight) / 2 };
   }
+}
+
+// Where ghosts are named: at the frame at which they are furthest apart.
+function anchors(positions, nodes) {
+  const count = positions.length / (3 * nodes);
+  const at = (ghost, node) => new THREE.Vector3().fromArray(positions, 3 * (ghost * nodes + node));
+  let best = 0, widest = -1;
+  for (let node = 0; node < nodes; node++) {
+    const box = new THREE.Box3();
+    for (let ghost = 0; ghost < count; ghost++) box.expandByPoint(at(ghost, node));
+    const width = box.isEmpty() ? 0 : box.getSize(new THREE.Vector3()).length();
+    if (width > widest) [best, widest] = [node, width];
+  }
+  return Array.from({ length: count }, (_, ghost) => at(ghost, best));
 }
 
 function matt(object) {

@@ -36,6 +36,18 @@ export function typed(text) {
   return cleaned !== "" && Number.isFinite(value) ? value : null;
 }
 
+// Whether a value is outside of limits, of which null is none.
+export function beyond(value, lower, upper) {
+  return (lower !== null && value < lower) || (upper !== null && value > upper);
+}
+
+// links: two numbers, 0 for the base, or none.
+export function touchingText(links) {
+  if (!links?.length) return "";
+  const name = (link) => (link ? `link ${link}` : "the base");
+  return `${name(links[0])} and ${name(links[1])} touch each other`;
+}
+
 export function save(name, content, type) {
   const address = URL.createObjectURL(new Blob([content], { type }));
   const link = h("a", { href: address, download: name });

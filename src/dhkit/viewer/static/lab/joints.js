@@ -1,8 +1,9 @@
 // Sliders and numbers of the joints, with their limits.
 
-import { UNITS, fixed, h, onTyped, typed } from "./dom.js";
+import { UNITS, beyond, fixed, h, onTyped, touchingText, typed } from "./dom.js";
 
 const FREE = { rad: Math.PI, m: 1 }; // what a slider spans on either side where a joint has no limit
+const ANSWER = 1000; // ms in which the state that follows from a step is expected
 const KEYS = { plain: 1, shift: 10, alt: 0.1 }; // arrow keys: degrees or mm
 
 export class JointPanel {
@@ -14,7 +15,8 @@ export class JointPanel {
     this.named = h("div", { class: "buttons", role: "group", "aria-label": "Configurations" });
     this.angle = this.unitChoice("angle", ["deg", "rad"], "Angles in");
     this.length = this.unitChoice("length", ["m", "mm", "in"], "Lengths in");
-    root.append(this.named, this.list, h("div", { class: "units" }, this.angle, this.length), h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
+    this.note = h("p", { class: "note bad", role: "status" });
+    root.append(this.named, this.list, this.note, h("div", { class: "units" }, this.angle, this.length), h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
   }
 
   unitChoice(name, units, label) {
@@ -26,7 +28,7 @@ export class JointPanel {
     this.arm = arm;
     this.length.hidden = !arm.joints.some((joint) => joint.unit === "m");
     this.angle.hidden = !arm.joints.some((joint) => joint.unit === "rad");
-    this.named.replaceChildren(...arm.configurations.map((name) => h("button", { type: "button", onclick: () => this.lab.ask("joints.named", { name }) }, name)));
+    this.named.replaceChildren(...arm.configurations.map((name) => h("button", { type: "button", onclick: () => this.go(name) }, name)));
     this.rows = arm.joints.map((joint, i) => this.row(joint, i));
     this.list.replaceChildren(...this.rows.map((row) => row.root));
     this.q = new Array(arm.n).fill(0);
@@ -72,6 +74,11 @@ export class JointPanel {
     this.set(i, this.q[i] + direction * size * (this.arm.joints[i].unit === "m" ? 1e-3 : Math.PI / 180));
   }
 
+  go(name) {
+    for (const row of this.rows) row.sent = null;
+    this.lab.ask("joints.named", { name });
+  }
+
   // What is shown is what is sent: a slider moves by the last digit on show.
   slide(i, value) {
     const { scale, digits } = this.unit(i);
@@ -81,24 +88,39 @@ export class JointPanel {
   set(i, value) {
     this.q = this.q.slice();
     this.q[i] = value;
+    this.rows[i].sent = { value, time: performance.now() };
+    clearTimeout(this.answer);
+    this.answer = setTimeout(() => this.take_joints(this.lab.state.joints), ANSWER);
     this.show();
-    this.lab.ask("joints.set", { q: this.q });
+    this.lab.ask("joints.set", { q: this.q, joint: i });
   }
 
-  take_joints({ q, outside }) {
+  take_joints({ q, outside, touching }) {
     if (!this.arm || q.length !== this.arm.n) return;
-    this.outside = new Set(outside);
-    this.lab.stage.warn(outside);
     if (this.lab.page.player.active) return; // an animation is on show
-    const dragged = this.rows.some((row) => row.slider === document.activeElement && row.slider.matches(":active"));
-    if (!dragged) this.q = q.slice();
+    this.outside = new Set(outside);
+    this.lab.stage.warn(outside, touching);
+    this.note.textContent = touchingText(touching);
+    this.q = q.map((x, i) => this.unanswered(i, x));
     this.show();
+  }
+
+  // A state that was sent before Python knew of a step must not undo it: the next step would begin there.
+  unanswered(i, told) {
+    const row = this.rows[i], { sent } = row;
+    const dragged = row.slider === document.activeElement && row.slider.matches(":active");
+    if (sent && sent.value !== told && (dragged || performance.now() < sent.time + ANSWER)) return sent.value;
+    if (!dragged) row.sent = null;
+    return told;
   }
 
   // An animation shows these values; null: it is over.
   moved(q) {
-    if (!q || !this.arm) return;
+    if (!this.arm) return;
+    if (!q) return this.lab.state.joints && this.take_joints(this.lab.state.joints);
     this.q = [...q];
+    this.outside = new Set(this.q.flatMap((x, i) => (beyond(x, this.arm.joints[i].lower, this.arm.joints[i].upper) ? [i] : [])));
+    this.note.textContent = "";
     if (!this.root.hidden) this.show();
   }
 

@@ -1,6 +1,6 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
-import { base64Of, bytes, DEGREES, fixed, h, save, typed } from "./dom.js";
+import { base64Of, beyond, bytes, DEGREES, fixed, h, save, touchingText, typed } from "./dom.js";
 import { Plot, legend } from "./plot.js";
 
 const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
@@ -98,8 +98,18 @@ export class MotionPanel {
 
   // An animation is at a time: so are the curves.
   moved(q, time) {
+    if (q && this.motion) this.warn(time);
     if (!q || !this.visible) return;
     for (const plot of Object.values(this.plots)) plot.mark(time);
+  }
+
+  // What is beyond a limit at a time, or touches, is marked on the arm.
+  warn(time) {
+    const { duration, limits, q, qd, tau, times, touching } = this.motion;
+    const at = (samples) => (duration > 0 ? Math.round((time / duration) * (samples - 1)) : 0), k = at(times.length);
+    const fast = (value, limit) => limit !== null && Math.abs(value) > limit * (1 + 1e-6);
+    const joints = this.arm.joints.flatMap((_, i) => (beyond(q[k][i], limits.lower[i], limits.upper[i]) || fast(qd[k][i], limits.velocity[i]) || (tau && fast(tau[k][i], limits.effort[i])) ? [i] : []));
+    this.lab.stage.warn(joints, touching ? touching[at(touching.length)] : []);
   }
 
   async read() {
@@ -126,7 +136,7 @@ export class MotionPanel {
     this.files.hidden = this.figures.hidden = !motion;
     this.facts.textContent = "";
     if (!motion) return;
-    const touching = motion.collisions.length ? "links touch each other on the way" : null;
+    const touching = motion.touching && touchingText(motion.touching.find((links) => links.length));
     this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching].filter(Boolean).join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
     this.draw();

@@ -91,7 +91,8 @@ export class TablePanel {
     const items = [...this.step.querySelectorAll("li")], start = performance.now();
     const tick = (now) => {
       if (stopped) return;
-      const at = Math.min((now - start) / STEP_TIME, steps.length - 1), k = Math.min(steps.length - 2, Math.floor(at));
+      // The first picture's time may lie before the start.
+      const at = Math.min(Math.max(0, now - start) / STEP_TIME, steps.length - 1), k = Math.min(steps.length - 2, Math.floor(at));
       items.forEach((item, j) => item.classList.toggle("now", j === k && at < steps.length - 1));
       this.lab.stage.showMoving(steps[k].T, steps[k + 1].T, at - k);
       if (at < steps.length - 1) requestAnimationFrame(tick);

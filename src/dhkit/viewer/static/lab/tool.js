@@ -94,10 +94,19 @@ export class ToolPanel {
     this.grab.hidden = Boolean(target);
     this.gizmo.set(target?.T ?? null, target ? target.reached : true, this.lab.state.arm?.reach ?? 1);
     const focused = document.activeElement?.dataset?.branch;
-    let ghosts = 0;
-    this.branches.replaceChildren(...(target?.branches ?? []).map((branch) => this.branch(branch, branch.chosen ? null : ghosts++)));
+    const branches = target?.branches ?? [], ghosts = branches.filter((branch) => !branch.chosen);
+    this.branches.replaceChildren(...branches.map((branch) => this.branch(branch, branch.chosen ? null : ghosts.indexOf(branch))));
+    this.name(ghosts);
     if (focused) this.branches.querySelector(`[data-branch="${CSS.escape(focused)}"]`)?.focus();
     this.remark();
+  }
+
+  // While a simulation runs the only ghost is what it follows.
+  name(ghosts) {
+    const names = ghosts.map(({ name }, k) => ({ text: name, color: GHOSTS[k % GHOSTS.length] })), key = JSON.stringify(names);
+    if (this.named === key) return;
+    this.named = key;
+    this.lab.stage.nameGhosts(names);
   }
 
   // ghost: its number among the ghosts in the scene, in whose colour it is marked.
