@@ -323,6 +323,7 @@ export class Stage {
 
   // A frame on its way from one pose to another, 16 numbers by row each; null takes it away.
   showMoving(from, to, share) {
+    if (!from && !this.moving) return;
     this.moving ??= this.addMoving();
     this.moving.visible = Boolean(from);
     this.dirty();

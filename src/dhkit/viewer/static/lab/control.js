@@ -8,6 +8,7 @@ const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joi
 const WINDOW = 10; // s that are drawn
 const MOST = 36000; // rows that are kept: ten minutes
 const PLOT_EVERY = 100; // ms
+const MILLI = 1000; // of errors, in rad and m
 
 export class ControlPanel {
   constructor(lab, root) {
@@ -106,7 +107,6 @@ export class ControlPanel {
       this.columns = columns;
       const joints = (columns.length - 2) / 2, names = columns.slice(1, 1 + joints).map((name) => this.arm?.joints[Number(name.slice(1)) - 1]?.name ?? name);
       this.names = names;
-      this.scales = columns.slice(1, 1 + joints).map((name) => (this.arm?.joints[Number(name.slice(1)) - 1]?.unit === "m" ? 1000 : 1000));
       this.legend.replaceChildren(legend(names));
     }
     const width = columns.length;
@@ -126,7 +126,7 @@ export class ControlPanel {
     const rows = this.rows.slice(begin);
     const column = (k, scale = 1) => rows.map((row) => row[k] * scale);
     const times = column(0);
-    this.errors.set(this.names, [times, ...this.names.map((_, i) => column(1 + i, this.scales[i]))]);
+    this.errors.set(this.names, [times, ...this.names.map((_, i) => column(1 + i, MILLI))]);
     this.torques.set(this.names, [times, ...this.names.map((_, i) => column(1 + n + i))]);
   }
 

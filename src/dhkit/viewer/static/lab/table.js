@@ -79,6 +79,13 @@ export class TablePanel {
     return column === "theta" || column === "alpha" ? `${fixed((value * 180) / Math.PI, 4)}°` : `${fixed(value, 5)} m`;
   }
 
+  // Another panel is opened: the frame that moves goes.
+  shown(visible) {
+    if (visible) return;
+    this.running?.();
+    this.lab.stage.showMoving(null);
+  }
+
   // One elementary transform after the other, as a frame that moves.
   async animate(row) {
     const answer = await this.lab.ask("table.steps", { row });
