@@ -390,7 +390,7 @@ export class Stage {
   setGhosts(message) {
     const { nodes } = this;
     this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
-    this.anchors = anchors(placements(message.transforms, THREE).positions, nodes.length);
+    this.anchors = anchors(placements(message.transforms, THREE).positions, nodes.map((node) => node.position));
     this.overlaid();
   }
 
@@ -460,15 +460,15 @@ export class Stage {
   }
 }
 
-// Where ghosts are named: at the frame at which they are furthest apart.
-function anchors(positions, nodes) {
-  const count = positions.length / (3 * nodes);
+// Where ghosts are named: at the frame at which they and the arm are furthest apart.
+function anchors(positions, arm) {
+  const nodes = arm.length, count = positions.length / (3 * nodes);
   const at = (ghost, node) => new THREE.Vector3().fromArray(positions, 3 * (ghost * nodes + node));
   let best = 0, widest = -1;
   for (let node = 0; node < nodes; node++) {
-    const box = new THREE.Box3();
+    const box = new THREE.Box3(arm[node].clone(), arm[node].clone());
     for (let ghost = 0; ghost < count; ghost++) box.expandByPoint(at(ghost, node));
-    const width = box.isEmpty() ? 0 : box.getSize(new THREE.Vector3()).length();
+    const width = box.getSize(new THREE.Vector3()).length();
     if (width > widest) [best, widest] = [node, width];
   }
   return Array.from({ length: count }, (_, ghost) => at(ghost, best));
