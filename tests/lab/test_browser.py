@@ -903,7 +903,7 @@ def test_gate_of_a_stream_of_poses(visit, slack):
 
 @only_accepting
 def test_gate_of_one_message_against_one_a_link(visit, stock):
-    lab, page = visit("puma560")
+    lab, _ = visit("puma560")
     took = {"ours": [], "stock": []}
     for k in range(200):
         for name, show in (("ours", lab.view.show), ("stock", stock.display)):

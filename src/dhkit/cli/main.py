@@ -553,6 +553,35 @@ def grade(
 
 
 @app.command()
+def check(
+    robot: Robot,
+    program: Annotated[
+        list[str],
+        typer.Argument(help="A file (.py, .m) that defines fk, ik or controller; with --run a program, its arguments."),
+    ],
+    run: Annotated[
+        bool, typer.Option("--run", help="Execute PROGRAM, which speaks the protocol of docs/own-code.md.")
+    ] = False,
+    rubric: Annotated[Path | None, typer.Option(help="What each part is worth (.toml).")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
+    samples: Annotated[int, typer.Option(min=1, max=100_000, help="Random states.")] = 200,
+    seconds: Annotated[float, typer.Option(min=0.01, max=3600, help="The longest that a call may take.")] = 5.0,
+    sandbox: Annotated[str | None, typer.Option(help="bwrap: in bubblewrap, for strangers' files.")] = None,
+    json: Json = False,
+) -> int:
+    """Score a program's forward and inverse kinematics and its controller, and say where it fails first.
+
+    Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.
+    """
+    from dhkit.cli import check as check_command
+
+    if not run and len(program) != 1:
+        raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
+    source = program if run else Path(program[0])
+    return check_command.run(Arm.load(robot), source, rubric, seed, samples, sandbox, seconds, json)
+
+
+@app.command()
 def bench(
     quantities: Annotated[list[str] | None, typer.Argument(help="What to time; all unless given.")] = None,
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",

@@ -1,0 +1,9 @@
+"""Programs that somebody else wrote, run in processes of their own and compared with an arm."""
+
+from dhkit.programs.checks import check
+from dhkit.programs.process import Limits, ProgramError
+from dhkit.programs.program import FUNCTIONS, Program
+from dhkit.programs.report import CheckReport, Part
+from dhkit.programs.rubric import CheckRubric
+
+__all__ = ["FUNCTIONS", "CheckReport", "CheckRubric", "Limits", "Part", "Program", "ProgramError", "check"]

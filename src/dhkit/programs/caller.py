@@ -1,0 +1,75 @@
+"""A program's function, called for a score: its failures counted, its time taken."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.programs.process import ProgramError
+from dhkit.programs.program import Program
+
+__all__ = ["CLOSE", "EXAMPLES", "Caller", "numbers"]
+
+CLOSE = 1e-6
+"""m and entries of a rotation matrix between a pose and the one that is reached."""
+EXAMPLES = 5
+"""Failing poses that are listed."""
+MOST_FAILURES = 3
+"""Failures in a row (of those that end a program) after which it is not called again."""
+FATAL = {"late", "memory", "processes", "ended", "garbage"}
+
+
+class Caller:
+    """A program's function, called until it has failed fatally several times in a row."""
+
+    def __init__(self, program: Program, function: str) -> None:
+        self.program, self.function = program, function
+        self.failures: Counter[str] = Counter()
+        self.seconds: list[float] = []
+        self._fatal = 0
+
+    def __call__(self, **arguments: Any) -> Any:
+        """Return the function's value.
+
+        Raises
+        ------
+        ProgramError
+            It failed, or has failed too often.
+        """
+        if self._fatal >= MOST_FAILURES:
+            raise ProgramError("not called any more", "ended")
+        begin = time.perf_counter()
+        try:
+            value = self.program.call(self.function, **arguments)
+        except ProgramError as error:
+            self.failures[str(error)] += 1
+            self._fatal = self._fatal + 1 if error.failure in FATAL else 0
+            raise
+        self._fatal = 0
+        self.seconds.append(time.perf_counter() - begin)
+        return value
+
+    def said(self) -> tuple[str, ...]:
+        """Return what its failures were, the most frequent first."""
+        return tuple(
+            f"{text} ({count} {'time' if count == 1 else 'times'})"
+            for text, count in self.failures.most_common(EXAMPLES)
+        )
+
+
+def numbers(value: Any) -> Array:
+    """Return an answer as an array, null as NaN.
+
+    Raises
+    ------
+    ProgramError
+        It is no array of numbers.
+    """
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ProgramError("returned what is no array of numbers", "raised") from None

@@ -1,0 +1,159 @@
+"""Score a program's kinematics and controllers against an arm, and say where they fail first."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.description import Array
+from dhkit.errors import DhkitError
+from dhkit.programs.caller import CLOSE, EXAMPLES, Caller, numbers
+from dhkit.programs.inverse import score_inverse
+from dhkit.programs.process import ProgramError
+from dhkit.programs.program import Program
+from dhkit.programs.random_poses import random_states
+from dhkit.programs.report import CheckReport, Part
+from dhkit.programs.rubric import CheckRubric
+
+__all__ = ["check"]
+
+
+def check(
+    arm: Arm,
+    program: Program,
+    rubric: CheckRubric | None = None,
+    seed: int | None = None,
+    samples: int = 200,
+    progress: Callable[[str], None] = lambda text: None,
+) -> CheckReport:
+    """Score a program.
+
+    Parameters
+    ----------
+    arm
+        The truth.
+    program
+        What is scored.
+    rubric
+        What it is worth; by the functions that the program has unless given.
+    seed
+        Of the random states; from the system's entropy unless given.
+    samples
+        Random states of each part.
+    progress
+        Called with what is done next.
+
+    Raises
+    ------
+    ProgramError
+        The program cannot be loaded.
+    DhkitError
+        The arm lacks what is asked for, such as bodies for a controller.
+    """
+    if not 1 <= samples <= 100_000:
+        raise ValueError(f"samples is {samples}; expected 1 to 100000")
+    program.start()
+    seed = secrets.randbits(32) if seed is None else seed
+    rubric = rubric or CheckRubric()
+    wanted = rubric.wanted(program.functions)
+    functions: dict[str, tuple[Part, ...]] = {}
+    for name in wanted:
+        progress(name)
+        if name not in program.functions:
+            most = sum(rubric.points(name).values())
+            functions[name] = (Part("defined", 0.0, most, f"{program.name} does not define {name}"),)
+            continue
+        rng = np.random.default_rng([seed, len(functions)])
+        score = {"fk": _fk, "ik": score_inverse, "controller": _controller}[name]
+        functions[name] = tuple(score(arm, Caller(program, name), rubric, rng, samples))
+    notes = [f"{program.name} imports {module}" for module in program.imported]
+    return CheckReport(arm.name, program.name, functions, tuple(notes), seed)
+
+
+# Forward kinematics
+
+
+def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int) -> Iterator[Part]:
+    states = random_states(arm, rng, samples)
+    truth = arm.fk(states)
+    good = np.zeros(samples, dtype=bool)
+    for k, q in enumerate(states):
+        T = _matrix(call, q)
+        good[k] = T is not None and np.abs(T - truth[k]).max() < CLOSE * max(1.0, arm.description.reach)
+    most = rubric.points("fk")["agrees"]
+    text = f"{good.sum()} of {samples} poses agree"
+    details = call.said()
+    if not good.all() and not details:
+        k = int(np.argmin(good))
+        details = (f"first at q = {_listed(states[k])}", *_fk_hint(arm, call, rng))
+    yield Part("agrees", most * good.mean(), most, text, details)
+
+
+def _matrix(call: Caller, q: Array) -> Array | None:
+    """Return the pose that the program gives; None where it gives none."""
+    try:
+        T = numbers(call(q=q.tolist()))
+    except ProgramError:
+        return None
+    if T.shape != (4, 4):
+        call.failures[f"fk returned shape {T.shape}; expected (4, 4)"] += 1
+        return None
+    return T if np.isfinite(T).all() else None
+
+
+def _fk_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, ...]:
+    """Say which joint's axis is wrong first: the motion of the tool, seen from the base, by that joint alone."""
+    q = random_states(arm, rng, 1)[0]
+    scale = np.where(arm.description.numbers.prismatic, 1.0, 180 / np.pi)
+    T = _matrix(call, q * scale)
+    if T is not None and np.abs(T - arm.fk(q)).max() < CLOSE:
+        return ("it agrees when it is given degrees; expected radians",)
+    for i, joint in enumerate(arm.description.joints):
+        moved = q.copy()
+        moved[i] += 0.1
+        theirs, start = _matrix(call, moved), _matrix(call, q)
+        if theirs is None or start is None or np.linalg.matrix_rank(start) < 4:
+            return ()
+        ours = arm.fk(moved) @ np.linalg.inv(arm.fk(q))
+        if np.abs(theirs @ np.linalg.inv(start) - ours).max() > CLOSE:
+            before = f"row {i}" if i else "the base"
+            return (
+                f"joint {i + 1} ({joint.name}) is the first whose axis is wrong: look at {before} and its own sign",
+            )
+    return ("every joint's axis is right: look at the last row and the tool",)
+
+
+# Controllers
+
+
+def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int) -> Iterator[Part]:
+    task, most = rubric.controller, rubric.points("controller")["follows"]
+    start = np.array(arm.configurations.get(task.start, np.zeros(arm.n)))
+    goal = np.array(arm.configurations.get(task.goal, np.zeros(arm.n)))
+    plant = arm.with_payload(task.payload) if task.payload else arm
+
+    def controller(t: float, q: Array, qd: Array, setpoint: Any) -> Array:
+        wanted = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
+        return numbers(call(t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=wanted))
+
+    motion = arm.quintic(start, goal, task.duration)
+    try:
+        result = arm.simulate(controller, motion, rate=task.rate, plant=plant)
+    except DhkitError as error:
+        yield Part("follows", 0.0, most, "the run failed", (*call.said(), str(error))[:EXAMPLES])
+        return
+    errors = np.abs(result.q - result.reference_q)
+    peak = float(errors.max())
+    share = float(np.clip(1 - np.log10(max(peak, 1e-12) / task.bound), 0.0, 1.0))
+    joint = int(np.argmax(errors.max(axis=0)))
+    name = arm.description.joints[joint].name
+    text = f"peak error {peak:.3g} in joint {joint + 1} ({name}); {task.bound:g} rad or m are asked for"
+    yield Part("follows", most * share, most, text, call.said())
+
+
+def _listed(q: Array) -> str:
+    return "[" + ", ".join(f"{x:.4g}" for x in q) + "]"

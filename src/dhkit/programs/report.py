@@ -1,0 +1,83 @@
+"""How a program compares with an arm."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+__all__ = ["CheckReport", "Part"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one part of a function's score is.
+
+    Attributes
+    ----------
+    name
+        Such as ``closes``.
+    points, most
+        What it got, and what it is worth.
+    text
+        What was found, in a sentence.
+    details
+        Where it fails.
+    """
+
+    name: str
+    points: float
+    most: float
+    text: str
+    details: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """How a program compares with an arm.
+
+    Attributes
+    ----------
+    robot, program
+        Their names.
+    functions
+        The parts of each function's score.
+    notes
+        What else was seen.
+    seed
+        Of the random states: the same seed gives the same states.
+    """
+
+    robot: str
+    program: str
+    functions: dict[str, tuple[Part, ...]]
+    notes: tuple[str, ...]
+    seed: int
+
+    @property
+    def points(self) -> float:
+        """Points of all functions."""
+        return round(sum(part.points for parts in self.functions.values() for part in parts), 6)
+
+    @property
+    def most(self) -> float:
+        """What they are worth."""
+        return round(sum(part.most for parts in self.functions.values() for part in parts), 6)
+
+    @property
+    def full(self) -> bool:
+        """Whether nothing is missing."""
+        return self.points >= self.most
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as JSON has it."""
+        return {"points": self.points, "most": self.most, **asdict(self)}
+
+    def __str__(self) -> str:
+        lines = [f"{self.program} against {self.robot}: {self.points:g} of {self.most:g} points"]
+        for function, parts in self.functions.items():
+            lines += ["", function]
+            for part in parts:
+                lines.append(f"  {part.name:<10} {f'{part.points:.3g} of {part.most:g}':>12}   {part.text}")
+                lines += [f"  {'':<10} {'':>12}     {detail}" for detail in part.details]
+        lines += [""] * bool(self.notes) + [f"note: {note}" for note in self.notes]
+        return "\n".join([*lines, f"random states: seed {self.seed}"])

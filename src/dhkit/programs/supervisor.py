@@ -1,0 +1,114 @@
+"""Run a program so that everything it starts can be ended; executed by its path, with Python's own library alone.
+
+It stands between dhkit and a program that dhkit did not write. Processes that lose their parent become children of this
+one (Linux: a subreaper), also those that made a session of their own, so that ending its descendants ends them all. It
+ends when the program and everything it started have ended, and ends them when it is terminated, or dhkit dies.
+
+Arguments: the descriptors from which the program reads requests and to which it writes answers, which become its 3 and
+4; bytes of memory that each process may address; then the program and its arguments.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import time
+from contextlib import suppress
+from typing import NoReturn
+
+DEATH_SIGNAL, SUBREAPER = 1, 36
+"""Of Linux's prctl(2)."""
+LARGEST_FILE = 64 << 20
+"""Bytes of a file that the program writes."""
+MOST_FILES = 256
+ROUNDS = 200
+"""Attempts to end all descendants, 10 ms apart: they may start others meanwhile."""
+REQUESTS, ANSWERS = 3, 4
+
+
+def main(arguments: list[str]) -> NoReturn:
+    """Run the program, and wait until nothing of it is left."""
+    requests, answers, memory = map(int, arguments[:3])
+    program = arguments[3:]
+    if sys.platform == "linux":
+        prctl = ctypes.CDLL(None).prctl
+        prctl(SUBREAPER, 1, 0, 0, 0)
+        prctl(DEATH_SIGNAL, signal.SIGTERM, 0, 0, 0)
+    signal.signal(signal.SIGTERM, lambda *_: end_all())
+    child = os.fork()
+    if child == 0:
+        run(program, requests, answers, memory)
+    os.close(requests)
+    os.close(answers)
+    status = 0
+    while True:
+        try:
+            pid, code = os.wait()
+        except ChildProcessError:
+            break
+        if pid == child:
+            status = os.waitstatus_to_exitcode(code)
+    sys.exit(status if status >= 0 else 128 - status)
+
+
+def run(program: list[str], requests: int, answers: int, memory: int) -> NoReturn:
+    """Be the program, within limits."""
+    import resource
+
+    try:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        os.setsid()
+        spare = [os.dup(os.dup(fd)) for fd in (requests, answers)]
+        for fd, wanted in zip(spare, (REQUESTS, ANSWERS), strict=True):
+            os.dup2(fd, wanted)
+        os.closerange(ANSWERS + 1, MOST_FILES)
+        limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_FSIZE: LARGEST_FILE, resource.RLIMIT_NOFILE: MOST_FILES}
+        for kind, bound in (limits | {resource.RLIMIT_AS: memory}).items():
+            with suppress(OSError, ValueError):  # macOS knows no limit of addresses
+                resource.setrlimit(kind, (bound, bound))
+        os.execvp(program[0], program)  # noqa: S606 - no shell is wanted
+    except OSError as error:
+        os.write(2, f"{program[0]}: {error.strerror}\n".encode())
+    finally:
+        os._exit(127)
+
+
+def end_all() -> NoReturn:
+    """End every descendant, then this process."""
+    for _ in range(ROUNDS):
+        left = descendants()
+        if not left:
+            break
+        for number in (signal.SIGSTOP, signal.SIGKILL):  # what stands still starts nothing
+            for pid in left:
+                with suppress(OSError):
+                    os.kill(pid, number)
+        with suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
+        time.sleep(0.01)
+    os._exit(0)
+
+
+def descendants() -> list[int]:
+    """Return the processes that this one started, and those that they did; none where there is no /proc."""
+    parents: dict[int, int] = {}
+    with suppress(OSError):
+        for entry in os.listdir("/proc"):  # noqa: PTH208 - names alone
+            if not entry.isdigit():
+                continue
+            with suppress(OSError, IndexError, ValueError):
+                with open(f"/proc/{entry}/stat", "rb") as file:  # noqa: PTH123
+                    fields = file.read().rpartition(b")")[2].split()
+                if fields[0] != b"Z":
+                    parents[int(entry)] = int(fields[1])
+    found = {os.getpid()}
+    while more := {pid for pid, parent in parents.items() if parent in found} - found:
+        found |= more
+    return sorted(found - {os.getpid()})
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

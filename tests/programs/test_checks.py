@@ -1,0 +1,142 @@
+"""Scores of solutions as a teacher would give them, the joint that is wrong first named."""
+
+import json
+
+import numpy as np
+import pytest
+
+from dhkit import Arm
+from dhkit.cli import main
+from dhkit.programs import CheckRubric, Program, check
+from programs.puma_solutions import EDITS, solution
+
+EXPECTED = {
+    "right": ((100, 60, 20, 10, 10), ""),
+    "one branch": ((100, 60, 2.5, 10, 10), "never found"),
+    "atan for atan2": ((100, (20, 45), (5, 15), (0, 10), (3, 8)), "joint 1 (waist) is wrong first"),
+    "no shoulder offset": ((100, 0, 0, 0, 0), "joint 1 (waist) is wrong first"),
+    "degrees": ((100, 0, 0, 0, 0), "in degrees; expected radians"),
+    "fails at singular poses": ((100, 60, 20, (0, 8), 10), ""),
+    "slow": ((100, 60, 20, 10, (1, 5)), ""),
+    "sign of the elbow": ((100, 0, 0, 0, 0), "joint 3 (elbow) is wrong first"),
+    "wrist transposed": ((100, 0, 0, 0, 0), "joint 4 (wrist_roll) is wrong first"),
+    "raises out of reach": ((100, (50, 59), 20, (0, 10), 10), "math domain error"),
+}
+"""Points of fk and of the parts of ik, or between which they are; and what is said."""
+
+
+@pytest.fixture(scope="module")
+def puma():
+    return Arm.load("puma560")
+
+
+def checked(arm, text, tmp_path, **options):
+    path = tmp_path / "student.py"
+    path.write_text(text)
+    with Program(path) as program:
+        return check(arm, program, **({"seed": 1, "samples": 40} | options))
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_ten_solutions_are_scored_as_a_teacher_would(name, puma, tmp_path):
+    report = checked(puma, solution(name), tmp_path)
+    expected, said = EXPECTED[name]
+    found = [part.points for parts in report.functions.values() for part in parts]
+    assert len(found) == len(expected)
+    for points, wanted in zip(found, expected, strict=True):
+        low, high = wanted if isinstance(wanted, tuple) else (wanted - 1e-9, wanted + 1e-9)
+        assert low <= points <= high, str(report)
+    assert said in str(report)
+
+
+FORWARD = {
+    "theta's sign": ("link(i, q[i])", "link(i, -q[i])", "joint 1 (waist) is the first whose axis is wrong"),
+    "a3": ("a = [0, a2, a3, 0, 0, 0]", "a = [0, a2, -a3, 0, 0, 0]", "joint 4 (wrist_roll) is the first"),
+    "alpha1": ("alpha = [pi / 2, 0", "alpha = [-pi / 2, 0", "joint 2 (shoulder) is the first"),
+    "d6": ("d = [d1, 0, d3, d4, 0, 0]", "d = [d1, 0, d3, d4, 0, 0.1]", "look at the last row"),
+    "degrees": ("link(i, q[i])", "link(i, q[i] * pi / 180)", "given degrees"),
+}
+
+
+@pytest.mark.parametrize("name", FORWARD)
+def test_a_wrong_row_is_found(name, puma, tmp_path):
+    old, new, said = FORWARD[name]
+    text = solution("right").replace(old, new).split("def ik")[0]
+    report = checked(puma, text, tmp_path, samples=10)
+    assert report.points < 100 and said in str(report)
+
+
+@pytest.mark.parametrize("name", ["planar2r", "cobra600", "stanford", "ur5", "panda"])
+def test_our_own_kinematics_get_full_marks(name, tmp_path):
+    text = (
+        f"from dhkit import Arm\narm = Arm.load({name!r})\n"
+        "def fk(q):\n    return arm.fk(q)\n"
+        "def ik(T):\n    s = arm.ik(T) if arm.n < 7 else arm.ik_numeric(T, arm.configurations['ready'])\n"
+        "    return s.q[s.valid]\n"
+    )
+    report = checked(
+        Arm.load(name), text, tmp_path, samples=20, rubric=CheckRubric.from_dict({"fk": {}, "ik": {"seconds": 10}})
+    )
+    assert report.functions["fk"][0].points == 100
+    parts = {part.name: part for part in report.functions["ik"]}
+    assert parts["closes"].points >= 0.9 * parts["closes"].most, str(report)
+    if name != "panda":
+        assert parts["branches"].points == parts["branches"].most, str(report)
+    assert report.notes == ("student.py imports dhkit",)
+
+
+def test_a_controller_is_scored_by_its_error(puma, tmp_path):
+    text = (
+        "import numpy as np\nKP = np.array([2500, 2500, 1500, 60, 40, 20.0])\n"
+        "def controller(t, q, qd, setpoint):\n    return KP * (setpoint.q - q) + 0.1 * KP * (setpoint.qd - qd)\n"
+    )
+    rubric = CheckRubric.from_dict({"controller": {"duration": 1.0, "rate": 200.0, "bound": 0.5}})
+    assert checked(puma, text, tmp_path, rubric=rubric).full
+    strict = CheckRubric.from_dict({"controller": {"duration": 1.0, "rate": 200.0, "bound": 1e-4}})
+    report = checked(puma, text, tmp_path, rubric=strict)
+    assert report.points == 0 and "peak error" in str(report)
+    broken = checked(puma, text.replace("return", "return 1 / 0 *"), tmp_path, rubric=rubric)
+    assert broken.points == 0 and "line 4: ZeroDivisionError" in str(broken)
+
+
+def test_the_same_seed_gives_the_same_report(puma, tmp_path):
+    first, again = (checked(puma, solution("one branch"), tmp_path, samples=10) for _ in range(2))
+    assert [p.points for p in first.functions["ik"]] == [p.points for p in again.functions["ik"]]
+    assert (
+        checked(puma, solution("right"), tmp_path, seed=None, samples=1).seed
+        != checked(puma, solution("right"), tmp_path, seed=None, samples=1).seed
+    )
+
+
+def test_the_command_and_its_status(tmp_path, capsys):
+    (tmp_path / "right.py").write_text(solution("right"))
+    (tmp_path / "degrees.py").write_text(solution("degrees"))
+    (tmp_path / "broken.py").write_text("def fk(q)\n")
+    (tmp_path / "rubric.toml").write_text("[ik]\nbranches = 40\ncloses = 60\nsingular = 0\ntime = 0\n")
+    (tmp_path / "wrong.toml").write_text("[ik]\nbranch = 40\n")
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(["check", "puma560", *arguments])
+        return ended.value.code, *capsys.readouterr()
+
+    status, out, _ = run(str(tmp_path / "right.py"), "--samples", "10", "--seed", "3")
+    assert status == 0 and "200 of 200 points" in out and "seed 3" in out
+    status, out, _ = run(
+        str(tmp_path / "degrees.py"), "--samples", "10", "--json", "--rubric", str(tmp_path / "rubric.toml")
+    )
+    report = json.loads(out)
+    assert status == 1 and report["most"] == 100 and report["points"] == 0 and list(report["functions"]) == ["ik"]
+    status, _, err = run(str(tmp_path / "broken.py"))
+    assert status == 2 and err == "dhkit: broken.py: line 1: SyntaxError: expected ':'\n"
+    status, _, err = run(str(tmp_path / "right.py"), "--rubric", str(tmp_path / "wrong.toml"))
+    assert status == 2 and "ik.branch" in err and err.count("\n") == 1
+    status, _, err = run(str(tmp_path / "missing.py"))
+    assert status == 2 and "expected a file" in err
+
+
+def test_a_rubric_that_asks_for_more_than_is_there(puma, tmp_path):
+    rubric = CheckRubric.from_dict({"fk": {}, "controller": {}})
+    report = checked(puma, solution("right"), tmp_path, rubric=rubric, samples=5)
+    assert report.points == 100 and report.most == 200
+    assert np.isclose(report.functions["controller"][0].points, 0.0)

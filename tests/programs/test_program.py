@@ -1,0 +1,210 @@
+"""Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind."""
+
+# ruff: noqa: E501 - programs in one line
+
+import os
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from dhkit.programs import Limits, Program, ProgramError
+
+NAMED = "DHKIT_TEST_PROCESS"
+LIMITS = Limits(seconds=2.0, memory=400 << 20)
+
+HARMFUL = {
+    "loops": ("def fk(q):\n    while True:\n        pass\n", "late", "no answer within 2 s"),
+    "allocates": ("import numpy as np\ndef fk(q):\n    x = []\n    while True:\n        x.append(np.ones(10**6))\n", "memory", "0.391 GB"),
+    "allocates 10 GB at once": ("import numpy as np\ndef fk(q):\n    return np.ones(10**10 // 8)\n", "raised", "line 3: MemoryError"),
+    "exits": ("import sys\ndef fk(q):\n    sys.exit(3)\n", "raised", "line 3: SystemExit: 3"),
+    "exits at once": ("import os\ndef fk(q):\n    os._exit(3)\n", "ended", "the program ended with status 3"),
+    "raises": ("def fk(q):\n\n    return 1 / 0\n", "raised", "line 3: ZeroDivisionError: division by zero"),
+    "crashes": ("import ctypes\ndef fk(q):\n    ctypes.string_at(0)\n", "ended", "by SIGSEGV"),
+    "recurses": ("def fk(q):\n    return fk(q)\n", "raised", "line 2: RecursionError"),
+    "is a fork bomb": ("import os\ndef fk(q):\n    while True:\n        os.fork()\n", None, "needed more than|started more than"),
+    "writes garbage": ("import os\nos.write(4, b'hello\\n')\ndef fk(q):\n    return 1.0\n", "garbage", "no answer"),
+    "floods": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'{\"id\": 0}\\n')\n", "garbage", "no answer"),
+    "writes an endless line": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'x' * 65536)\n", "garbage", "no answer"),
+    "nests deeply": ("import os\ndef fk(q):\n    os.write(4, b'[' * 100000 + b'\\n')\n", "garbage", "no answer"),
+    "closes its answers": ("import os, time\ndef fk(q):\n    os.close(4)\n    time.sleep(50)\n", "ended", "ended"),
+    "stops itself": ("import os, signal\ndef fk(q):\n    os.kill(os.getpid(), signal.SIGSTOP)\n", "late", "no answer"),
+    "ignores signals": ("import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\ndef fk(q):\n    while True:\n        time.sleep(1)\n", "late", "no answer"),
+    "returns text": ("def fk(q):\n    return 'abc'\n", "raised", "expected real numbers"),
+    "returns complex numbers": ("def fk(q):\n    return 1j\n", "raised", "returned complex"),
+    "is no Python": ("def fk(q)\n    return 1\n", "unreadable", "line 1: SyntaxError"),
+    "raises when loaded": ("x = 1\nfk = y\n", "unreadable", "line 2: NameError"),
+    "has no function": ("x = 1\n", "unreadable", "defines none of fk, ik, controller"),
+    "has a NUL": ("def fk(q):\n    return 1\n\0", "unreadable", "null bytes"),
+}  # fmt: skip
+
+LEFT_BEHIND = {
+    "children": "import os, time\ndef fk(q):\n    for k in range(5):\n        if os.fork() == 0:\n            time.sleep(1000)\n    return 1.0\n",
+    "daemons": (
+        "import os, time\ndef fk(q):\n    if os.fork() == 0:\n        os.setsid()\n        if os.fork() == 0:\n"
+        "            os.setsid()\n            time.sleep(1000)\n        os._exit(0)\n    return 1.0\n"
+    ),
+    "who kills its supervisor": (
+        "import os, time\ndef fk(q):\n    if os.fork() == 0:\n        os.setsid()\n        time.sleep(1000)\n"
+        "    time.sleep(0.3)\n    os.kill(os.getppid(), 9)\n    return 1.0\n"
+    ),
+}  # fmt: skip
+
+
+def left(folder):
+    """Return the processes that run below a folder."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if process.status() != psutil.STATUS_ZOMBIE and process.cwd().startswith(str(folder)):
+                found.append(process)
+        except psutil.Error:
+            pass
+    return found
+
+
+@pytest.fixture
+def program(tmp_path, monkeypatch):
+    """Return what makes a program of a text, closed at the end; nothing of it is left."""
+    made = []
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+    def make(text, name="student.py", **options):
+        path = tmp_path / name
+        path.write_text(text)
+        made.append(Program(path, **({"limits": LIMITS} | options)))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+    deadline = time.monotonic() + 2.0
+    while left(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert left(tmp_path) == []
+
+
+GOOD = "import numpy as np\ndef fk(q):\n    print('called')\n    return np.eye(4) * q[0]\n"
+
+
+@pytest.mark.parametrize("name", HARMFUL)
+def test_harm_is_said_and_the_next_program_runs(name, program):
+    text, failure, said = HARMFUL[name]
+    with pytest.raises(ProgramError, match=said) as caught:
+        program(text).call("fk", q=[1.0, 2.0])
+    assert failure in (None, caught.value.failure)
+    assert program(GOOD).call("fk", q=[2.0])[0][0] == 2.0
+
+
+@pytest.mark.parametrize("name", LEFT_BEHIND)
+def test_what_it_starts_ends_with_it(name, program):
+    assert program(LEFT_BEHIND[name]).call("fk", q=[1.0]) == 1.0
+
+
+def test_a_program_goes_on_after_an_exception_and_is_started_anew_after_its_end(program):
+    text = "count = 0\ndef fk(q):\n    global count\n    count += 1\n    if q[0] < 0:\n        raise ValueError(q[0])\n    if q[0] > 9:\n        import os; os._exit(1)\n    return count\n"
+    one = program(text)
+    assert one.call("fk", q=[1.0]) == 1
+    with pytest.raises(ProgramError, match=r"line 6: ValueError: -1.0") as caught:
+        one.call("fk", q=[-1.0])
+    assert caught.value.line == 6
+    assert one.call("fk", q=[1.0]) == 3
+    with pytest.raises(ProgramError, match="status 1"):
+        one.call("fk", q=[10.0])
+    assert one.call("fk", q=[1.0]) == 1
+
+
+def test_a_million_lines_are_read_and_their_end_is_kept(program):
+    one = program("def fk(q):\n    for k in range(10**6):\n        print(k)\n    return 1.0\n", limits=Limits(60.0))
+    assert one.call("fk", q=[1.0]) == 1.0
+    assert one.output.endswith("999999\n") and len(one.output) < 100_000
+
+
+def test_values_are_told_as_they_are(program):
+    one = program(
+        "def fk(q):\n    return [float('nan'), float('inf'), -0.0, 1e-320, True]\ndef ik(T):\n    return None\n"
+    )
+    assert one.call("fk", q=[1.0]) == [None, None, 0.0, 1e-320, 1.0]
+    assert one.call("ik", T=[[1.0]]) == []
+
+
+def test_nothing_of_ours_is_handed_over(program, monkeypatch):
+    monkeypatch.setenv("SECRET", "secret")
+    text = (
+        "import os, sys\ndef fk(q):\n    return [len(os.environ), 'SECRET' in os.environ, len(sys.argv),"
+        f" os.getcwd() == {str(Path.cwd())!r}, max(int(n) for n in os.listdir('/proc/self/fd'))]\n"
+    )
+    variables, secret, arguments, folder, descriptor = program(text).call("fk", q=[1.0])
+    assert (secret, arguments, folder) == (0, 2, 0) and variables < 12 and descriptor <= 5
+
+
+@pytest.mark.parametrize(
+    "text", ["import dhkit\ndef fk(q):\n    return 1\n", "def fk(q):\n    import dhkit.arm\n    return 1\n"]
+)
+def test_who_imports_dhkit_is_reported(text, program):
+    one = program(text, limits=Limits(20.0))
+    one.call("fk", q=[1.0])
+    assert one.imported == ("dhkit",)
+
+
+def test_files_that_are_none(tmp_path):
+    (tmp_path / "large.py").write_bytes(b"#" * 2_000_000)
+    (tmp_path / "folder.py").mkdir()
+    os.mkfifo(tmp_path / "pipe.py")
+    (tmp_path / "text.txt").write_text("fk")
+    for name, said in (("large.py", "1000000 bytes"), ("folder.py", "a file"), ("pipe.py", "a file"), ("no.py", "a file"), ("text.txt", ".py or .m")):  # fmt: skip
+        with pytest.raises(ProgramError, match=said):
+            Program(tmp_path / name).start()
+    with pytest.raises(ProgramError, match="no such program"):
+        Program(["no-such-program"]).start()
+
+
+FOREIGN = """
+import json, os
+requests, answers = os.fdopen(3), os.fdopen(4, "w", buffering=1)
+print(json.dumps({"functions": ["fk"]}), file=answers)
+for line in requests:
+    if line.strip():
+        request = json.loads(line)
+        print(json.dumps({"id": 10**9, "value": 0}), file=answers)  # of no request
+        print(json.dumps({"id": request["id"], "value": sum(request["arguments"]["q"])}), file=answers)
+"""
+
+
+def test_any_program_speaks_the_protocol(tmp_path):
+    (tmp_path / "foreign.py").write_text(FOREIGN)
+    with Program([sys.executable, str(tmp_path / "foreign.py"), "; touch /tmp/x"]) as one:
+        assert one.call("fk", q=[1.0, 2.5]) == 3.5
+        assert one.call("fk", q=[2.0]) == 2.0
+
+
+@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="no octave: Debian's octave runs MATLAB's language")
+def test_octave_runs_files_of_matlab(program):
+    text = "1;\nfunction T = fk(q)\n  if q(1) > 5\n    error('too far');\n  end\n  T = eye(4) * q(1);\nend\n"
+    text += "function Q = ik(T)\n  if T(1, 1) > 3\n    Q = [];\n  else\n    Q = [T(1, :); NaN 1 2 3];\n  end\nend\n"
+    text += "function u = controller(t, q, qd, setpoint)\n  u = 10 * (setpoint.q - q);\nend\n"
+    one = program(text, "student.m", limits=Limits(20.0, 1 << 30))
+    assert one.call("fk", q=[2.0, 0.0])[3][3] == 2.0
+    with pytest.raises(ProgramError, match="line 4: too far"):
+        one.call("fk", q=[9.0, 0.0])
+    T = [[1.0, 2.0, 3.0, 4.0]] * 4
+    assert one.call("ik", T=T) == [[1, 2, 3, 4], [None, 1, 2, 3]]
+    assert one.call("ik", T=[[4.0] * 4] * 4) == []
+    setpoint = {"q": [2.0, 3.0], "qd": [0.0, 0.0], "qdd": [0.0, 0.0]}
+    assert one.call("controller", t=0.0, q=[1.0, 1.0], qd=[0.0, 0.0], setpoint=setpoint) == [10, 20]
+
+
+@pytest.mark.skipif(shutil.which("bwrap") is None, reason="no bwrap: Debian's bubblewrap")
+def test_a_sandbox_writes_nowhere_and_has_no_network(program, tmp_path):
+    text = (
+        "import socket\ndef fk(q):\n    try:\n"
+        f"        open({str(tmp_path / 'written')!r}, 'w')\n        return 1.0\n    except OSError:\n        pass\n"
+        "    try:\n        socket.create_connection(('127.0.0.1', 1), 0.2)\n    except ConnectionRefusedError:\n"
+        "        return 0.0\n    except OSError:\n        return 0.0\n    return 2.0\n"
+    )
+    assert program(text, sandbox="bwrap").call("fk", q=[1.0]) == 0.0
+    assert not (tmp_path / "written").exists()
