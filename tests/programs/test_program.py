@@ -4,6 +4,7 @@
 
 import os
 import shutil
+import socket
 import sys
 import tempfile
 import time
@@ -200,11 +201,15 @@ def test_octave_runs_files_of_matlab(program):
 
 @pytest.mark.skipif(shutil.which("bwrap") is None, reason="no bwrap: Debian's bubblewrap")
 def test_a_sandbox_writes_nowhere_and_has_no_network(program, tmp_path):
-    text = (
-        "import socket\ndef fk(q):\n    try:\n"
-        f"        open({str(tmp_path / 'written')!r}, 'w')\n        return 1.0\n    except OSError:\n        pass\n"
-        "    try:\n        socket.create_connection(('127.0.0.1', 1), 0.2)\n    except ConnectionRefusedError:\n"
-        "        return 0.0\n    except OSError:\n        return 0.0\n    return 2.0\n"
-    )
-    assert program(text, sandbox="bwrap").call("fk", q=[1.0]) == 0.0
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        text = (
+            "import socket\ndef fk(q):\n    reached = 0.0\n    try:\n"
+            f"        open({str(tmp_path / 'written')!r}, 'w').close()\n    except OSError:\n        pass\n"
+            f"    try:\n        socket.create_connection(('127.0.0.1', {server.getsockname()[1]}), 0.5)\n"
+            "        reached = 1.0\n    except OSError:\n        pass\n    return reached\n"
+        )
+        assert program(text).call("fk", q=[1.0]) == 1.0
+        assert (tmp_path / "written").exists()
+        (tmp_path / "written").unlink()
+        assert program(text, sandbox="bwrap").call("fk", q=[1.0]) == 0.0
     assert not (tmp_path / "written").exists()
