@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
 from dhkit.cli.output import say
 from dhkit.cli.outputs import PAGES, check_outputs
 from dhkit.lab import serve
+from dhkit.programs import protect_from_children
 
 __all__ = ["run_lab", "run_view", "until_interrupted"]
 
@@ -26,9 +28,18 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
         return 0
 
 
-def run_lab(arm: Arm, port: int | None, *, open_browser: bool) -> int:
+def run_lab(
+    arm: Arm,
+    port: int | None,
+    *,
+    open_browser: bool,
+    own: Path | Sequence[str] | None = None,
+    sandbox: str | None = None,
+) -> int:
     """Serve a lab."""
-    with serve(arm, block=False, port=port, open_browser=False) as lab:
+    if own is not None:
+        protect_from_children()
+    with serve(arm, block=False, port=port, open_browser=False, own=own, sandbox=sandbox) as lab:
         return until_interrupted(lab.url, f"the lab of {arm.name}", open_browser=open_browser)
 
 

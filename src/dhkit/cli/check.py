@@ -9,8 +9,7 @@ from pathlib import Path
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json
-from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check
-from dhkit.programs.program import protect_from_children
+from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check, protect_from_children
 
 __all__ = ["run"]
 

@@ -420,12 +420,23 @@ def play(
 def lab(
     robot: Robot,
     port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,
+    mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
+    run: Annotated[
+        str | None, typer.Option(help="Your program in place of a file; ARGUMENTS follow the robot.")
+    ] = None,
+    arguments: Annotated[list[str] | None, typer.Argument(help="Of the program of --run.")] = None,
+    sandbox: Annotated[str | None, typer.Option(help="bwrap: your program in bubblewrap.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> int:
     """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
     from dhkit.cli import browser
 
-    return browser.run_lab(Arm.load(robot), port, open_browser=not no_browser)
+    if mine is not None and run is not None:
+        raise DescriptionError("--mine and --run; expected one of them")
+    if arguments and run is None:
+        raise DescriptionError(f"{arguments[0]!r} behind the robot; expected --run PROGRAM for arguments")
+    own = mine if run is None else [run, *(arguments or [])]
+    return browser.run_lab(Arm.load(robot), port, open_browser=not no_browser, own=own, sandbox=sandbox)
 
 
 @app.command()

@@ -22,6 +22,7 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
 from dhkit.lab.live import Live, Wanted
 from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.own_panel import OwnPanel
 from dhkit.viewer.streams import Samples
 
 __all__ = ["ControlPanel", "Settings"]
@@ -42,7 +43,10 @@ AMPLITUDE, FREQUENCY = 0.3, 0.25
 """Of a sine: rad (and shares of the reach), and Hz."""
 MOST_FORCE, LONGEST_PUSH = 1e4, 10.0
 PARTS = ("controller", "bandwidth", "damping", "friction", "payload", "compensate", "reference")
+OWN = "own"
+"""The name of the controller of the person's own program."""
 TITLES = {
+    OWN: "Your own",
     "pd": "PD of each joint",
     "pid": "PID of each joint",
     "pd-gravity": "PD and gravity",
@@ -78,7 +82,7 @@ class Settings:
         """
         fields = Fields(request, data, PARTS)
         return Settings(
-            fields.choice("controller", list(CONTROLLERS), self.controller),
+            fields.choice("controller", [*CONTROLLERS, OWN], self.controller),
             fields.number("bandwidth", 0.1, 1000.0, self.bandwidth),
             fields.number("damping", 0.01, 10.0, self.damping),
             fields.choice("friction", FRICTIONS, self.friction),
@@ -96,8 +100,8 @@ class Settings:
 class ControlPanel:
     """Requests ``control.…``, ``bodies.assume`` and ``arm.planar``; the run has a thread of its own."""
 
-    def __init__(self, desk: Desk, motions: MotionPanel) -> None:
-        self.desk, self.motions = desk, motions
+    def __init__(self, desk: Desk, motions: MotionPanel, own: OwnPanel) -> None:
+        self.desk, self.motions, self.own = desk, motions, own
         self.settings = Settings()
         self.planar = False
         self._lock = threading.RLock()
@@ -219,7 +223,10 @@ class ControlPanel:
             {
                 "running": running,
                 "paused": self._paused,
-                "controllers": [{"name": name, "title": TITLES.get(name, name)} for name in CONTROLLERS],
+                "controllers": [
+                    {"name": name, "title": TITLES.get(name, name)}
+                    for name in [*CONTROLLERS, *([OWN] if self.own.controls else [])]
+                ],
                 **{name: getattr(settings, name) for name in PARTS},
                 "planar": self.planar,
                 "rate": RATE,
@@ -323,9 +330,12 @@ class ControlPanel:
 
     def _apply(self, live: Live, arm: Arm) -> None:
         settings = self.settings
-        controller = make_controller(
-            settings.controller, live.arm.description, settings.bandwidth, settings.damping, live.q
-        )
+        if settings.controller == OWN:
+            controller = self.own.controller()
+        else:
+            controller = make_controller(
+                settings.controller, live.arm.description, settings.bandwidth, settings.damping, live.q
+            )
         live.take(FrictionCompensation(controller, live.arm) if settings.compensate else controller)
         live.wanted = self._wanted(live, arm)
 

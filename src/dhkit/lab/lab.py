@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -15,6 +16,7 @@ from dhkit.lab.fields import Fields
 from dhkit.lab.jobs import Jobs
 from dhkit.lab.joint_panel import JointPanel
 from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_lines import python_lines
 from dhkit.lab.table_panel import TablePanel
 from dhkit.lab.tool_panel import ToolPanel
@@ -33,6 +35,11 @@ class Lab:
     ----------
     arm
         The arm.
+    own
+        A program with ``fk``, ``ik`` or ``controller``, which is held against the arm: a ``.py`` or ``.m`` file, or a
+        command; see :class:`dhkit.programs.Program`.
+    sandbox
+        What it runs in: ``"bwrap"``, or None.
     port, token
         Where the page is, for pages that are to find it again; any free port and a new token unless given.
 
@@ -48,7 +55,14 @@ class Lab:
     {}
     """
 
-    def __init__(self, arm: Arm, port: int = 0, token: str | None = None) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        port: int = 0,
+        token: str | None = None,
+        own: Path | Sequence[str] | None = None,
+        sandbox: str | None = None,
+    ) -> None:
         self._lock = threading.RLock()
         self._closed = False
         self.view = View(arm.description, answer=self.answer, port=port, token=token)
@@ -58,7 +72,8 @@ class Lab:
         self._tool = ToolPanel(self.desk)
         table = TablePanel(self.desk)
         self._motions = MotionPanel(self.desk, jobs)
-        self._control = ControlPanel(self.desk, self._motions)
+        self._own = OwnPanel(self.desk, own, sandbox)
+        self._control = ControlPanel(self.desk, self._motions, self._own)
         self._requests: dict[str, Callable[[dict[str, Any]], Any]] = {
             "joints.set": joints.set,
             "joints.named": joints.named,
@@ -92,6 +107,8 @@ class Lab:
             "control.stop": self._control.stop,
             "control.push": self._control.push,
             "control.download": self._control.download,
+            "own.ghosts": self._own.ghosts,
+            "own.score": self._own.score,
             "bodies.assume": self._control.assume,
             "arm.planar": self._control.lock_to_planar,
             "python": self._python,
@@ -101,6 +118,7 @@ class Lab:
         table.publish()
         self._motions.publish()
         self._control.publish()
+        self._own.begin()
 
     @property
     def url(self) -> str:
@@ -131,6 +149,7 @@ class Lab:
             self._closed = True
         self._motions.close()
         self._control.close()
+        self._own.close()
         self.desk.close()
         self.view.close()
 

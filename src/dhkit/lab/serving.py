@@ -7,6 +7,7 @@ import secrets
 import stat
 import time
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
@@ -22,7 +23,15 @@ LONGEST_TOKEN = 100
 """Characters that are read where one is kept."""
 
 
-def serve(arm: Arm, *, block: bool = True, port: int | None = None, open_browser: bool = True) -> Lab:
+def serve(
+    arm: Arm,
+    *,
+    block: bool = True,
+    port: int | None = None,
+    open_browser: bool = True,
+    own: Path | Sequence[str] | None = None,
+    sandbox: str | None = None,
+) -> Lab:
     """Open a lab in the browser.
 
     Parameters
@@ -36,6 +45,8 @@ def serve(arm: Arm, *, block: bool = True, port: int | None = None, open_browser
         for this port, readable by this user alone. Any free port, and a new token, unless given.
     open_browser
         Whether the page is opened in the default browser.
+    own, sandbox
+        A program that is held against the arm, and what it runs in: see :class:`Lab`.
 
     Returns
     -------
@@ -59,7 +70,7 @@ def serve(arm: Arm, *, block: bool = True, port: int | None = None, open_browser
     """
     if port is not None and not 1024 <= port < 65_536:
         raise ValueError(f"port is {port}; expected 1024 to 65535")
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port))
+    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox)
     if not block:
         if open_browser:
             webbrowser.open(lab.url)

@@ -2,8 +2,18 @@
 
 from dhkit.programs.checks import check
 from dhkit.programs.process import Limits, ProgramError
-from dhkit.programs.program import FUNCTIONS, Program
+from dhkit.programs.program import FUNCTIONS, Program, protect_from_children
 from dhkit.programs.report import CheckReport, Part
 from dhkit.programs.rubric import CheckRubric
 
-__all__ = ["FUNCTIONS", "CheckReport", "CheckRubric", "Limits", "Part", "Program", "ProgramError", "check"]
+__all__ = [
+    "FUNCTIONS",
+    "CheckReport",
+    "CheckRubric",
+    "Limits",
+    "Part",
+    "Program",
+    "ProgramError",
+    "check",
+    "protect_from_children",
+]

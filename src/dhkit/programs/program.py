@@ -55,6 +55,7 @@ class Program:
         self._source, self._sandbox = source, sandbox
         self._process: Process | None = None
         self._lock = threading.Lock()
+        self._closed = False
 
     def start(self) -> None:
         """Start the program, unless it runs, and wait until it says which functions it has.
@@ -100,7 +101,9 @@ class Program:
         return "" if running is None else running.output()
 
     def close(self) -> None:
-        """End the program and all that it started."""
+        """End the program and all that it started, in the middle of a call too; it is not started again."""
+        self._closed = True
+        self._end(keep=True)
         with self._lock:
             self._end()
 
@@ -111,6 +114,8 @@ class Program:
         self.close()
 
     def _started(self) -> Process:
+        if self._closed:
+            raise ProgramError(f"{self.name} was closed", "ended")
         running = self._process
         if running is not None and running.failure is None:
             return running
