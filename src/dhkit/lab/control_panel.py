@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.control import CONTROLLERS, FrictionCompensation, make_controller
+from dhkit.control import CONTROLLERS, FrictionCompensation, Sine, make_controller
 from dhkit.description import Array
 from dhkit.dynamics import Friction
 from dhkit.errors import DhkitError
@@ -25,7 +25,7 @@ from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.viewer.streams import Samples
 
-__all__ = ["ControlPanel", "Settings"]
+__all__ = ["OWN", "ControlPanel", "Settings"]
 
 log = logging.getLogger(__name__)
 
@@ -38,9 +38,13 @@ BEHIND = 5
 SMOOTH = 0.05
 """rad/s or m/s of smooth friction."""
 FRICTIONS = ("none", "smooth", "stiction")
-REFERENCES = ("hold", "sine", "motion", "target")
+REFERENCES = ("hold", "sine", "motion", "target", "sliders")
 AMPLITUDE, FREQUENCY = 0.3, 0.25
-"""Of a sine: rad (and shares of the reach), and Hz."""
+"""Of a sine: rad (and shares of the reach) from end to end, less where limits are near; and Hz."""
+ROOM = 0.9
+"""Share of the way to a limit that a sine takes at most."""
+REBUILT = ("controller", "bandwidth", "damping", "compensate")
+"""Settings of which the controller is made."""
 MOST_FORCE, LONGEST_PUSH = 1e4, 10.0
 PARTS = ("controller", "bandwidth", "damping", "friction", "payload", "compensate", "reference")
 OWN = "own"
@@ -115,6 +119,9 @@ class ControlPanel:
         self._error: str | None = None
         desk.changed.append(self._forget)
         desk.steer = self._steer
+        motions.changed.append(self._motion_changed)
+        self.sine: Sine | None = None
+        """What a run that follows a sine follows."""
 
     def start(self, data: dict[str, Any]) -> dict[str, Any]:
         """Simulate from the state on show."""
@@ -122,6 +129,7 @@ class ControlPanel:
         arm = self.desk.arm
         if not all(joint.bodies for joint in arm.description.joints):
             raise ValueError("control.start: the arm has no bodies; expected uniform links to be assumed first")
+        self._require_reference(settings.reference)
         self._end()
         with self._lock:
             before, self.settings = self.settings, settings
@@ -129,9 +137,11 @@ class ControlPanel:
             self._base = self.desk.q.copy()
             try:
                 live = Live(self._simulated(arm), self._plant(arm), settings.model, self._base[self._free], RATE)
-                self._apply(live, arm)
+                live.take(self._controller(live))
+                live.wanted = self._wanted(live, arm)
             except (DhkitError, ValueError):
                 self.settings = before
+                self.publish()
                 raise
             self._live = live
             self._error, self._paused, self._speed = None, False, 1.0
@@ -143,19 +153,36 @@ class ControlPanel:
         return {}
 
     def change(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Change the settings, while it runs too."""
+        """Change the settings, while it runs too: what they do not concern goes on as it is."""
         with self._lock:
-            self.settings = self.settings.changed("control.change", data)
-            live, arm = self._live, self.desk.arm
+            before, now = self.settings, self.settings.changed("control.change", data)
+            live = self._live if self.desk.running else None
             if live is not None:
-                live.change(self._plant(arm), self.settings.model)
-                self._apply(live, arm)
+                try:
+                    if now.reference != before.reference or "reference" in data:
+                        self._require_reference(now.reference)
+                    self.settings = now
+                    controller = None
+                    if any(getattr(now, name) != getattr(before, name) for name in REBUILT):
+                        controller = self._controller(live)
+                    if (now.payload, now.friction) != (before.payload, before.friction):
+                        live.change(self._plant(self.desk.arm), now.model)
+                except (DhkitError, ValueError):
+                    self.settings = before
+                    raise
+                if controller is not None:
+                    live.take(controller)
+                if "reference" in data:
+                    live.wanted = self._wanted(live, self.desk.arm)
+            self.settings = now
         self.publish()
         return {}
 
     def pause(self, data: dict[str, Any]) -> dict[str, Any]:
         """Hold the time, or let it go on."""
         Fields("control.pause", data, [])
+        if not self.desk.running:
+            raise ValueError("control.pause: nothing runs")
         self._paused = not self._paused
         self.publish()
         return {}
@@ -193,11 +220,13 @@ class ControlPanel:
         with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
             path = result.save(Path(folder) / f"run.{kind}")
             content = base64.b64encode(path.read_bytes()).decode()
-        return {"name": f"{self.desk.arm.name}-{self.settings.controller}.{kind}", "content": content}
+        return {"name": f"{self.desk.arm.name}-run.{kind}", "content": content}
 
     def assume(self, data: dict[str, Any]) -> dict[str, Any]:
         """Give an arm without bodies uniform links."""
         Fields("bodies.assume", data, [])
+        if all(joint.bodies for joint in self.desk.arm.description.joints):
+            raise ValueError("bodies.assume: every link has a mass; expected one without")
         self._end()
         self.desk.assumed_bodies = True
         self.desk.replace(self.desk.arm.with_uniform_links())
@@ -236,6 +265,22 @@ class ControlPanel:
                 "note": "the links' masses are assumed: uniform rods" if self.desk.assumed_bodies else None,
             },
         )
+
+    @property
+    def free(self) -> list[int]:
+        """The joints that a run moves, from 0."""
+        return self._free
+
+    @property
+    def locked(self) -> dict[int, float]:
+        """The values of the joints that a run does not move, by joint from 0."""
+        return {i: float(x) for i, x in enumerate(self._base) if i not in self._free} if self.planar else {}
+
+    @property
+    def wanted(self) -> Array:
+        """The joint values that a run follows now, of the free joints."""
+        live = self._live
+        return np.zeros(len(self._free)) if live is None else live.wanted(live.t)[0]
 
     def close(self) -> None:
         """End the run."""
@@ -307,9 +352,22 @@ class ControlPanel:
 
     def _forget(self) -> None:
         """End a run of another arm."""
+        ran = self.desk.running
         self._end()
         with self._lock:
-            self._live, self.planar, self._error = None, False, None
+            self._live, self.planar = None, False
+            self._error = "ended: the arm was edited" if ran else None
+        self.publish()
+
+    def _motion_changed(self) -> None:
+        """Follow another motion from now on; hold where there is none any more."""
+        with self._lock:
+            live = self._live
+            if live is None or not self.desk.running or self.settings.reference != "motion":
+                return
+            if self.motions.motion is None:
+                self.settings = replace(self.settings, reference="hold")
+            live.wanted = self._wanted(live, self.desk.arm)
         self.publish()
 
     def _full(self, q: Array) -> Array:
@@ -322,13 +380,13 @@ class ControlPanel:
         """Return the arm whose joints are free."""
         if not self.planar:
             return arm
-        return arm.lock({i: float(self._base[i]) for i in range(arm.n) if i not in self._free})
+        return arm.lock({i: self.locked[i] for i in self.locked})
 
     def _plant(self, arm: Arm) -> Arm:
         simulated = self._simulated(arm)
         return simulated.with_payload(self.settings.payload) if self.settings.payload else simulated
 
-    def _apply(self, live: Live, arm: Arm) -> None:
+    def _controller(self, live: Live) -> Any:
         settings = self.settings
         if settings.controller == OWN:
             controller = self.own.controller()
@@ -336,8 +394,20 @@ class ControlPanel:
             controller = make_controller(
                 settings.controller, live.arm.description, settings.bandwidth, settings.damping, live.q
             )
-        live.take(FrictionCompensation(controller, live.arm) if settings.compensate else controller)
-        live.wanted = self._wanted(live, arm)
+        return FrictionCompensation(controller, live.arm) if settings.compensate else controller
+
+    def _require_reference(self, name: str) -> None:
+        """Refuse to follow what is not there.
+
+        Raises
+        ------
+        ValueError
+            Says what is missing.
+        """
+        if name == "motion" and self.motions.motion is None:
+            raise ValueError("control: there is no motion to follow; expected one planned first (Motion)")
+        if name == "target" and self.desk.aimed is None:
+            raise ValueError("control: there is no target to follow; expected one that is in reach (Tool)")
 
     def _wanted(self, live: Live, arm: Arm) -> Wanted:
         """Return what the run follows from now on."""
@@ -348,19 +418,16 @@ class ControlPanel:
             return lambda t: (self._aimed(held), still, still)
         if self.settings.reference == "motion":
             motion = self.motions.motion
-            if motion is None:
-                raise ValueError("control: there is no motion to follow; expected one planned first")
+            assert motion is not None  # noqa: S101 - for mypy: it was asked for before
             return lambda t: _repeated(motion, t - begin, free)
         if self.settings.reference == "sine":
-            size = np.where(arm.description.numbers.prismatic, AMPLITUDE * arm.description.reach, AMPLITUDE)[free]
-            w = 2 * np.pi * FREQUENCY
+            self.sine = sine = _sine(arm, held, free)
 
-            def sine(t: float) -> tuple[Array, Array, Array]:
-                s = w * (t - begin)
-                # It begins at rest: 1 - cos.
-                return held + size * (1 - np.cos(s)) / 2, size * w * np.sin(s) / 2, size * w * w * np.cos(s) / 2
+            def sampled(t: float) -> tuple[Array, Array, Array]:
+                q, qd, qdd = sine.sampled(np.array([t - begin]))
+                return q[0], qd[0], qdd[0]
 
-            return sine
+            return sampled
         return lambda t: (held, still, still)
 
     def _steer(self, q: Array, joint: int | None) -> None:
@@ -372,8 +439,10 @@ class ControlPanel:
                 return
             held, still = live.wanted(live.t)[0].copy(), np.zeros(len(self._free))
             asked = [k for k, i in enumerate(self._free) if joint in (None, i)]
+            if not asked:
+                raise ValueError(f"joint {1 + (joint or 0)} is locked: only joints 2 and 3 move")
             held[asked] = q[self._free][asked]
-            self.settings = replace(self.settings, reference="hold")
+            self.settings = replace(self.settings, reference="sliders")
             live.wanted = lambda t: (held, still, still)
         self.publish()
 
@@ -394,7 +463,22 @@ def _repeated(motion: Any, t: float, free: list[int]) -> tuple[Array, Array, Arr
     back = s >= period / 2
     if back:
         s -= period / 2
-    s = min(s, motion.duration)
-    at = motion.duration - s if back else s
+    rests = s >= motion.duration
+    at = min(s, motion.duration)
+    at = motion.duration - at if back else at
+    still = np.zeros(len(free))
+    if rests:
+        return motion.q(at)[free], still, still
     sign = -1.0 if back else 1.0
     return motion.q(at)[free], sign * motion.qd(at)[free], motion.qdd(at)[free]
+
+
+def _sine(arm: Arm, held: Array, free: list[int]) -> Sine:
+    """Return a sine of the free joints that begins at rest, to the side on which there is more room."""
+    numbers = arm.description.numbers
+    size = np.where(numbers.prismatic, AMPLITUDE * arm.description.reach, AMPLITUDE)[free]
+    above, below = numbers.upper[free] - held, held - numbers.lower[free]
+    up = np.clip(np.where(above >= np.minimum(size, below), np.minimum(size, ROOM * above), 0.0), 0.0, None)
+    down = np.clip(np.minimum(size, ROOM * below), 0.0, None)
+    way = np.where(up > 0, up, -down) / 2
+    return Sine(held + way, way, FREQUENCY, -np.pi / 2)

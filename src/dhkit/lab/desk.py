@@ -15,6 +15,8 @@ from dhkit.viewer import View
 
 __all__ = ["Desk", "listed"]
 
+UNIQUE = 1e-6
+"""Cosine (or sine) of the second Euler angle below which the first and third are not unique."""
 SINGULAR = 1e-3
 """Smallest over largest singular value of the Jacobian (m and rad): below it a state is told as singular."""
 
@@ -63,9 +65,16 @@ class Desk:
         kept = (
             q if q is not None else self.q if arm.description.kinds == self.arm.description.kinds else self.first(arm)
         )
+        before = self.arm, self.q, self.aimed
         self.arm, self.q, self.aimed = arm, kept, None
-        self.view.replace(arm.description)
-        self.publish()
+        try:
+            self.view.replace(arm.description)
+            self.publish()
+        except BaseException:
+            self.arm, self.q, self.aimed = before
+            self.view.replace(self.arm.description)
+            self.publish()
+            raise
         for call in self.changed:
             call()
 
@@ -119,19 +128,23 @@ class Desk:
                 "touching": self._contacts.links(arm, q),
             },
         )
+        self.view.panel("tool", self.tool(arm, q))
+
+    def tool(self, arm: Arm, q: Array) -> dict[str, Any]:
+        """Return the numbers of the tool at joint values, shape (n,)."""
         T = arm.fk(q)
         xyz, euler = pose_parts(T, order=self.order)
-        self.view.panel(
-            "tool",
-            {
-                "T": T.ravel().tolist(),
-                "xyz": xyz.tolist(),
-                "euler": euler.tolist(),
-                "order": self.order,
-                "manipulability": float(arm.manipulability(q)),
-                "singular": _singular(arm, q),
-            },
-        )
+        # Where the second angle is at the end of its range only the sum or difference of the others counts.
+        ends = np.cos(euler[1]) if self.order[0] != self.order[2] else np.sin(euler[1])
+        return {
+            "T": T.ravel().tolist(),
+            "xyz": xyz.tolist(),
+            "euler": euler.tolist(),
+            "order": self.order,
+            "unique": bool(abs(ends) > UNIQUE),
+            "manipulability": float(arm.manipulability(q)),
+            "singular": _singular(arm, q),
+        }
 
     def close(self) -> None:
         """End what runs in the background."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from dhkit.errors import DhkitError
@@ -70,10 +71,13 @@ class Jobs:
     ----------
     tell
         Called with a panel's state: what runs, how far it is, and what went wrong.
+    lock
+        Held while a result is taken: what it belongs to must not change meanwhile.
     """
 
-    def __init__(self, tell: Callable[[Any], None]) -> None:
+    def __init__(self, tell: Callable[[Any], None], lock: AbstractContextManager[Any] | None = None) -> None:
         self._tell = tell
+        self._taking: AbstractContextManager[Any] = nullcontext() if lock is None else lock
         self._count = 0
         self._job: Job | None = None
         self._lock = threading.Lock()
@@ -129,8 +133,9 @@ class Jobs:
     def _run(self, job: Job, work: Callable[[Job], Any], done: Callable[[Any], None]) -> None:
         try:
             result = work(job)
-            if not job.cancelled:
-                done(result)
+            with self._taking:
+                if not job.cancelled:
+                    done(result)
         except Cancelled:
             return
         except (DhkitError, ValueError, TypeError) as error:

@@ -67,7 +67,7 @@ class Lab:
         self._closed = False
         self.view = View(arm.description, answer=self.answer, port=port, token=token)
         self.desk = Desk(arm, self.view)
-        jobs = Jobs(lambda state: self.view.panel("job", state))
+        jobs = Jobs(lambda state: self.view.panel("job", state), self._lock)
         joints = JointPanel(self.desk)
         self._tool = ToolPanel(self.desk)
         table = TablePanel(self.desk)
@@ -83,6 +83,7 @@ class Lab:
             "tool.choose": self._tool.choose,
             "tool.order": self._tool.order,
             "tool.clear": self._tool.clear,
+            "tool.read": self._tool.read,
             "table.edit": table.edit,
             "table.convention": table.convention,
             "table.undo": table.undo,

@@ -77,9 +77,16 @@ class Live:
         self.controller = controller
 
     def change(self, plant: Arm, friction: Friction | None) -> None:
-        """Go on with another load or friction."""
+        """Go on with another load or friction.
+
+        What is recorded begins anew: the work of one run is that of one arm.
+        """
         self._friction = friction
         self._plant = self._moving(plant)
+        state = self._state
+        self._start = self._state = State(state.t, state.q, state.qd, state.memory)  # no work is done yet
+        self._turnover = 0.0
+        self._count, self._steps, self._stride = 0, 0, 1
 
     def push(self, link: int | None, force: Array, duration: float) -> None:
         """Push from now on for a while.
@@ -131,7 +138,7 @@ class Live:
         if not self._count:
             raise ValueError("nothing has been simulated yet")
         rows = self._rows[: self._count]
-        recorded = {"t": rows[:, 0].copy()}
+        recorded = {"t": rows[:, 0] - rows[0, 0]}
         recorded |= zip(COLUMNS, (x.copy() for x in np.split(rows[:, 1:], len(COLUMNS), axis=1)), strict=True)
         return result_of(
             self.arm.description, self._plant, recorded, self._start, self._state, self._turnover, self.controller

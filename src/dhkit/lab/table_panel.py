@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -56,7 +57,7 @@ class TablePanel:
         fields = Fields("table.edit", data, ["row", "column", "text"])
         row = fields.whole("row", 0, self.desk.arm.n - 1)
         column = COLUMNS.index(fields.choice("column", COLUMNS))
-        text = fields.text("text").strip()
+        text = _typed(fields.text("text").strip())
         texts = [list(entries) for entries in self._now.texts]
         texts[row][column] = text
         table = self._read(tuple(map(tuple, texts)), self._now.description)
@@ -115,11 +116,9 @@ class TablePanel:
 
     def publish(self) -> None:
         """Tell the pages the table."""
-        table, arm = self._now, self.desk.arm
+        table = self._now
         description = table.description
         numbers = description.numbers
-        frames = arm.frames(self.desk.q)
-        A = np.linalg.solve(frames[:-1], frames[1:])
         self.desk.view.panel(
             "table",
             {
@@ -138,7 +137,6 @@ class TablePanel:
                 "changed": table.texts != self._first.texts
                 or description.convention is not self._first.description.convention,
                 "note": self._note(),
-                "A": A.reshape(-1, 16).tolist(),
             },
         )
 
@@ -146,6 +144,9 @@ class TablePanel:
         before, now = (classify(x).fit for x in (self._first.description, self._now.description))
         if before is not None and now is None:
             return "this table has no closed form: the tool is followed by iteration"
+        meshes, drawn = (any(j.shapes for j in table.description.joints) for table in (self._first, self._now))
+        if meshes and not drawn:
+            return "drawn from the table: the arm's meshes fit its own lengths alone"
         return None
 
     def _read(self, texts: tuple[tuple[str, ...], ...], last: Description) -> Table:
@@ -157,8 +158,6 @@ class TablePanel:
             for k, (name, text) in enumerate(zip(COLUMNS, entries, strict=True)):
                 try:
                     values[name] = quantity(name, text, last.parameters)
-                    if not values[name].symbols and abs(float(values[name])) > LARGEST:
-                        raise ValueError(f"{name}: beyond {LARGEST:g}")
                 except (DhkitError, ValueError) as error:
                     errors[i, k] = str(error)
             rows.append(values)
@@ -169,7 +168,12 @@ class TablePanel:
             for joint, x in zip(last.joints, rows, strict=True)
         )
         try:
-            return Table(texts, _drawn(replace(last, joints=joints)))
+            description = _drawn(replace(last, joints=joints))
+            numbers = description.numbers
+            beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= LARGEST))
+            if len(beyond):
+                return Table(texts, last, {(int(i), int(k)): f"{COLUMNS[k]}: beyond {LARGEST:g}" for k, i in beyond})
+            return Table(texts, description)
         except (DhkitError, ValueError) as error:
             changed = [(i, k) for i, row in enumerate(texts) for k in range(4) if row[k] != self._now.texts[i][k]]
             return Table(texts, last, dict.fromkeys(changed or [(0, 0)], str(error)))
@@ -180,24 +184,36 @@ class TablePanel:
         self._show(table)
 
     def _show(self, table: Table) -> None:
-        same = table.description == self.desk.arm.description
-        self._now = table
+        same = table.description == self._now.description
+        before, self._now = self._now, table
         if same:
             self.publish()
             return
         self._own = True
+        arm = Arm(table.description)
         try:
-            self.desk.replace(Arm(table.description))
+            self.desk.replace(arm.with_uniform_links() if self.desk.assumed_bodies else arm)
+        except BaseException:
+            self._now = before
+            raise
         finally:
             self._own = False
         self.publish()
 
     def _replaced(self) -> None:
-        """Begin anew with an arm that did not come from here."""
-        if not self._own:
-            self._first = self._now = Table.of(self.desk.arm.description)
+        """Take an arm of the same table that has got other bodies; begin anew with any other."""
+        if self._own:
+            return
+        table = Table.of(self.desk.arm.description)
+        if table.texts != self._now.texts:
+            self._first = self._now = table
             self._before, self._after = [], []
-            self.publish()
+        self.publish()
+
+
+def _typed(text: str) -> str:
+    """Return an entry as expressions are written: 90° is 90*deg, π is pi, a decimal comma a point."""
+    return re.sub(r"(?<=\d),(?=\d)", ".", text.replace("°", "*deg").replace("π", "pi").replace("−", "-"))
 
 
 def _drawn(description: Description) -> Description:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array, pose
+from dhkit.errors import DhkitError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
 from dhkit.lab.desk import Desk
-from dhkit.lab.fields import Fields
+from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 
 __all__ = ["ToolPanel", "solved"]
 
@@ -19,6 +21,8 @@ FAR = 1e4
 """m: positions beyond are refused."""
 RESTARTS = 3
 """Of the iteration for arms without closed form, while a person drags."""
+TURNED = 1e-6
+"""rad between the target's rotation and one that meets it."""
 FLAT = 1e-9
 """Extent of the tool's positions across a plane, over the reach, below which they lie in it."""
 PROBES = 64
@@ -47,7 +51,7 @@ class ToolPanel:
         self.T: Array | None = None
         self.chosen: str | None = None
         self._plane = _plane_of(desk.arm)
-        desk.changed.append(self._forget)
+        desk.changed.append(self._replaced)
 
     def target(self, data: dict[str, Any]) -> dict[str, Any]:
         """Move the target to a pose, and the arm after it."""
@@ -79,8 +83,11 @@ class ToolPanel:
         name = Fields("tool.choose", data, ["branch"]).text("branch")
         if self.T is None:
             raise ValueError("tool.choose: there is no target; expected one first")
-        if name not in [branch["name"] for branch in self._branches(*solved(self.desk.arm, self.T, self.desk.q))]:
+        branches = {one["name"]: one for one in self._branches(*solved(self.desk.arm, self.T, self.desk.q))}
+        if name not in branches:
             raise ValueError(f"tool.choose: found {name[:40]!r}; expected a branch that reaches the target")
+        if not branches[name]["within"]:
+            raise ValueError(f"tool.choose: {name} is outside the joint limits, and only shown")
         self.chosen = name
         return self._follow(self.T)
 
@@ -90,11 +97,24 @@ class ToolPanel:
         self.desk.publish_state()
         return {}
 
+    def read(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the numbers of the tool at joint values that a page shows: those of a motion on its way."""
+        arm = self.desk.arm
+        return self.desk.tool(arm, Fields("tool.read", data, ["q"]).vector("q", arm.n, LARGEST_JOINT_VALUE))
+
     def clear(self, data: dict[str, Any]) -> dict[str, Any]:
         """Take the target and the ghosts away."""
         Fields("tool.clear", data, [])
         self._forget()
         return {}
+
+    def _replaced(self) -> None:
+        """Have another arm follow the target, where there is one."""
+        T = self.T
+        self._forget()
+        if T is not None:
+            with suppress(DhkitError, ValueError):  # an arm that cannot: there is no target any more
+                self._follow(T)
 
     def _forget(self) -> None:
         self.T, self.chosen, self.desk.aimed = None, None, None
@@ -131,7 +151,7 @@ class ToolPanel:
             "reached": near is not None,
             "distance": float(np.linalg.norm(T_now[:3, 3] - T[:3, 3])),
             "angle": _angle(T_now, T),
-            "message": self._message(found, near, numeric, beyond=bool(branches)),
+            "message": self._message(found, near, numeric, _angle(T_now, T), beyond=bool(branches)),
             "chosen": near["name"] if near else None,
             "branches": branches,
             "numeric": numeric,
@@ -157,7 +177,9 @@ class ToolPanel:
             return chosen
         return min(branches, key=lambda branch: float(np.sum((np.array(branch["q"]) - self.desk.q) ** 2)))
 
-    def _message(self, found: IKSolutions, near: dict[str, Any] | None, numeric: bool, *, beyond: bool) -> str | None:
+    def _message(
+        self, found: IKSolutions, near: dict[str, Any] | None, numeric: bool, angle: float, *, beyond: bool
+    ) -> str | None:
         if near is None and beyond:
             return "in reach only outside the joint limits"
         if near is None:
@@ -166,7 +188,11 @@ class ToolPanel:
                 return "not reached by iteration from here"
             if distance == 0:
                 return "the position is in reach, this orientation is not"
-            return f"out of reach by {1000 * distance:.3g} mm"
+            return f"out of reach by {distance:.3g} m" if distance >= 1 else f"out of reach by {1000 * distance:.3g} mm"
+        if self.desk.running:
+            return "a controller moves the arm: it follows the target where Control says so"
+        if angle > TURNED:
+            return f"this arm cannot turn its tool freely: the rotation is off by {np.degrees(angle):.3g}°"
         if numeric:
             return None
         flags = int(found.flags[found.branches.index(near["name"])])

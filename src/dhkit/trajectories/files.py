@@ -39,6 +39,8 @@ TRAJECTORY = FileKind(
 )
 FIRST_LINE = 200
 """Bytes in which the first line of a table is looked for."""
+MOST_COEFFICIENTS = 65
+"""Of a joint's polynomial on an interval: the time that one of a motion takes grows with them."""
 RATE = 1000.0
 """Samples a second where none are asked for."""
 SECOND = 1_000_000_000
@@ -230,6 +232,9 @@ class _Read:
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
     robot = TRAJECTORY.robot_of_archive(values, description)
     breaks, coefficients = values["breaks"], values["coefficients"]
+    if coefficients.ndim > 1 and coefficients.shape[1] > MOST_COEFFICIENTS:
+        found = f"polynomials of degree {coefficients.shape[1] - 1}"
+        raise ValueError(f"{found}; expected at most {MOST_COEFFICIENTS - 1}")
     if robot.n == 1 and coefficients.ndim == 2:
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:

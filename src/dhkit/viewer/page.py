@@ -41,6 +41,7 @@ LAB_FILES = (
     "gizmo.js",
     "table.js",
     "motion.js",
+    "own.js",
     "control.js",
     "plot.js",
     "uplot.js",

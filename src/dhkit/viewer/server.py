@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import Any
 
 from tornado.httpserver import HTTPServer
+from tornado.iostream import IOStream
 from tornado.netutil import bind_sockets
 from tornado.web import Application
 
@@ -51,7 +52,31 @@ MAX_BUFFER = 2 * MAX_MESSAGE
 """Bytes that are read ahead of a connection."""
 IDLE = 60.0
 """Seconds that a connection may take to say what it wants."""
+MOST_CONNECTIONS = 150
+"""Connections at a time, with those of pages."""
 POLL = 0.005
+
+
+class BoundedServer(HTTPServer):
+    """A server that closes connections beyond a number: each takes a descriptor, of which a process has few."""
+
+    def initialize(self, *arguments: Any, **options: Any) -> None:
+        """Begin without connections."""
+        super().initialize(*arguments, **options)
+        self._open = 0
+
+    def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
+        """Serve a connection, unless there are too many."""
+        if self._open >= MOST_CONNECTIONS:
+            stream.close()
+            return
+        self._open += 1
+        super().handle_stream(stream, address)
+
+    def on_close(self, server_conn: object) -> None:
+        """Take note of a connection's end."""
+        self._open -= 1
+        super().on_close(server_conn)
 
 
 class ViewerServer:
@@ -263,7 +288,9 @@ class ViewerServer:
             websocket_max_message_size=MAX_MESSAGE,
         )
         self.sockets = bind_sockets(self._wanted_port, ADDRESS)
-        http = HTTPServer(application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE)
+        http = BoundedServer(
+            application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE
+        )
         http.add_sockets(self.sockets)
         self.port = self.sockets[0].getsockname()[1]
         started.set_result(self.port)

@@ -1,10 +1,10 @@
 // Controllers on the simulated arm in real time, with errors and torques as they come.
 
-import { bytes, fixed, h, onTyped, save, typed } from "./dom.js";
+import { bytes, fixed, h, onTyped, save, typed, unitsOf } from "./dom.js";
 import { Plot, legend } from "./plot.js";
 
 const FRICTIONS = [["none", "none"], ["smooth", "smooth"], ["stiction", "with stiction"]];
-const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joint"], ["motion", "the planned motion, to and fro"], ["target", "the tool's target"]];
+const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joint"], ["motion", "the planned motion, to and fro"], ["target", "the tool's target"], ["sliders", "the joint sliders"]];
 const WINDOW = 10; // s that are drawn
 const MOST = 36000; // rows that are kept: ten minutes
 const PLOT_EVERY = 100; // ms
@@ -15,13 +15,13 @@ export class ControlPanel {
     this.lab = lab;
     const change = (name, value) => this.lab.ask("control.change", { [name]: value });
     const choice = (name, label, options) => {
-      const list = h("select", { onchange: () => change(name, list.value) }, options.map(([value, text]) => h("option", { value }, text)));
+      const list = h("select", { onchange: async () => { await change(name, list.value); this.show(); } }, options.map(([value, text]) => h("option", { value }, text)));
       this[name] = list;
       return h("label", {}, h("span", {}, label), list);
     };
     const number = (name, label, unit) => {
       const input = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": label });
-      onTyped(input, (text) => (typed(text) === null ? this.show() : change(name, typed(text))));
+      onTyped(input, (text) => (typed(text) === null ? this.lab.complain(`${label}: found ${text.slice(0, 40)}; expected a number`) : change(name, typed(text))), () => this.show());
       this[name] = input;
       return h("label", {}, h("span", {}, label), h("span", {}, input, ` ${unit}`));
     };
@@ -58,11 +58,15 @@ export class ControlPanel {
     this.assume.hidden = arm.bodies;
     this.planar.hidden = arm.n < 4;
     this.start.disabled = !arm.bodies;
-    if (!arm.bodies) this.note.textContent = "This arm has no masses: nothing can be simulated until uniform links are assumed.";
+    if (!arm.bodies) this.note.textContent = "Not every link has a mass: nothing can be simulated until all are assumed to be uniform rods.";
+    const errors = unitsOf(arm.joints, "mrad", "mm"), torques = unitsOf(arm.joints, "N m", "N");
+    this.errors.setUnit(errors);
+    this.torques.setUnit(torques);
   }
 
   take_control(control) {
     this.state = control;
+    if (!control.running && !control.time) this.forget();
     if (this.controller.options.length !== control.controllers.length) this.controller.replaceChildren(...control.controllers.map(({ name, title }) => h("option", { value: name }, title)));
     this.show();
   }
@@ -99,6 +103,15 @@ export class ControlPanel {
   async download(format) {
     const answer = await this.lab.ask("control.download", { format });
     if (answer) save(answer.name, bytes(answer.content), "application/octet-stream");
+  }
+
+  // There is no run, or Python has begun anew.
+  forget() {
+    this.rows = [];
+    this.columns = [];
+    this.legend.replaceChildren();
+    this.errors.clear();
+    this.torques.clear();
   }
 
   samples({ columns, rows, restart }) {

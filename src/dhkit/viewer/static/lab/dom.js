@@ -67,16 +67,28 @@ export async function base64Of(file) {
 }
 
 // A field whose text is only taken when it is done: Enter or leaving it; Escape puts back what was there.
-export function onTyped(input, take) {
+// refresh(): shows the present value, which may be another than when the field was entered.
+export function onTyped(input, take, refresh = () => {}) {
   let before = "";
   input.addEventListener("focus", () => (before = input.value));
-  input.addEventListener("change", () => take(input.value));
+  input.addEventListener("change", async () => {
+    await take(input.value);
+    if (document.activeElement !== input) refresh();
+  });
+  input.addEventListener("blur", () => input.value === before && refresh());
   input.addEventListener("keydown", (event) => {
     if (event.key === "Enter") input.blur();
     if (event.key !== "Escape") return;
     input.value = before;
     input.blur();
   });
+}
+
+// The unit of values of several joints: of angles, of slides, or of both.
+export function unitsOf(joints, angle, length) {
+  const slides = new Set(joints.map((joint) => joint.unit === "m"));
+  if (slides.size > 1) return `${angle} or ${length}`;
+  return slides.has(true) ? length : angle;
 }
 
 export function matrix(numbers) {

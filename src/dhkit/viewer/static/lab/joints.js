@@ -51,7 +51,7 @@ export class JointPanel {
       const { scale } = this.unit(i);
       this.rows[i].typed = { text: String(value), value: value / scale, scale };
       this.set(i, value / scale);
-    });
+    }, () => this.show());
     number.addEventListener("keydown", (event) => {
       if (event.key !== "ArrowUp" && event.key !== "ArrowDown") return;
       this.key(event, i);
@@ -72,6 +72,11 @@ export class JointPanel {
     event.stopPropagation();
     const size = event.altKey ? KEYS.alt : event.shiftKey ? KEYS.shift : KEYS.plain;
     this.set(i, this.q[i] + direction * size * (this.arm.joints[i].unit === "m" ? 1e-3 : Math.PI / 180));
+  }
+
+  // Joints that a simulation has locked cannot be moved.
+  take_control({ running, planar }) {
+    this.rows.forEach((row, i) => (row.slider.disabled = row.number.disabled = running && planar && i !== 1 && i !== 2));
   }
 
   go(name) {

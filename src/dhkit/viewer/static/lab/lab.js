@@ -4,6 +4,7 @@ import { h } from "./dom.js";
 import { ControlPanel } from "./control.js";
 import { JointPanel } from "./joints.js";
 import { MotionPanel } from "./motion.js";
+import { OwnPanel } from "./own.js";
 import { Requests } from "./requests.js";
 import { TablePanel } from "./table.js";
 import { ToolPanel } from "./tool.js";
@@ -14,6 +15,7 @@ const PANELS = [
   ["table", "DH table", TablePanel],
   ["motion", "Motion", MotionPanel],
   ["control", "Control", ControlPanel],
+  ["own", "Yours", OwnPanel],
 ];
 const SHORT = 6000; // ms that a message stays
 
@@ -22,7 +24,7 @@ export class Lab {
     this.page = page;
     this.stage = page.stage;
     this.state = {};
-    this.requests = new Requests(page.connection, (error) => this.complain(error));
+    this.requests = new Requests(page.connection, (error, request) => this.complain(error, request));
     this.units = { angle: remembered("angle", "deg"), length: remembered("length", "m") };
     this.build();
     document.body.classList.add("lab");
@@ -64,8 +66,16 @@ export class Lab {
     remember("tab", this.panels[k].name);
   }
 
+  // A panel that is not for every lab.
+  showTab(name, visible) {
+    const k = this.panels.findIndex((panel) => panel.name === name), { tab } = this.panels[k];
+    tab.hidden = !visible;
+    if (!visible && tab.getAttribute("aria-selected") === "true") this.open(0);
+  }
+
   moveTab(event, k) {
-    const count = this.panels.length, next = { ArrowRight: (k + 1) % count, ArrowLeft: (k + count - 1) % count, Home: 0, End: count - 1 }[event.key];
+    const shown = this.panels.map((_, i) => i).filter((i) => !this.panels[i].tab.hidden), at = shown.indexOf(k), count = shown.length;
+    const next = { ArrowRight: shown[(at + 1) % count], ArrowLeft: shown[(at + count - 1) % count], Home: shown[0], End: shown[count - 1] }[event.key];
     if (next === undefined) return;
     event.preventDefault();
     event.stopPropagation();
@@ -95,7 +105,7 @@ export class Lab {
   // What is on show becomes the state that Python has, where an animation has left it elsewhere.
   async settled() {
     const { player } = this.page;
-    if (!player.active || !this.state.motion) return;
+    if (!player.active || !this.state.motion || this.state.control?.running) return;
     player.pause();
     await this.ask("motion.show", { time: player.time });
   }
@@ -104,14 +114,16 @@ export class Lab {
     return this.requests.ask(name, data);
   }
 
-  complain(error) {
-    this.message.textContent = error;
+  // What Python says of a request begins with the request's name, which is for programs.
+  complain(error, request = "") {
+    this.message.textContent = request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error;
     this.message.hidden = false;
     clearTimeout(this.quiet);
     this.quiet = setTimeout(() => (this.message.hidden = true), SHORT);
   }
 
   async copyPython() {
+    await this.settled();
     const answer = await this.ask("python");
     if (!answer) return;
     try {

@@ -1,6 +1,6 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
-import { base64Of, beyond, bytes, DEGREES, fixed, h, save, touchingText, typed } from "./dom.js";
+import { base64Of, beyond, bytes, DEGREES, fixed, h, save, touchingText, typed, unitsOf } from "./dom.js";
 import { Plot, legend } from "./plot.js";
 
 const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
@@ -11,10 +11,10 @@ export class MotionPanel {
     this.lab = lab;
     this.kind = h("select", { "aria-label": "Kind of motion", onchange: () => this.fit() }, KINDS.map(([value, text]) => h("option", { value }, text)));
     this.goal = h("select", { "aria-label": "Goal" });
-    this.duration = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration in seconds", placeholder: "shortest" });
+    this.duration = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration in seconds", placeholder: "shortest", onkeydown: (event) => event.key === "Enter" && this.plan() });
     this.go = h("button", { type: "button", class: "main", onclick: () => this.plan() }, "Plan from here");
     this.job = h("p", { class: "note", role: "status" });
-    this.cancel = h("button", { type: "button", hidden: true, onclick: () => lab.ask("motion.cancel") }, "Cancel");
+    this.cancel = h("button", { type: "button", hidden: true, onclick: async () => { await lab.ask("motion.cancel"); this.job.textContent = "cancelled"; } }, "Cancel");
     this.facts = h("p", { class: "facts" });
     this.points = h("ol", { class: "points" });
     this.file = h("input", { type: "file", accept: ".csv,.mat,.npz,.yaml,.yml", "aria-label": "File with a motion", onchange: () => this.read() });
@@ -64,12 +64,17 @@ export class MotionPanel {
     this.fit();
   }
 
+  // What a kind of motion does not have cannot be chosen.
   fit() {
+    const through = [...this.goal.options].find((option) => option.value === "waypoints");
+    if (through) through.disabled = !["quintic", "least-time"].includes(this.kind.value);
+    if (through?.disabled && this.goal.value === "waypoints") this.goal.value = this.goal.options[0].value;
     this.goal.disabled = this.kind.value === "circle";
+    this.duration.disabled = this.kind.value === "least-time";
   }
 
   async plan() {
-    const text = this.duration.value.trim(), duration = text === "" ? null : typed(text);
+    const text = this.duration.disabled ? "" : this.duration.value.trim(), duration = text === "" ? null : typed(text);
     if (text !== "" && !(duration > 0)) return this.lab.complain(`duration ${text}: expected a positive number of seconds`);
     await this.lab.settled();
     const goal = this.chosen();
@@ -115,6 +120,7 @@ export class MotionPanel {
   async read() {
     const [file] = this.file.files;
     if (!file) return;
+    if (file.size > LARGEST_FILE) this.file.value = "";
     if (file.size > LARGEST_FILE) return this.lab.complain(`${file.name} has ${file.size} bytes; expected at most ${LARGEST_FILE}`);
     await this.lab.ask("motion.file", { name: file.name, content: await base64Of(file), degrees: this.degrees.checked });
     this.file.value = "";
@@ -136,14 +142,18 @@ export class MotionPanel {
     this.files.hidden = this.figures.hidden = !motion;
     this.facts.textContent = "";
     if (!motion) return;
+    const still = this.lab.state.control?.running ? "not played: a controller moves the arm" : null;
     const touching = motion.touching && touchingText(motion.touching.find((links) => links.length));
-    this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching].filter(Boolean).join("; ");
+    this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching, still].filter(Boolean).join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
     this.draw();
   }
 
   draw() {
     const { motion, arm } = this, { joints } = arm;
+    this.plots.q.setUnit(unitsOf(joints, "°", "m"));
+    this.plots.qd.setUnit(unitsOf(joints, "°/s", "m/s"));
+    this.plots.tau.setUnit(unitsOf(joints, "N m", "N"));
     const names = joints.map((joint) => joint.name), scales = joints.map((joint) => (joint.unit === "m" ? 1 : DEGREES));
     this.legend.replaceChildren(legend(names));
     const curves = (rows, scale) => [motion.times, ...joints.map((_, i) => rows.map((row) => row[i] * scale[i]))];

@@ -4,6 +4,7 @@ import { h, save } from "./dom.js";
 
 export const COLORS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb"];
 const HEIGHT = 150;
+const DIGITS = 8; // of numbers in a CSV
 
 let loading = null;
 
@@ -24,10 +25,24 @@ export class Plot {
     this.area = h("div", { class: "plot" });
     this.csv = h("button", { type: "button", class: "quiet", title: `Save ${title} as CSV`, onclick: () => this.saveCsv() }, "CSV");
     this.png = h("button", { type: "button", class: "quiet", title: `Save ${title} as PNG`, onclick: () => this.savePng() }, "PNG");
-    this.root = h("figure", {}, h("figcaption", {}, h("span", {}, `${title} [${unit}]`), h("span", {}, this.csv, this.png)), this.area);
+    this.caption = h("span", {}, `${title} [${unit}]`);
+    this.root = h("figure", {}, h("figcaption", {}, this.caption, h("span", {}, this.csv, this.png)), this.area);
     this.plot = null;
     new ResizeObserver(() => this.resize()).observe(this.area);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.again());
+  }
+
+  setUnit(unit) {
+    this.unit = unit;
+    this.caption.textContent = `${this.title} [${unit}]`;
+  }
+
+  clear() {
+    this.shownData = null;
+    this.names = null;
+    this.key = null;
+    this.plot?.destroy();
+    this.plot = null;
   }
 
   // data: times, then the values of each curve; limits: largest values that are drawn dashed, of each curve, or null.
@@ -45,6 +60,7 @@ export class Plot {
     if (!this.names) return;
     const uPlot = await load();
     this.plot?.destroy();
+    if (!this.names) return; // cleared meanwhile
     const style = getComputedStyle(document.documentElement);
     const value = (name) => style.getPropertyValue(name).trim();
     const axis = { stroke: value("--faint"), grid: { stroke: value("--line"), width: 1 }, ticks: { show: false }, font: "11px system-ui" };
@@ -93,12 +109,44 @@ export class Plot {
     if (!this.shownData) return;
     const [times, ...curves] = this.shownData;
     const lines = [["t [s]", ...this.names.map((name) => `${name} [${this.unit}]`)].join(",")];
-    times.forEach((t, i) => lines.push([t, ...curves.map((curve) => curve[i])].join(",")));
+    times.forEach((t, i) => lines.push([t, ...curves.map((curve) => curve[i])].map((x) => String(Number(x.toPrecision(DIGITS)))).join(",")));
     save(`${this.title}.csv`, lines.join("\n") + "\n", "text/csv");
   }
 
+  // A picture for a report: the curves at their size on screen times the screen's pixels, under a title and names.
   savePng() {
-    this.area.querySelector("canvas")?.toBlob((blob) => blob && save(`${this.title}.png`, blob, "image/png"));
+    const curves = this.area.querySelector("canvas");
+    if (!curves || !this.names) return;
+    const style = getComputedStyle(document.documentElement), value = (name) => style.getPropertyValue(name).trim();
+    const scale = curves.width / curves.clientWidth, line = 18 * scale, picture = document.createElement("canvas");
+    picture.width = curves.width;
+    const paint = picture.getContext("2d"), font = `${12 * scale}px system-ui, sans-serif`;
+    paint.font = font;
+    const places = [];
+    let x = 8 * scale, row = 1;
+    for (const name of this.names) {
+      const width = paint.measureText(name).width + 30 * scale;
+      if (x + width > picture.width && x > 8 * scale) [x, row] = [8 * scale, row + 1];
+      places.push({ x, row });
+      x += width;
+    }
+    const top = (row + 1) * line + 4 * scale;
+    picture.height = top + curves.height + line;
+    paint.fillStyle = value("--ground");
+    paint.fillRect(0, 0, picture.width, picture.height);
+    paint.font = font;
+    paint.fillStyle = value("--ink");
+    paint.fillText(`${this.title} [${this.unit}]`, 8 * scale, line * 0.8);
+    places.forEach((place, k) => {
+      const y = (place.row + 0.8) * line;
+      paint.fillStyle = COLORS[k % COLORS.length];
+      paint.fillRect(place.x, y - 5 * scale, 12 * scale, 3 * scale);
+      paint.fillStyle = value("--ink");
+      paint.fillText(this.names[k], place.x + 17 * scale, y);
+    });
+    paint.drawImage(curves, 0, top);
+    paint.fillText("t [s]", picture.width / 2, picture.height - 5 * scale);
+    picture.toBlob((blob) => blob && save(`${this.title}.png`, blob, "image/png"));
   }
 }
 

@@ -3,7 +3,7 @@
 import { fixed, h, matrix, onTyped, save } from "./dom.js";
 
 const COLUMNS = ["theta", "d", "a", "alpha"];
-const HEADS = { standard: ["θ", "d [m]", "a [m]", "α"], modified: ["θ", "d [m]", "aᵢ₋₁ [m]", "αᵢ₋₁"] };
+const HEADS = { standard: ["θ [rad]", "d [m]", "a [m]", "α [rad]"], modified: ["θ [rad]", "d [m]", "aᵢ₋₁ [m]", "αᵢ₋₁ [rad]"] };
 const WIDEST = 10; // characters of a cell
 const STEP_TIME = 700; // ms of one elementary transform
 
@@ -53,13 +53,14 @@ export class TablePanel {
       if (document.activeElement !== input) input.value = table.rows[i][column];
       input.style.width = `calc(${this.widths[column]}ch + 12px)`;
       input.setAttribute("aria-invalid", String(Boolean(error)));
-      input.title = error ?? this.meaning(i, column);
+      input.title = error ?? `${table.rows[i][column]} = ${this.meaning(i, column)}`;
     }
     this.undo.disabled = !table.undo;
     this.redo.disabled = !table.redo;
     this.reset.disabled = !table.changed;
     const [first] = table.errors;
-    this.note.textContent = first ? `${first.error}; the arm is the last one that could be built` : table.note ?? "";
+    const more = table.errors.length > 1 ? ` (and ${table.errors.length - 1} more)` : "";
+    this.note.textContent = first ? `row ${first.row + 1}, ${first.error}${more}; the arm is the last one that could be built, and other edits wait` : [this.inDegrees(), table.note].filter(Boolean).join("; ");
     this.note.classList.toggle("bad", Boolean(first));
   }
 
@@ -74,6 +75,15 @@ export class TablePanel {
     return h("tr", {}, h("th", { scope: "row" }, h("button", { type: "button", class: "quiet", title: `${row.joint}: its four transforms`, "aria-label": `row ${i + 1}, ${row.joint}: show its four transforms`, onclick: () => this.animate(i) }, String(i + 1))), cells);
   }
 
+  // Somebody who writes 90 for a right angle has meant degrees.
+  inDegrees() {
+    for (const [i, row] of this.table.values.entries()) {
+      const k = [0, 3].find((column) => Math.abs(row[column]) > 2 * Math.PI);
+      if (k !== undefined) return `row ${i + 1}, ${COLUMNS[k]}: ${fixed(row[k], 4)} rad are ${fixed((row[k] * 180) / Math.PI, 1)}°; degrees are written 90*deg or 90°`;
+    }
+    return null;
+  }
+
   meaning(i, column) {
     const value = this.table.values[i][COLUMNS.indexOf(column)];
     return column === "theta" || column === "alpha" ? `${fixed((value * 180) / Math.PI, 4)}°` : `${fixed(value, 5)} m`;
@@ -81,16 +91,36 @@ export class TablePanel {
 
   // Another panel is opened: the frame that moves goes.
   shown(visible) {
-    if (visible) return;
+    if (!visible) this.stopSteps();
+  }
+
+  stopSteps() {
     this.running?.();
     this.lab.stage.showMoving(null);
+    this.step.replaceChildren();
+    this.steps = null;
+  }
+
+  take_arm() {
+    this.stopSteps();
+  }
+
+  // The transforms of a row are those of the joint values that they were asked for.
+  take_joints({ q }) {
+    if (this.steps && JSON.stringify(q) !== this.steps) this.stopSteps();
+  }
+
+  moved(q) {
+    if (q && this.steps && JSON.stringify([...q]) !== this.steps) this.stopSteps();
   }
 
   // One elementary transform after the other, as a frame that moves.
   async animate(row) {
+    await this.lab.settled();
     const answer = await this.lab.ask("table.steps", { row });
     if (!answer) return;
     this.running?.();
+    this.steps = JSON.stringify(this.lab.state.joints.q);
     let stopped = false;
     this.running = () => (stopped = true);
     const { steps, A } = answer;

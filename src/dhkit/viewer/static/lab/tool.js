@@ -5,6 +5,7 @@ import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
 const GHOSTS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988"]; // dhkit/viewer/overlays.py
+const AWAY = 1e-4; // m
 const ORDERS = ["XYZ", "ZYX", "ZYZ", "ZXZ", "xyz", "zyx", "zyz", "zxz"];
 
 export class ToolPanel {
@@ -15,13 +16,14 @@ export class ToolPanel {
     this.pose = h("div", { class: "pose" });
     const field = (label, k) => {
       const input = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", class: "number", "aria-label": label });
-      onTyped(input, () => this.typed());
+      onTyped(input, () => this.typed(), () => this.show());
       this.fields[k] = input;
       return h("label", {}, h("span", {}, label), input);
     };
     this.order = h("select", { "aria-label": "Convention of Euler angles", onchange: () => lab.ask("tool.order", { order: this.order.value }) }, ORDERS.map((order) => h("option", { value: order }, order === order.toUpperCase() ? `${order} moving axes` : `${order} fixed axes`)));
     this.pose.append(h("div", { class: "three" }, AXES.map((axis, k) => field(`${axis} [m]`, k))), h("div", { class: "three" }, ["A", "B", "C"].map((name, k) => field(`${name} [°]`, 3 + k))), h("label", { class: "line" }, "Euler angles ", this.order));
     this.matrix = h("details", {}, h("summary", {}, "Matrix"), h("div"));
+    this.matrix.addEventListener("toggle", () => this.show());
     this.note = h("p", { class: "note", role: "status" });
     this.grab = h("button", { type: "button", "aria-pressed": "false", onclick: () => this.toggle() }, "Move the tool by a target");
     this.clear = h("button", { type: "button", hidden: true, onclick: () => lab.ask("tool.clear") }, "Remove the target");
@@ -62,12 +64,28 @@ export class ToolPanel {
       this.lab.complain("pose of the tool: expected numbers, in m and degrees");
       return this.show();
     }
-    this.lab.ask("tool.pose", { xyz: values.slice(0, 3), euler: values.slice(3).map((x) => x / DEGREES), order: this.order.value });
+    return this.lab.ask("tool.pose", { xyz: values.slice(0, 3), euler: values.slice(3).map((x) => x / DEGREES), order: this.order.value });
   }
 
   take_tool(tool) {
+    if (this.away && tool === this.lab.state.tool) return;
     this.tool = tool;
     this.show();
+  }
+
+  shown(visible) {
+    this.visible = visible;
+    const { player, motion } = this.lab.page;
+    if (visible && player.active && motion?.times) this.lab.page.showTime(player.time);
+  }
+
+  // An animation shows these joint values; Python has the numbers of the tool there.
+  async moved(q) {
+    this.away = Boolean(q);
+    if (!q) return this.lab.state.tool && this.take_tool(this.lab.state.tool);
+    if (!this.visible) return;
+    const tool = await this.lab.ask("tool.read", { q: [...q] });
+    if (tool && this.away) this.take_tool(tool);
   }
 
   show() {
@@ -84,7 +102,8 @@ export class ToolPanel {
 
   remark() {
     const target = this.lab.state.target;
-    const words = [target?.message, target?.message ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
+    const { T, unique } = this.tool ?? {}, far = target?.reached && T && [3, 7, 11].some((k) => Math.abs(T[k] - target.T[k]) > AWAY);
+    const words = [far && !target.message ? "the tool is not at the target: move the target, and it follows" : null, unique === false ? "A and C are not unique here" : null, target?.message, target?.message ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
     this.note.textContent = words.filter(Boolean).join("; ");
     this.note.classList.toggle("bad", Boolean(target && !target.reached));
   }
