@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dhkit.arm import Arm
 from dhkit.description import to_toml
 from dhkit.description.library import library_robot, robots
@@ -79,7 +81,8 @@ def _run(control: ControlPanel) -> list[str]:
     if settings.reference == "motion":
         reference, duration = "motion", ""
     elif settings.reference == "sine" and sine is not None:
-        values = f"{literal(sine.centre)}, {literal(sine.amplitude)}, {sine.frequency!r}, {sine.phase!r}"
+        frequency, phase = (float(np.asarray(value)) for value in (sine.frequency, sine.phase))
+        values = f"{literal(sine.centre)}, {literal(sine.amplitude)}, {frequency!r}, {phase!r}"
         reference, duration = f"dhkit.Sine({values})", "duration=10.0, "
     else:
         reference, duration = literal(wanted), "duration=5.0, "
