@@ -56,12 +56,12 @@ class CheckReport:
     @property
     def points(self) -> float:
         """Points of all functions."""
-        return round(sum(part.points for parts in self.functions.values() for part in parts), 6)
+        return round(float(sum(part.points for parts in self.functions.values() for part in parts)), 6)
 
     @property
     def most(self) -> float:
         """What they are worth."""
-        return round(sum(part.most for parts in self.functions.values() for part in parts), 6)
+        return round(float(sum(part.most for parts in self.functions.values() for part in parts)), 6)
 
     @property
     def full(self) -> bool:
