@@ -424,6 +424,9 @@ BAD = {
     ],
     "motion.show": [{}, {"time": 0.5}, {"time": -1}],
     "motion.download": [{}, {"format": "csv"}, {"format": "py"}],
+    "tool.read": [{}, {"q": [0] * 5}, {"q": [1e300] * 6}, {"q": None}],
+    "own.ghosts": [{}, {"on": 1}, {"on": True, "off": False}],
+    "own.score": [{}, {"robot": "ur5"}],
     "waypoints.remove": [{}, {"index": 0}],
     "control.start": [
         {"controller": "mine"},

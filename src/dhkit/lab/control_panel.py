@@ -120,6 +120,7 @@ class ControlPanel:
         desk.changed.append(self._forget)
         desk.steer = self._steer
         motions.changed.append(self._motion_changed)
+        own.changed.append(self.publish)
         self.sine: Sine | None = None
         """What a run that follows a sine follows."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,8 @@ class OwnPanel:
 
     def __init__(self, desk: Desk, source: Path | Sequence[str] | None, sandbox: str | None = None) -> None:
         self.desk, self.source, self._sandbox = desk, source, sandbox
+        self.changed: list[Callable[[], None]] = []
+        """Called when there are other functions."""
         self._state: dict[str, Any] = {}
         self._seen: Any = None
         self._lock = threading.Lock()
@@ -153,6 +155,8 @@ class OwnPanel:
             self._tell(loading=False, error=str(error), output=self._program.output[-PRINTED:])
             return
         self._tell(loading=False, error=None, functions=list(self._program.functions))
+        for call in self.changed:
+            call()
         self._score()
 
     def _tell(self, **state: Any) -> None:
@@ -166,6 +170,9 @@ class OwnPanel:
         program, desk = self._program, self.desk
         if program is None or not program.functions or self._state.get("loading", True):
             return
+        printed = program.output[-PRINTED:]  # which may come after the answer
+        if printed != self._state.get("output", ""):
+            self._tell(output=printed)
         arm, q = desk.arm, desk.q
         seen = (arm, q.tobytes(), self._ghosts)
         if seen == self._seen:
@@ -176,7 +183,7 @@ class OwnPanel:
             found["fk"] = self._answered(lambda: _forward(arm, q, program))
         if "ik" in program.functions:
             found["ik"] = self._answered(lambda: self._inverse(arm, q, program))
-        self._tell(**found, output=program.output[-PRINTED:], imported=list(program.imported))
+        self._tell(**found, imported=list(program.imported))
 
     def _answered(self, ask: Any) -> dict[str, Any]:
         try:
