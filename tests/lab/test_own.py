@@ -96,9 +96,8 @@ def test_its_controller_is_in_the_list_and_drives_the_arm(beside):
     wait_for(lambda: np.abs(lab.desk.q - begin).max() > 0.02)
     assert states(lab)["control"]["error"] is None
     lab.answer("control.stop", {})
-    file.write_text(CONTROLLER.replace("300", "1 / 0"))
-    wait_for(lambda: own(lab)["functions"] == ["controller"] and not own(lab)["loading"])
-    time.sleep(0.3)
+    file.write_text(CONTROLLER.replace("300", "1 / 0") + "def fk(q):\n    return 1.0\n")
+    wait_for(lambda: own(lab)["functions"] == ["fk", "controller"])
     lab.answer("control.start", {"controller": "own"})
     wait_for(lambda: states(lab)["control"]["error"])
     assert "line 2: ZeroDivisionError" in states(lab)["control"]["error"]
