@@ -152,7 +152,7 @@ class Process:
             self._process.kill()
             self._process.wait()
         # What was seen and is still there: its supervisor was killed by the program.
-        for process in self._known.values():
+        for process in list(self._known.values()):
             with suppress(psutil.Error):
                 process.kill()
         os.close(self._requests)
@@ -239,7 +239,7 @@ class Process:
                 try:
                     memory += process.memory_info().rss
                 except psutil.Error:
-                    del self._known[process.pid]
+                    self._known.pop(process.pid, None)
             if memory > self._limits.memory:
                 self._give_up("memory")
             elif len(self._known) > MOST_PROCESSES:
