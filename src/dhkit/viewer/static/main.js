@@ -59,6 +59,7 @@ class Page {
     const { Lab } = await import("./lab/lab.js");
     this.lab = new Lab(this);
     this.stage.beside();
+    this.takeOverlay(() => {});
     for (const message of this.early.splice(0)) this.takePanel(message);
   }
 
@@ -71,6 +72,7 @@ class Page {
   }
 
   takePose(message) {
+    this.stage.naming = true;
     if (this.player.active) {
       this.player.unload();
       this.stage.drawn.clear();
@@ -88,6 +90,7 @@ class Page {
     const placed = (states) => states && { ...states, ...placements(states.transforms, THREE) };
     const motion = { ...placed(message), ghost: placed(message.ghost) };
     this.motion = motion;
+    this.stage.naming = false;
     this.player.reveal();
     this.stage.forget();
     this.takeOverlay(() => this.stage.setCompanion(motion.ghost));
@@ -103,7 +106,9 @@ class Page {
 
   takeOverlay(draw) {
     draw();
-    element("overlays").hidden = this.stage.overlays.empty;
+    // Beside panels ghosts come and go all the time: the other buttons stay where they are.
+    element("overlays").hidden = !this.lab && this.stage.overlays.empty;
+    element("overlays").disabled = this.stage.overlays.empty;
   }
 
   // Samples are at equal steps: dhkit/viewer/motion.py.

@@ -38,6 +38,7 @@ export class Stage {
     this.labels = new Labels(labels);
     this.names = new Labels(names); // of ghosts
     this.anchors = []; // where each ghost is named
+    this.naming = true; // whether ghosts are of the state on show: no animation goes away from them
     this.nodes = [];
     this.old = []; // materials of a scene that is gone
     this.seen = new THREE.Box3();
@@ -440,7 +441,7 @@ export class Stage {
     for (const material of this.old.splice(0)) material.dispose();
     this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
-    const named = this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
+    const named = this.naming && this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
     this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));
   }
 

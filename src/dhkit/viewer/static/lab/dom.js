@@ -91,7 +91,29 @@ export function unitsOf(joints, angle, length) {
   return slides.has(true) ? length : angle;
 }
 
-export function matrix(numbers) {
-  const rows = [0, 1, 2, 3].map((i) => h("tr", {}, [0, 1, 2, 3].map((j) => h("td", {}, fixed(numbers[4 * i + j], 4)))));
-  return h("table", { class: "matrix" }, h("tbody", {}, rows));
+// A matrix of 4 x 4 numbers by row as a formula, behind its name where it has one: MathML.
+export function matrix(numbers, name = "") {
+  const m = (tag, ...children) => {
+    const element = document.createElementNS("http://www.w3.org/1998/Math/MathML", tag);
+    element.append(...children);
+    return element;
+  };
+  // A sign takes its room where there is none: the digits stand below each other.
+  const sign = (text) => m(text.startsWith("-") ? "mrow" : "mphantom", m("mn", "\u2212"));
+  const entry = (x) => m("mtd", m("mrow", sign(fixed(x, 5)), m("mn", fixed(x, 5).replace("-", ""))));
+  const rows = [0, 1, 2, 3].map((i) => m("mtr", ...[0, 1, 2, 3].map((j) => entry(numbers[4 * i + j]))));
+  const math = m("math", m("mrow", ...(name ? [name, m("mo", "=")] : []), m("mo", "["), m("mtable", ...rows), m("mo", "]")));
+  math.setAttribute("class", "matrix");
+  return math;
+}
+
+// A letter with an index, for a formula.
+export function indexed(letter, index) {
+  const element = document.createElementNS("http://www.w3.org/1998/Math/MathML", "msub");
+  for (const [tag, text] of [["mi", letter], ["mn", String(index)]]) {
+    const part = document.createElementNS(element.namespaceURI, tag);
+    part.textContent = text;
+    element.append(part);
+  }
+  return element;
 }

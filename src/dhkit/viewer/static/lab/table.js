@@ -1,6 +1,6 @@
 // The table of the arm: every number can be changed, and the arm follows.
 
-import { fixed, h, matrix, onTyped, save } from "./dom.js";
+import { fixed, h, indexed, matrix, onTyped, save } from "./dom.js";
 
 const COLUMNS = ["theta", "d", "a", "alpha"];
 const HEADS = { standard: ["θ [rad]", "d [m]", "a [m]", "α [rad]"], modified: ["θ [rad]", "d [m]", "aᵢ₋₁ [m]", "αᵢ₋₁ [rad]"] };
@@ -124,7 +124,7 @@ export class TablePanel {
     let stopped = false;
     this.running = () => (stopped = true);
     const { steps, A } = answer;
-    this.step.replaceChildren(h("h3", {}, `A${row + 1}`), h("ol", {}, steps.slice(1).map((step) => h("li", {}, step.title))), matrix(A));
+    this.step.replaceChildren(h("h3", {}, `The transforms of row ${row + 1}`), h("ol", {}, steps.slice(1).map((step) => h("li", {}, step.title))), matrix(A, indexed("A", row + 1)));
     const items = [...this.step.querySelectorAll("li")], start = performance.now();
     const tick = (now) => {
       if (stopped) return;
