@@ -164,11 +164,11 @@ class TablePanel:
         if errors:
             return Table(texts, last, errors)
         joints = tuple(
-            replace(joint, theta=x["theta"], d=x["d"], a=x["a"], alpha=x["alpha"])
+            replace(joint, theta=x["theta"], d=x["d"], a=x["a"], alpha=x["alpha"], shapes=())
             for joint, x in zip(last.joints, rows, strict=True)
         )
         try:
-            description = _drawn(replace(last, joints=joints))
+            description = replace(last, joints=joints)
             numbers = description.numbers
             beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= LARGEST))
             if len(beyond):

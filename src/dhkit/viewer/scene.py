@@ -6,6 +6,7 @@ triads are children that never move. ``/dhkit/tool`` stands at the tool's frame.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -30,6 +31,8 @@ TRIAD = 0.13
 """Length of a triad as a share of the arm's size."""
 NESTED = 0.72
 """How much shorter the next triad at the same origin is, so that both are seen."""
+STEPS = 8
+"""Of sizes in an octave."""
 LEAST_SIZE = 0.1
 """What an arm without lengths is drawn as, m."""
 
@@ -48,7 +51,8 @@ class Scene:
     """A scene that a page builds once, and then only moves."""
 
     about: Lowered
-    """What the page says of the arm: name, joints, labels, size (m) and which way is up (world)."""
+    """What the page says of the arm: name, joints, labels, size (m), which way is up (world); and the node that each
+    command gives an object, empty for commands that do not."""
     commands: tuple[Lowered, ...]
     """meshcat's commands, in order."""
 
@@ -68,7 +72,7 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
     ModelError
         A mesh that cannot be read.
     """
-    size = scene_size(description)
+    size = _in_steps(scene_size(description))
     commands = [_set_object(f"{ROOT}/grid", grid_object(size, "grid"))]
     commands += _part_commands(parts)
     commands += _triad_commands(description, size)
@@ -81,6 +85,7 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
         "labels": [{"frame": label.frame, "text": label.text} for label in frame_labels(description)],
         "size": size,
         "up": _up(description),
+        "nodes": [c["path"].removeprefix(f"{ROOT}/") if c["type"] == "set_object" else "" for c in commands],
     }
     return Scene(about, tuple(commands))
 
@@ -114,6 +119,11 @@ def scene_size(description: Description) -> float:
     numbers = description.numbers
     offsets = np.linalg.norm([numbers.T_world_base[:3, 3], numbers.T_last_tool[:3, 3]], axis=1)
     return max(float(numbers.reach + offsets.sum()), LEAST_SIZE)
+
+
+def _in_steps(size: float) -> float:
+    """Return the next of the sizes that grow by 9 %: an edit that changes the reach a little leaves grid and triads."""
+    return float(2.0 ** (math.ceil(STEPS * math.log2(size)) / STEPS))
 
 
 def frame_labels(description: Description) -> tuple[Label, ...]:

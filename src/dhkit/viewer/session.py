@@ -11,6 +11,8 @@ from dhkit.viewer.streams import Samples
 __all__ = ["Session", "Slot"]
 
 
+STATES = 16
+"""Messages of panels under way: an edit of the table changes the state of most panels."""
 LAST_SLOT = 1_000
 """Slots are below."""
 
@@ -37,8 +39,8 @@ class Slot(IntEnum):
 class Session:
     """Messages on their way to one page, in two lanes: pictures, and the states and samples of panels.
 
-    A lane has at most one message that the page has not drawn yet, and per slot only the latest waits. A panel's state
-    is taken at once where a picture waits for the display, so that neither lane waits for the other.
+    One picture at most is under way, which the display takes its time for, and :data:`STATES` messages of panels, which
+    the page takes at once; neither lane waits for the other. Per slot only the latest waits.
 
     Examples
     --------
@@ -62,13 +64,13 @@ class Session:
         # A new page needs the slots in their order; later whatever has waited longest is next, or poses that come as
         # fast as they are drawn would leave nothing else a turn.
         self._waiting = {slot: (slot, sequence, message) for slot, (sequence, message) in state.items()}
-        self._unshown: dict[bool, int] = {}
+        self._unshown: dict[bool, set[int]] = {False: set(), True: set()}
         """Sequence numbers under way, by whether they are of a panel."""
 
     @property
     def settled(self) -> bool:
         """Whether the page has drawn everything."""
-        return not self._waiting and not self._unshown
+        return not self._waiting and not any(self._unshown.values())
 
     def offer(self, slot: int, sequence: int, message: bytes | Samples) -> None:
         """Take a message in place of the one that waits in its slot; samples join those that wait."""
@@ -78,18 +80,20 @@ class Session:
         self._waiting[slot] = (turn, sequence, message)
 
     def next(self) -> bytes | None:
-        """Return a message to send now; None where each lane has one under way, or nothing waits."""
-        free = [slot for slot in self._waiting if _of_panel(slot) not in self._unshown]
+        """Return a message to send now; None where enough are under way, or nothing waits."""
+        full = {lane: len(self._unshown[lane]) >= most for lane, most in ((False, 1), (True, STATES))}
+        free = [slot for slot in self._waiting if not full[_of_panel(slot)]]
         if not free:
             return None
         slot = min(free, key=lambda slot: self._waiting[slot][0])
         _, sequence, message = self._waiting.pop(slot)
-        self._unshown[_of_panel(slot)] = sequence
+        self._unshown[_of_panel(slot)].add(sequence)
         return stamped(message.encoded(), sequence) if isinstance(message, Samples) else message
 
     def shown(self, sequence: int) -> None:
         """Take note that the page has drawn a message; of one that is not under way, nothing."""
-        self._unshown = {lane: number for lane, number in self._unshown.items() if number != sequence}
+        for lane in self._unshown.values():
+            lane.discard(sequence)
 
 
 def _of_panel(slot: int) -> bool:

@@ -133,12 +133,16 @@ export class Stage {
 
   build({ about, commands, joints }) {
     const { viewer } = this;
-    this.keepPrograms();
-    viewer.delete_path(["dhkit"]);
-    for (const command of commands) viewer.handle_command_bytearray(command);
-    const root = viewer.scene_tree.find(["dhkit"]).object;
-    root.traverse((object) => object.isMesh && smoothNormals(object.geometry, THREE));
     const node = (...path) => viewer.scene_tree.find(["dhkit", ...path]).object;
+    // An edited arm has the parts it had: nodes stay (meshcat hangs controls on every new one), and what is equal.
+    const paths = about.nodes.join(), stay = this.paths === paths;
+    const changed = commands.map((command, k) => k).filter((k) => !stay || !equal(commands[k], this.commands[k]));
+    const objects = stay ? changed.map((k) => about.nodes[k]).filter(Boolean).map((path) => node(...path.split("/"), "<object>")) : [node()];
+    this.keepPrograms(objects);
+    if (!stay) viewer.delete_path(["dhkit"]);
+    for (const k of changed) viewer.handle_command_bytearray(commands[k]);
+    for (const k of changed) if (about.nodes[k]) node(...about.nodes[k].split("/"), "<object>").traverse((object) => object.isMesh && smoothNormals(object.geometry, THREE));
+    [this.paths, this.commands] = [paths, commands];
     this.nodes = [];
     for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
     this.nodes.push(node("tool"));
@@ -164,9 +168,9 @@ export class Stage {
   }
 
   // A program whose last material goes is compiled anew for the next: the old materials go behind the next picture.
-  keepPrograms() {
+  keepPrograms(objects) {
     const spent = new THREE.Material();
-    this.viewer.scene_tree.find(["dhkit"]).object.traverse((object) => {
+    for (const root of objects) root.traverse((object) => {
       if (!object.material) return;
       this.old.push(...[object.material].flat());
       object.material = spent;
@@ -459,6 +463,10 @@ export class Stage {
     if (p.z > 1) return null;
     return { x: ((p.x + 1) * this.pane.clientWidth) / 2, y: ((1 - p.y) * this.pane.clientHeight) / 2 };
   }
+}
+
+function equal(a, b) {
+  return a.length === b.length && a.every((byte, i) => byte === b[i]);
 }
 
 // Where ghosts are named: at the frame at which they and the arm are furthest apart.
