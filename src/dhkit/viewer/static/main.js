@@ -8,6 +8,7 @@ import { Readout } from "./readout.js";
 import { Stage, THREE } from "./stage.js";
 
 const element = (id) => document.getElementById(id);
+const POSE_TIME = 250; // ms in which the pose of an edited arm comes: it is not drawn before
 const STEP = 1 / 30; // s that an arrow key moves an animation
 
 class Page {
@@ -66,6 +67,7 @@ class Page {
   takeScene(message) {
     if (message.about.panels && this.connection && !this.opening) this.opening = this.openLab().catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     this.stage.build(message);
+    if (this.lab) this.stage.awaited = performance.now() + POSE_TIME;
     this.readout.set(message.about);
     element("tools").hidden = false;
     document.body.dataset.ready = "true";
@@ -73,6 +75,7 @@ class Page {
 
   takePose(message) {
     this.stage.naming = true;
+    this.stage.awaited = 0;
     if (this.player.active) {
       this.player.unload();
       this.stage.drawn.clear();

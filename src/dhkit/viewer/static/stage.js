@@ -38,6 +38,7 @@ export class Stage {
     this.labels = new Labels(labels);
     this.names = new Labels(names); // of ghosts
     this.anchors = []; // where each ghost is named
+    this.awaited = 0; // ms until which a pose is awaited
     this.naming = true; // whether ghosts are of the state on show: no animation goes away from them
     this.nodes = [];
     this.old = []; // materials of a scene that is gone
@@ -436,6 +437,7 @@ export class Stage {
 
   render(now) {
     const { viewer } = this;
+    if (now < this.awaited) return;
     if (!viewer.needs_render) return this.refine(now);
     if (this.fine) viewer.renderer.setPixelRatio(this.ratio);
     this.fine = false;
