@@ -119,7 +119,7 @@ def main() -> None:
                 page.evaluate(f"document.getElementById('tab-{name}').click()")
                 prepare(lab, page)
                 time.sleep(0.5)
-                content = compressed(page.screenshot())
+                content = compressed(page.screenshot(fine=True))
                 if len(content) > LARGEST:
                     raise ValueError(f"lab-{name}.png has {len(content)} bytes; expected {LARGEST} at most")
                 (ROOT / "docs" / f"lab-{name}.png").write_bytes(content)

@@ -249,8 +249,17 @@ class Page:
         for _ in range(abs(there - here)):
             self.press("ArrowDown" if there > here else "ArrowUp")
 
-    def screenshot(self, file: Path | None = None) -> np.ndarray:
-        """Return the picture, shape (height, width, 3), 0 to 255; write it as PNG if a file is given."""
+    def screenshot(self, file: Path | None = None, fine: bool = False) -> np.ndarray:
+        """Return the picture, shape (height, width, 3), 0 to 255; write it as PNG if a file is given.
+
+        A page without a graphics processor draws a scene at rest once more, finely: it is taken so where ``fine`` says
+        so, and else always before, whatever the machine does.
+        """
+        if fine:
+            self.until("!globalThis.dhkit?.stage?.software || dhkit.stage.fine || dhkit.lab?.state.control?.running")
+        else:
+            self.settle()
+            self.evaluate("void globalThis.dhkit?.stage?.dirty?.()")
         self.settle()
         content = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
         if file is not None:
