@@ -29,7 +29,7 @@ import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,10 +171,14 @@ class Obstacles:
 
 def encode_scene(scene: Scene) -> bytes:
     """Return a scene message."""
-    import umsgpack
+    import msgpack
+
+    def array(value: Any) -> Any:
+        """Return what meshcat gives for an array as msgpack writes it."""
+        return msgpack.ExtType(value.type, value.data)
 
     about = json.dumps(scene.about, separators=(",", ":"), allow_nan=False).encode()
-    blocks = [about, *(umsgpack.packb(command) for command in scene.commands)]
+    blocks = [about, *(msgpack.packb(command, default=array) for command in scene.commands)]
     body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
     return message_header(MessageType.SCENE, joints=len(scene.about["joints"])) + body
 
