@@ -7,15 +7,17 @@ const FRICTIONS = [["none", "none"], ["smooth", "smooth"], ["stiction", "with st
 const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joint"], ["motion", "the planned motion, to and fro"], ["target", "the tool's target"], ["sliders", "the joint sliders"]];
 const WINDOW = 10; // s that are drawn
 const MOST = 36000; // rows that are kept: ten minutes
+const ANSWER = 1000; // ms in which the state that follows from a choice is expected
 const PLOT_EVERY = 100; // ms
 const MILLI = 1000; // of errors, in rad and m
 
 export class ControlPanel {
   constructor(lab, root) {
     this.lab = lab;
+    this.chosen = new Map(); // when a list was last changed, ms
     const change = (name, value) => this.lab.ask("control.change", { [name]: value });
     const choice = (name, label, options) => {
-      const list = h("select", { onchange: async () => { await change(name, list.value); this.show(); } }, options.map(([value, text]) => h("option", { value }, text)));
+      const list = h("select", { onchange: () => this.choose(name, list.value) }, options.map(([value, text]) => h("option", { value }, text)));
       this[name] = list;
       return h("label", {}, h("span", {}, label), list);
     };
@@ -74,8 +76,12 @@ export class ControlPanel {
   show() {
     const { state } = this;
     if (!state) return;
-    // A list that is open is left alone.
-    for (const name of ["controller", "reference", "friction"]) if (this[name].value !== state[name]) this[name].value = state[name];
+    const now = performance.now();
+    for (const name of ["controller", "reference", "friction"]) {
+      // A state that was sent before Python knew of the choice must not undo it.
+      const fresh = now - (this.chosen.get(name) ?? -ANSWER) < ANSWER;
+      if (!fresh && this[name].value !== state[name]) this[name].value = state[name];
+    }
     for (const name of ["bandwidth", "damping", "payload"]) if (document.activeElement !== this[name]) this[name].value = String(state[name]);
     this.compensate.checked = state.compensate;
     this.start.textContent = state.running ? "Stop" : "Start";
@@ -87,6 +93,14 @@ export class ControlPanel {
     const words = [state.error, time, slow, state.note].filter(Boolean);
     if (this.arm?.bodies) this.note.textContent = words.join("; ");
     this.note.classList.toggle("bad", Boolean(state.error));
+  }
+
+  async choose(name, value) {
+    this.chosen.set(name, performance.now());
+    setTimeout(() => this.show(), ANSWER);
+    if ((await this.lab.ask("control.change", { [name]: value })) !== null) return;
+    this.chosen.delete(name); // refused
+    this.show();
   }
 
   async toggle() {
