@@ -961,17 +961,21 @@ def test_gate_of_an_edit(visit, slack):
         lab.answer("table.edit", {"row": 1, "column": "a", "text": f"{0.4318 + 0.001 * k:.4f}"})
         python.append(1000 * (time.perf_counter() - start))
     panel(page, "table")
+    # Shown: the table has the number, and the edited arm is drawn in its pose. A person's edits are a while apart.
     took = page.evaluate(
         """(async () => {
-          const times = [];
+          const times = [], { stage } = dhkit, rest = (time) => new Promise(done => setTimeout(done, time));
+          const { build } = stage, { render } = stage.viewer;
+          let drawn = true;
+          stage.build = function (message) { build.call(this, message); drawn = false; };
+          stage.viewer.render = function () { render.call(this); drawn = true; };
           for (let k = 0; k < 40; k++) {
+            await rest(250);
             const start = performance.now(), value = 0.6718 + 0.001 * k;
-            const scene = new Promise(done => { const take = dhkit.takeScene; dhkit.takeScene = function (m) { take.call(this, m); dhkit.takeScene = take; done(); }; });
             const cell = document.querySelector('#lab [aria-label="d of row 1"]');
             cell.focus(); cell.value = value.toFixed(4); cell.dispatchEvent(new Event('change')); cell.blur();
-            await scene;
-            while (Math.abs(dhkit.lab.state.table.values[0][1] - value) > 1e-9) await new Promise(done => setTimeout(done, 1));
-            await new Promise(done => requestAnimationFrame(done));
+            const old = stage.commands;
+            while (stage.commands === old || !drawn || Math.abs(dhkit.lab.state.table.values[0][1] - value) > 1e-9) await rest(1);
             times.push(performance.now() - start);
           }
           return times;
@@ -979,7 +983,8 @@ def test_gate_of_an_edit(visit, slack):
     )
     (p, shown) = (np.percentile(x, 95) for x in (python, took))
     print(
-        f"edit of the table, p95: {p:.0f} ms in Python, {shown:.0f} ms until it is drawn; median {np.median(took):.0f} ms"
+        f"edit of the table, p95: {p:.0f} ms in Python, {shown:.0f} ms until it is drawn; median {np.median(took):.0f} ms, "
+        f"the first {took[0]:.0f} ms"
     )
     assert p < 100 * slack()
     assert shown < 100 * slack()

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dhkit.viewer.session import STATES, Session, Slot
+from dhkit.viewer.session import OF_ONE_ARM, STATES, Session, Slot
 
 PANELS = [Slot.PANELS + k for k in range(20)]
 SLOTS = [*(slot for slot in Slot if slot < Slot.PANELS), *PANELS]
@@ -23,6 +23,9 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
             lane = under_way["panel shown" if slot in PANELS else "picture shown"]
             lane.append(sequence)
             assert len(lane) <= (STATES if slot in PANELS else 1)
+            if slot == Slot.SCENE:
+                for other in OF_ONE_ARM:
+                    page.pop(other, None)
             page[slot] = message
 
     pump()
@@ -31,6 +34,9 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
             session.shown(under_way[step].pop(0) if under_way[step] else 0)
         else:
             message = b"%d" % sequence
+            if step == Slot.SCENE:
+                for slot in OF_ONE_ARM:
+                    latest.pop(slot, None)
             latest[step], sent[message] = (sequence, message), (step, sequence)
             session.offer(step, sequence, message)
         pump()

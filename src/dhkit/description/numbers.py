@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -151,11 +152,17 @@ class Numbers:
 
 def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
     """Return a placement's (4, 4) matrix; right angles have exact cosines."""
+    needed = {name for entry in (*placement.xyz, *placement.rpy) for name in entry.symbols}
+    return _matrix(placement, tuple((name, value) for name, value in values.items() if name in needed)).copy()
+
+
+@lru_cache(maxsize=1024)
+def _matrix(placement: Placement, values: tuple[tuple[str, Expression], ...]) -> Array:
+    """Remember matrices: an exact pose costs 1 ms, and base, tool and shapes stay while a person edits the table."""
     from dhkit.description.exact_poses import pose_of
 
-    return np.array(
-        [[float(substitute(entry, values)) for entry in row] for row in pose_of(placement, values)], dtype=float
-    )
+    pose = pose_of(placement, dict(values))
+    return np.array([[float(substitute(entry, dict(values))) for entry in row] for row in pose], dtype=float)
 
 
 def _as_one(bodies: tuple[Body, ...], values: dict[str, Expression]) -> Body | None:

@@ -68,11 +68,11 @@ class Desk:
         before = self.arm, self.q, self.aimed
         self.arm, self.q, self.aimed = arm, kept, None
         try:
-            self.view.replace(arm.description)
+            self.view.replace(arm.description, kept)
             self.publish()
         except BaseException:
             self.arm, self.q, self.aimed = before
-            self.view.replace(self.arm.description)
+            self.view.replace(self.arm.description, self.q)
             self.publish()
             raise
         for call in self.changed:

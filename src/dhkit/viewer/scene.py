@@ -72,17 +72,17 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
     ModelError
         A mesh that cannot be read.
     """
-    size = _in_steps(scene_size(description))
+    size, places = _in_steps(scene_size(description)), _shared_origins(description)
     commands = [_set_object(f"{ROOT}/grid", grid_object(size, "grid"))]
     commands += _part_commands(parts)
-    commands += _triad_commands(description, size)
+    commands += _triad_commands(description, places, size)
     nodes = [f"{ROOT}/link{i}" for i in range(description.n + 1)] + [f"{ROOT}/tool"]
     transforms = node_transforms(description, first_configuration(description))
     commands += [_set_transform(path, T) for path, T in zip(nodes, transforms, strict=True)]
     about = {
         "name": description.name,
         "joints": [{"name": j.name, "unit": "deg" if j.is_revolute else "m"} for j in description.joints],
-        "labels": [{"frame": label.frame, "text": label.text} for label in frame_labels(description)],
+        "labels": [{"frame": label.frame, "text": label.text} for label in _labels(description, places)],
         "size": size,
         "up": _up(description),
         "nodes": [c["path"].removeprefix(f"{ROOT}/") if c["type"] == "set_object" else "" for c in commands],
@@ -132,8 +132,12 @@ def frame_labels(description: Description) -> tuple[Label, ...]:
     Frames that are the same one are joined by ``=``, those that share only their origin by a comma:
     ``4, 5, 6 = tool`` at a wrist's centre.
     """
+    return _labels(description, _shared_origins(description))
+
+
+def _labels(description: Description, places: list[list[list[int]]]) -> tuple[Label, ...]:
     labels = []
-    for group in _shared_origins(description):
+    for group in places:
         text = ", ".join(" = ".join(_name(description, i) for i in same) for same in group)
         labels.append(Label(group[0][0], text))
     return tuple(labels)
@@ -176,9 +180,9 @@ def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
     return commands
 
 
-def _triad_commands(description: Description, size: float) -> list[Lowered]:
+def _triad_commands(description: Description, places: list[list[list[int]]], size: float) -> list[Lowered]:
     commands: list[Lowered] = []
-    for place in _shared_origins(description):
+    for place in places:
         for k, same in enumerate(place):
             name = _name(description, same[0])
             node = "tool" if name == "tool" else f"link{name}"

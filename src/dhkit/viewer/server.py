@@ -29,7 +29,7 @@ from dhkit.viewer.handlers import File, Page, Refused
 from dhkit.viewer.page import page_files
 from dhkit.viewer.protocol import stamped
 from dhkit.viewer.requests import Request
-from dhkit.viewer.session import Session, Slot
+from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 from dhkit.viewer.streams import Samples, encode_state
 
 __all__ = ["Answer", "ViewerServer"]
@@ -218,6 +218,10 @@ class ViewerServer:
 
     def _keep(self, slot: int, message: bytes | Samples) -> None:
         self._sequence += 1
+        if slot == Slot.SCENE:
+            for other in OF_ONE_ARM:
+                self._state.pop(other, None)
+                self._changed.pop(other, None)
         if isinstance(message, Samples):
             _, before = self._state.get(slot, (0, None))
             self._state[slot] = (self._sequence, _joined(before, replace(message, restart=before is None)))

@@ -8,7 +8,7 @@ from enum import IntEnum
 from dhkit.viewer.protocol import stamped
 from dhkit.viewer.streams import Samples
 
-__all__ = ["Session", "Slot"]
+__all__ = ["OF_ONE_ARM", "Session", "Slot"]
 
 
 STATES = 16
@@ -34,6 +34,10 @@ class Slot(IntEnum):
     """A pose or an animation."""
     PANELS = 100
     """The first of the states and samples of panels, each with a slot of its own."""
+
+
+OF_ONE_ARM = (Slot.TRACE, Slot.POINTS, Slot.ELLIPSOIDS, Slot.GHOSTS, Slot.MOTION)
+"""What a new scene takes away: it was drawn for the arm before."""
 
 
 class Session:
@@ -74,6 +78,9 @@ class Session:
 
     def offer(self, slot: int, sequence: int, message: bytes | Samples) -> None:
         """Take a message in place of the one that waits in its slot; samples join those that wait."""
+        if slot == Slot.SCENE:
+            for other in OF_ONE_ARM:
+                self._waiting.pop(other, None)
         turn, _, waiting = self._waiting.get(slot, (_turn(slot, sequence), 0, None))
         if isinstance(message, Samples) and isinstance(waiting, Samples):
             message = waiting.followed_by(message)

@@ -20,7 +20,7 @@ from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
-from dhkit.viewer.session import Slot
+from dhkit.viewer.session import OF_ONE_ARM, Slot
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -128,8 +128,15 @@ class View:
             raise ValueError(f"q is {q.tolist()}; expected finite values")
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
-    def replace(self, description: Description) -> None:
-        """Show another arm in place of this one, in its first configuration; what was drawn beside it is taken away.
+    def replace(self, description: Description, q: ArrayLike | None = None) -> None:
+        """Show another arm in place of this one; what was drawn for the one before is taken away.
+
+        Parameters
+        ----------
+        description
+            The arm.
+        q
+            Joint values that it is shown in, shape (n,), rad and m; its first configuration if not given.
 
         Raises
         ------
@@ -139,11 +146,10 @@ class View:
         scene = self._scene(description)
         with self._lock:
             self._description = description
-            nothing = np.zeros((0, description.n + 2, 4, 4))
+            for slot in OF_ONE_ARM:
+                self._state.pop(slot, None)
             self._publish(Slot.SCENE, scene)
-            self._publish(Slot.GHOSTS, protocol.encode_ghosts(nothing, np.zeros((0, 3), np.uint8)))
-            self._publish(Slot.TRACE, protocol.encode_trace(np.zeros((0, 3))))
-            self.show(first_configuration(description))
+            self.show(first_configuration(description) if q is None else q)
 
     def panel(self, name: str, data: Any) -> None:
         """Tell pages the state of a panel, of what JSON can hold, in place of the last of this name."""

@@ -67,6 +67,7 @@ class Page {
   takeScene(message) {
     if (message.about.panels && this.connection && !this.opening) this.opening = this.openLab().catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     this.stage.build(message);
+    this.takeOverlay(() => this.stage.leaveArm());
     if (this.lab) this.stage.awaited = performance.now() + POSE_TIME;
     this.readout.set(message.about);
     element("tools").hidden = false;

@@ -70,6 +70,13 @@ export class Overlays {
     this.layers.ellipsoids.fill(balls, box);
   }
 
+  // What was drawn for an arm goes with it; obstacles stay.
+  leaveArm() {
+    for (const name of ["points", "ellipsoids", "ghosts"]) this.layers[name].fill([], new this.THREE.Box3());
+    this.skeletons.set(new Float32Array(), 1, NONE, 0);
+    this.last = null;
+  }
+
   // stage: whose nodes are copied; each copy shares their geometry.
   // skeletons: whether a ghost is only rods between its frames, which a slow machine can draw many of.
   setGhosts({ transforms, tints }, { nodes, boxAt, skeletons = false }) {

@@ -92,6 +92,9 @@ export class Stage {
   beside() {
     this.steady = true;
     if (this.software) this.quality.save();
+    // The arm of an edited table has surfaces that meshes have not: their program is compiled with the first picture.
+    const like = new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x222222, side: THREE.FrontSide });
+    this.viewer.scene.add(new THREE.Mesh(new THREE.SphereGeometry(0, 3, 2), like));
   }
 
   withoutShadows() {
@@ -381,6 +384,12 @@ export class Stage {
   setTrace(trace, points) {
     trace.set(points, TRACE_RADIUS * this.size);
     this.dirty();
+  }
+
+  leaveArm() {
+    this.overlays.leaveArm();
+    this.anchors = [];
+    this.setTrace(this.given, new Float32Array());
   }
 
   setPoints(message) {
