@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import base64
 import logging
-import tempfile
 import threading
 import time
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.control import CONTROLLERS, FrictionCompensation, Sine, make_controller
+from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Sine, make_controller
 from dhkit.description import Array
-from dhkit.dynamics import Friction
 from dhkit.errors import DhkitError
-from dhkit.lab.desk import Desk
+from dhkit.lab.desk import Desk, file_content
 from dhkit.lab.fields import Fields
 from dhkit.lab.live import Live, Wanted
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
+from dhkit.lab.references import back_and_forth, gentle_sine
+from dhkit.lab.run_settings import OWN, PARTS, TITLES, Settings
 from dhkit.viewer.streams import Samples
 
-__all__ = ["OWN", "ControlPanel", "Settings"]
+__all__ = ["ControlPanel"]
 
 log = logging.getLogger(__name__)
 
@@ -35,70 +33,11 @@ FRAMES = 60.0
 """Pictures a second."""
 BEHIND = 5
 """Frames that a slow machine is behind before time is let go."""
-SMOOTH = 0.05
-"""rad/s or m/s of smooth friction."""
-FRICTIONS = ("none", "smooth", "stiction")
-REFERENCES = ("hold", "sine", "motion", "target", "sliders")
-AMPLITUDE, FREQUENCY = 0.3, 0.25
-"""Of a sine: rad (and shares of the reach) from end to end, less where limits are near; and Hz."""
-ROOM = 0.9
-"""Share of the way to a limit that a sine takes at most."""
 REBUILT = ("controller", "bandwidth", "damping", "compensate")
 """Settings of which the controller is made."""
 MOST_FORCE, LONGEST_PUSH = 1e4, 10.0
-PARTS = ("controller", "bandwidth", "damping", "friction", "payload", "compensate", "reference")
-OWN = "own"
-"""The name of the controller of the person's own program."""
-TITLES = {
-    OWN: "Your own",
-    "pd": "PD of each joint",
-    "pid": "PID of each joint",
-    "pd-gravity": "PD and gravity",
-    "feed-forward": "Feed-forward",
-    "computed-torque": "Computed torque",
-    "operational-space": "Operational space",
-    "adaptive": "Adaptive",
-    "lqr": "LQR",
-}
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What is simulated."""
-
-    controller: str = "computed-torque"
-    bandwidth: float = 20.0
-    """rad/s."""
-    damping: float = 1.0
-    friction: str = "none"
-    payload: float = 0.0
-    """kg at the tool, which the controller does not know of."""
-    compensate: bool = False
-    reference: str = "hold"
-
-    def changed(self, request: str, data: dict[str, Any]) -> Settings:
-        """Return the settings with some of them changed.
-
-        Raises
-        ------
-        ValueError
-            A value that is none.
-        """
-        fields = Fields(request, data, PARTS)
-        return Settings(
-            fields.choice("controller", [*CONTROLLERS, OWN], self.controller),
-            fields.number("bandwidth", 0.1, 1000.0, self.bandwidth),
-            fields.number("damping", 0.01, 10.0, self.damping),
-            fields.choice("friction", FRICTIONS, self.friction),
-            fields.number("payload", 0.0, 1000.0, self.payload),
-            fields.flag("compensate", self.compensate),
-            fields.choice("reference", REFERENCES, self.reference),
-        )
-
-    @property
-    def model(self) -> Friction | None:
-        """The friction of the joints."""
-        return {"none": None, "smooth": Friction(SMOOTH), "stiction": Friction()}[self.friction]
+GHOST = (0.55, 0.6, 0.68)
+"""Red, green and blue of the reference."""
 
 
 class ControlPanel:
@@ -160,7 +99,7 @@ class ControlPanel:
             live = self._live if self.desk.running else None
             if live is not None:
                 try:
-                    if now.reference != before.reference or "reference" in data:
+                    if "reference" in data:
                         self._require_reference(now.reference)
                     self.settings = now
                     controller = None
@@ -218,10 +157,7 @@ class ControlPanel:
             if self._live is None:
                 raise ValueError("control.download: nothing has been simulated yet")
             result = self._live.result()
-        with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
-            path = result.save(Path(folder) / f"run.{kind}")
-            content = base64.b64encode(path.read_bytes()).decode()
-        return {"name": f"{self.desk.arm.name}-run.{kind}", "content": content}
+        return {"name": f"{self.desk.arm.name}-run.{kind}", "content": file_content(result, kind)}
 
     def assume(self, data: dict[str, Any]) -> dict[str, Any]:
         """Give an arm without bodies uniform links."""
@@ -389,12 +325,12 @@ class ControlPanel:
 
     def _controller(self, live: Live) -> Any:
         settings = self.settings
-        if settings.controller == OWN:
-            controller = self.own.controller()
-        else:
-            controller = make_controller(
-                settings.controller, live.arm.description, settings.bandwidth, settings.damping, live.q
-            )
+        description = live.arm.description
+        controller: Controller = (
+            self.own.controller()
+            if settings.controller == OWN
+            else make_controller(settings.controller, description, settings.bandwidth, settings.damping, live.q)
+        )
         return FrictionCompensation(controller, live.arm) if settings.compensate else controller
 
     def _require_reference(self, name: str) -> None:
@@ -420,9 +356,9 @@ class ControlPanel:
         if self.settings.reference == "motion":
             motion = self.motions.motion
             assert motion is not None  # noqa: S101 - for mypy: it was asked for before
-            return lambda t: _repeated(motion, t - begin, free)
+            return lambda t: back_and_forth(motion, t - begin, free)
         if self.settings.reference == "sine":
-            self.sine = sine = _sine(arm, held, free)
+            self.sine = sine = gentle_sine(arm, held, free)
 
             def sampled(t: float) -> tuple[Array, Array, Array]:
                 q, qd, qdd = sine.sampled(np.array([t - begin]))
@@ -450,36 +386,3 @@ class ControlPanel:
     def _aimed(self, held: Array) -> Array:
         aimed = self.desk.aimed
         return held if aimed is None else aimed[self._free]
-
-
-GHOST = (0.55, 0.6, 0.68)
-"""Red, green and blue of the reference."""
-
-
-def _repeated(motion: Any, t: float, free: list[int]) -> tuple[Array, Array, Array]:
-    """Return a motion that is held for a second at its end, and goes back the same way."""
-    rest = 1.0
-    period = 2 * (motion.duration + rest)
-    s = t % period
-    back = s >= period / 2
-    if back:
-        s -= period / 2
-    rests = s >= motion.duration
-    at = min(s, motion.duration)
-    at = motion.duration - at if back else at
-    still = np.zeros(len(free))
-    if rests:
-        return motion.q(at)[free], still, still
-    sign = -1.0 if back else 1.0
-    return motion.q(at)[free], sign * motion.qd(at)[free], motion.qdd(at)[free]
-
-
-def _sine(arm: Arm, held: Array, free: list[int]) -> Sine:
-    """Return a sine of the free joints that begins at rest, to the side on which there is more room."""
-    numbers = arm.description.numbers
-    size = np.where(numbers.prismatic, AMPLITUDE * arm.description.reach, AMPLITUDE)[free]
-    above, below = numbers.upper[free] - held, held - numbers.lower[free]
-    up = np.clip(np.where(above >= np.minimum(size, below), np.minimum(size, ROOM * above), 0.0), 0.0, None)
-    down = np.clip(np.minimum(size, ROOM * below), 0.0, None)
-    way = np.where(up > 0, up, -down) / 2
-    return Sine(held + way, way, FREQUENCY, -np.pi / 2)

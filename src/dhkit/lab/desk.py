@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import tempfile
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +16,11 @@ from dhkit.kinematics import classify, freedoms, singular_values
 from dhkit.lab.contacts import Contacts
 from dhkit.viewer import View
 
-__all__ = ["Desk", "listed"]
+if TYPE_CHECKING:
+    from dhkit.control import SimulationResult
+    from dhkit.trajectories import Trajectory
+
+__all__ = ["Desk", "file_content", "listed"]
 
 UNIQUE = 1e-6
 """Cosine (or sine) of the second Euler angle below which the first and third are not unique."""
@@ -26,6 +33,12 @@ def listed(array: Array | None) -> list[Any] | None:
     if array is None:
         return None
     return [listed(row) if np.ndim(row) else (float(row) if np.isfinite(row) else None) for row in array]
+
+
+def file_content(result: Trajectory | SimulationResult, kind: str) -> str:
+    """Return a motion or a run as the content of a file that ends in ``kind``, in base64."""
+    with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
+        return base64.b64encode(result.save(Path(folder) / f"file.{kind}").read_bytes()).decode()
 
 
 class Desk:

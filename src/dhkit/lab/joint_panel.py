@@ -8,6 +8,7 @@ import numpy as np
 
 from dhkit.lab.desk import Desk
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
+from dhkit.programs import random_states
 
 __all__ = ["JointPanel"]
 
@@ -31,13 +32,7 @@ class JointPanel:
         arm = self.desk.arm
         name = Fields("joints.named", data, ["name"]).choice("name", ["zero", "random", *arm.configurations])
         if name == "random":
-            numbers = arm.description.numbers
-            free = np.where(numbers.prismatic, arm.description.reach or 1.0, np.pi)
-            lower, upper = (
-                np.where(np.isfinite(bound), bound, side * free)
-                for bound, side in ((numbers.lower, -1), (numbers.upper, 1))
-            )
-            q = self._random.uniform(lower, upper)
+            q = random_states(arm, self._random, 1)[0]
         else:
             q = np.array(arm.configurations.get(name, np.zeros(arm.n)))
         self.desk.steer(q, None)

@@ -17,7 +17,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.lab.contacts import touching
-from dhkit.lab.desk import Desk, listed
+from dhkit.lab.desk import Desk, file_content, listed
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.tool_panel import solved
@@ -119,8 +119,6 @@ class MotionPanel:
                 motion = read_motion(path, self.desk.arm.description, degrees=degrees)
             except DescriptionError as error:
                 raise ValueError(str(error).replace(str(path), fields.text("name"))) from None
-        if motion.duration > LONGEST:
-            raise ValueError(f"motion.file: it lasts {motion.duration:g} s; expected at most {LONGEST:g} s")
         self._take(
             motion, "file", f"dhkit.Trajectory.load({f'{self.desk.arm.name}-motion.npz'!r})  # downloaded as NPZ"
         )
@@ -150,10 +148,7 @@ class MotionPanel:
         motion = self.motion
         if motion is None:
             raise ValueError("motion.download: there is no motion")
-        with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
-            path = motion.save(Path(folder) / f"motion.{kind}")
-            content = base64.b64encode(path.read_bytes()).decode()
-        return {"name": f"{self.desk.arm.name}-motion.{kind}", "content": content}
+        return {"name": f"{self.desk.arm.name}-motion.{kind}", "content": file_content(motion, kind)}
 
     def add(self, data: dict[str, Any]) -> dict[str, Any]:
         """Teach the state on show as a waypoint."""
@@ -235,17 +230,18 @@ class MotionPanel:
         arm = self.desk.arm
         numbers = arm.description.numbers
         times = np.linspace(0.0, motion.duration, SHOWN)
-        bodies = all(joint.bodies for joint in arm.description.joints)
+        shown, speeds = motion.q(times), motion.qd(times)
+        torques = motion.tau(times) if all(joint.bodies for joint in arm.description.joints) else None
         state = {
             "kind": kind,
             "duration": motion.duration,
             "times": times.tolist(),
-            "q": motion.q(times).tolist(),
-            "qd": motion.qd(times).tolist(),
-            "tau": motion.tau(times).tolist() if bodies else None,
+            "q": shown.tolist(),
+            "qd": speeds.tolist(),
+            "tau": None if torques is None else torques.tolist(),
             "limits": {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")},
             "touching": None,
-            "excess": _excess(arm, motion, times),
+            "excess": _excess(arm, shown, speeds, torques),
         }
         q = motion.q(np.linspace(0.0, motion.duration, CHECKED))
         if not np.isfinite(q).all() or np.abs(q).max() > LARGEST_JOINT_VALUE:
@@ -315,16 +311,15 @@ def _circle(arm: Arm, start: Array, duration: float | None) -> tuple[Trajectory,
     raise wrong or DescriptionError("the tool stands on the base's axis; expected a place beside it")
 
 
-def _excess(arm: Arm, motion: Trajectory, times: Array) -> str | None:
-    """Return the limit that is exceeded most, in words, or None."""
+def _excess(arm: Arm, q: Array, qd: Array, tau: Array | None) -> str | None:
+    """Return the limit that is exceeded most by samples, shape (N, n) each, in words, or None."""
     numbers = arm.description.numbers
-    q, qd = motion.q(times), motion.qd(times)
     shares = {
         "speed": np.abs(qd).max(axis=0) / numbers.velocity,
         "range": np.maximum(q - numbers.upper, numbers.lower - q).max(axis=0) + 1.0,
     }
-    if all(joint.bodies for joint in arm.description.joints):
-        shares["torque"] = np.abs(motion.tau(times)).max(axis=0) / numbers.effort
+    if tau is not None:
+        shares["torque"] = np.abs(tau).max(axis=0) / numbers.effort
     worst = max(((float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items()))
     share, name, joint = worst
     if share <= 1 + 1e-6:

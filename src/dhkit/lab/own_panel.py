@@ -81,7 +81,7 @@ class OwnPanel:
         self._score()
         return {}
 
-    def controller(self) -> Any:
+    def controller(self) -> Callable[..., Array]:
         """Return the program's controller, in a process of its own that ends when another is asked for.
 
         Raises
@@ -96,11 +96,7 @@ class OwnPanel:
         driver = self._driver = Program(self.source, LIVE, self._sandbox)
         driver.start()
 
-        def controller(t: float, q: Array, qd: Array, setpoint: Any) -> Array:
-            wanted = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
-            return np.array(driver.call("controller", t=t, q=q.tolist(), qd=qd.tolist(), setpoint=wanted), dtype=float)
-
-        return controller
+        return driver.controller
 
     def publish(self) -> None:
         """Tell the pages what is known."""
@@ -194,10 +190,7 @@ class OwnPanel:
 
     def _inverse(self, arm: Arm, q: Array, program: Program) -> dict[str, Any]:
         T = arm.fk(q)
-        rows = np.array(program.call("ik", T=T.tolist()), dtype=float)
-        if rows.size and (rows.ndim > 2 or rows.shape[-1] != arm.n):
-            raise ValueError(f"ik returned shape {rows.shape}; expected ({arm.n},), or (B, {arm.n})")
-        rows = rows.reshape(-1, arm.n)
+        rows = program.ik(T, arm.n)
         finite = rows[np.isfinite(rows).all(axis=1)]
         right = [bool(np.abs(arm.fk(row) - T).max() < CLOSE) for row in finite]
         if self._ghosts and not self.desk.running:
@@ -223,11 +216,7 @@ class OwnPanel:
 
 
 def _forward(arm: Arm, q: Array, program: Program) -> dict[str, Any]:
-    T = np.array(program.call("fk", q=q.tolist()), dtype=float)
-    if T.shape != (4, 4):
-        raise ValueError(f"fk returned shape {T.shape}; expected (4, 4)")
-    if not np.isfinite(T).all():
-        raise ValueError("fk returned NaN or infinity")
+    T = program.fk(q)
     ours = arm.fk(q)
     cosine = np.clip((np.trace(ours[:3, :3].T @ T[:3, :3]) - 1) / 2, -1.0, 1.0)
     return {

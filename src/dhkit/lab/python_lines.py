@@ -8,9 +8,10 @@ from dhkit.arm import Arm
 from dhkit.description import to_toml
 from dhkit.description.library import library_robot, robots
 from dhkit.kinematics import classify
-from dhkit.lab.control_panel import OWN, ControlPanel
+from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import Desk
 from dhkit.lab.motion_panel import MotionPanel, literal
+from dhkit.lab.run_settings import OWN
 from dhkit.lab.tool_panel import ToolPanel
 
 __all__ = ["python_lines"]

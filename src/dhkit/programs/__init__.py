@@ -3,6 +3,7 @@
 from dhkit.programs.checks import check
 from dhkit.programs.process import Limits, ProgramError
 from dhkit.programs.program import FUNCTIONS, Program, protect_from_children
+from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part
 from dhkit.programs.rubric import CheckRubric
 
@@ -16,4 +17,5 @@ __all__ = [
     "ProgramError",
     "check",
     "protect_from_children",
+    "random_states",
 ]

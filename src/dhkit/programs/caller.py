@@ -6,13 +6,11 @@ import time
 from collections import Counter
 from typing import Any
 
-import numpy as np
-
 from dhkit.description import Array
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 
-__all__ = ["CLOSE", "EXAMPLES", "Caller", "numbers"]
+__all__ = ["CLOSE", "EXAMPLES", "Caller"]
 
 CLOSE = 1e-6
 """m and entries of a rotation matrix between a pose and the one that is reached."""
@@ -32,8 +30,8 @@ class Caller:
         self.seconds: list[float] = []
         self._fatal = 0
 
-    def __call__(self, **arguments: Any) -> Any:
-        """Return the function's value.
+    def __call__(self, *arguments: Any) -> Array:
+        """Return the function's value, as :meth:`Program.fk` and the like give it.
 
         Raises
         ------
@@ -44,7 +42,7 @@ class Caller:
             raise ProgramError("not called any more", "ended")
         begin = time.perf_counter()
         try:
-            value = self.program.call(self.function, **arguments)
+            value: Array = getattr(self.program, self.function)(*arguments)
         except ProgramError as error:
             self.failures[str(error)] += 1
             self._fatal = self._fatal + 1 if error.failure in FATAL else 0
@@ -59,17 +57,3 @@ class Caller:
             f"{text} ({count} {'time' if count == 1 else 'times'})"
             for text, count in self.failures.most_common(EXAMPLES)
         )
-
-
-def numbers(value: Any) -> Array:
-    """Return an answer as an array, null as NaN.
-
-    Raises
-    ------
-    ProgramError
-        It is no array of numbers.
-    """
-    try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ProgramError("returned what is no array of numbers", "raised") from None

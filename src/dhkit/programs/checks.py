@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DhkitError
-from dhkit.programs.caller import CLOSE, EXAMPLES, Caller, numbers
+from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
-from dhkit.programs.report import CheckReport, Part
+from dhkit.programs.report import CheckReport, Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
 __all__ = ["check"]
@@ -96,13 +95,9 @@ def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, s
 def _matrix(call: Caller, q: Array) -> Array | None:
     """Return the pose that the program gives; None where it gives none."""
     try:
-        T = numbers(call(q=q.tolist()))
+        return call(q)
     except ProgramError:
         return None
-    if T.shape != (4, 4):
-        call.failures[f"fk returned shape {T.shape}; expected (4, 4)"] += 1
-        return None
-    return T if np.isfinite(T).all() else None
 
 
 def _fk_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, ...]:
@@ -136,19 +131,15 @@ def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Gene
     goal = np.array(arm.configurations.get(task.goal, np.zeros(arm.n)))
     plant = arm.with_payload(task.payload) if task.payload else arm
 
-    def controller(t: float, q: Array, qd: Array, setpoint: Any) -> Array:
-        wanted = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
-        return numbers(call(t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=wanted))
-
     motion = arm.quintic(start, goal, task.duration)
     try:
-        result = arm.simulate(controller, motion, rate=task.rate, plant=plant)
+        result = arm.simulate(call, motion, rate=task.rate, plant=plant)
     except DhkitError as error:
         yield Part("follows", 0.0, most, "the run failed", (*call.said(), str(error))[:EXAMPLES])
         return
     errors = np.abs(result.q - result.reference_q)
     peak = float(errors.max())
-    share = float(np.clip(1 - np.log10(max(peak, 1e-12) / task.bound), 0.0, 1.0))
+    share = share_within(peak, task.bound)
     joint = int(np.argmax(errors.max(axis=0)))
     name = arm.description.joints[joint].name
     text = f"peak error {peak:.3g} in joint {joint + 1} ({name}); {task.bound:g} rad or m are asked for"

@@ -11,10 +11,10 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.kinematics import classify
-from dhkit.programs.caller import CLOSE, EXAMPLES, Caller, numbers
+from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.process import ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, regular_states, singular_states
-from dhkit.programs.report import Part
+from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
 __all__ = ["score_inverse"]
@@ -56,7 +56,7 @@ def score_inverse(
         said = f"{sum(map(bool, at))} of {len(at)} singular poses are met"
         yield Part("singular", points["singular"] * share_at, points["singular"], said)
     limit = rubric.ik.seconds
-    quick = float(np.clip(1 - np.log10(max(seconds, 1e-12) / limit), 0.0, 1.0)) if np.isfinite(seconds) else 0.0
+    quick = share_within(float(seconds), limit)
     met = float(np.mean([bool(found) for found in regular]))
     said = f"{1e3 * seconds:.3g} ms a pose; {1e3 * limit:g} ms are asked for" if np.isfinite(seconds) else "no answer"
     yield Part("time", points["time"] * quick * met, points["time"], said)
@@ -120,17 +120,10 @@ class _Poses:
 
     def _rows(self, T: Array) -> Array | None:
         """Return the solutions of a pose, shape (B, n); None where the function failed."""
-        n = self.arm.n
         try:
-            value = numbers(self.call(T=T.tolist()))
+            rows = self.call(T, self.arm.n)
         except ProgramError:
             return None
-        if value.size == 0:
-            return np.zeros((0, n))
-        if value.shape[-1] != n or value.ndim > 2:
-            self.call.failures[f"ik returned shape {value.shape}; expected ({n},), or (B, {n})"] += 1
-            return None
-        rows = value.reshape(-1, n)
         finite = np.isfinite(rows).all(axis=1)
         if not finite.all():
             self.wrong["NaN or infinity was returned; expected no row where there is no solution"] += 1

@@ -11,9 +11,15 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from dhkit.description import Array
 from dhkit.programs.process import HERE, Limits, Process, ProgramError
+
+if TYPE_CHECKING:
+    from dhkit.control import Setpoint
 
 __all__ = ["FUNCTIONS", "Program", "protect_from_children"]
 
@@ -93,6 +99,46 @@ class Program:
         if "value" not in answer:
             raise ProgramError("an answer without a value", "garbage")
         return answer["value"]
+
+    def fk(self, q: Array) -> Array:
+        """Return the pose that the program gives for joint values, shape (n,), as shape (4, 4).
+
+        Raises
+        ------
+        ProgramError
+            It failed, or gave something else.
+        """
+        T = _numbers("fk", self.call("fk", q=q.tolist()))
+        if T.shape != (4, 4):
+            raise ProgramError(f"fk returned shape {T.shape}; expected (4, 4)", "raised")
+        if not np.isfinite(T).all():
+            raise ProgramError("fk returned NaN or infinity", "raised")
+        return T
+
+    def ik(self, T: Array, n: int) -> Array:
+        """Return the solutions that the program gives for a pose, shape (4, 4), as shape (B, n); rows may hold NaN.
+
+        Raises
+        ------
+        ProgramError
+            It failed, or gave something else.
+        """
+        rows = _numbers("ik", self.call("ik", T=T.tolist()))
+        if rows.size and (rows.ndim > 2 or rows.shape[-1] != n):
+            raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", "raised")
+        return rows.reshape(-1, n)
+
+    def controller(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
+        """Return the torques that the program gives: a controller as :meth:`dhkit.Arm.simulate` takes it.
+
+        Raises
+        ------
+        ProgramError
+            It failed, or gave something else.
+        """
+        wanted = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
+        torques = self.call("controller", t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=wanted)
+        return _numbers("controller", torques)
 
     @property
     def output(self) -> str:
@@ -189,6 +235,14 @@ def protect_from_children() -> None:
     """Keep processes of the same user from reading this one's memory and environment (Linux)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(4, 0, 0, 0, 0)  # PR_SET_DUMPABLE
+
+
+def _numbers(function: str, value: Any) -> Array:
+    """Return an answer as an array, null as NaN."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ProgramError(f"{function} returned what is no array of numbers", "raised") from None
 
 
 def _text(error: Any) -> str:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-__all__ = ["CheckReport", "Part"]
+import numpy as np
+
+__all__ = ["CheckReport", "Part", "share_within"]
 
 
 @dataclass(frozen=True)
@@ -81,3 +83,8 @@ class CheckReport:
                 lines += [f"  {'':<10} {'':>12}     {detail}" for detail in part.details]
         lines += [""] * bool(self.notes) + [f"note: {note}" for note in self.notes]
         return "\n".join([*lines, f"random states: seed {self.seed}"])
+
+
+def share_within(value: float, bound: float) -> float:
+    """Return the share of points for a value that should not exceed a bound: none at ten times the bound."""
+    return float(np.clip(1 - np.log10(max(value, 1e-12) / bound), 0.0, 1.0))
