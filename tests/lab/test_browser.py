@@ -526,11 +526,11 @@ def test_a_controller_is_started_pushed_changed_and_stopped(visit):
     page.click(button("Start"))
     page.until("dhkit.lab.state.control.running && dhkit.lab.panels[4].panel.rows.length > 20")
     wait_for(lambda: plots(page, "control") >= 1)
-    calm = np.abs(lab.desk.q - lab.desk.named()["nominal"]).max()
+    calm = np.abs(lab.desk.q - lab.desk.arm.configurations["nominal"]).max()
     assert calm < 1e-3
     write(page, "Force along z, N", "-200")
     page.click(button("Push"))
-    wait_for(lambda: np.abs(lab.desk.q - lab.desk.named()["nominal"]).max() > 10 * max(calm, 1e-5))
+    wait_for(lambda: np.abs(lab.desk.q - lab.desk.arm.configurations["nominal"]).max() > 10 * max(calm, 1e-5))
     page.choose(labelled_list("Controller"), "pid")
     wait_for(lambda: lab._control.settings.controller == "pid")
     write(page, "Payload", "2")

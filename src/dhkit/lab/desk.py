@@ -12,27 +12,21 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array, pose_parts
-from dhkit.kinematics import classify, freedoms, singular_values
+from dhkit.kinematics import freedoms, singular_values
 from dhkit.lab.contacts import Contacts
 from dhkit.viewer import View
+from dhkit.viewer.interactive import arm_state
 
 if TYPE_CHECKING:
     from dhkit.control import SimulationResult
     from dhkit.trajectories import Trajectory
 
-__all__ = ["Desk", "file_content", "listed"]
+__all__ = ["Desk", "file_content"]
 
 UNIQUE = 1e-6
 """Cosine (or sine) of the second Euler angle below which the first and third are not unique."""
 SINGULAR = 1e-3
 """Smallest over largest singular value of the Jacobian (m and rad): below it a state is told as singular."""
-
-
-def listed(array: Array | None) -> list[Any] | None:
-    """Return an array as JSON has it: infinities and NaN are null."""
-    if array is None:
-        return None
-    return [listed(row) if np.ndim(row) else (float(row) if np.isfinite(row) else None) for row in array]
 
 
 def file_content(result: Trajectory | SimulationResult, kind: str) -> str:
@@ -91,10 +85,6 @@ class Desk:
         for call in self.changed:
             call()
 
-    def named(self) -> dict[str, Array]:
-        """Return the arm's configurations by name, zero first."""
-        return {"zero": np.zeros(self.arm.n)} | {name: np.array(q) for name, q in self.arm.configurations.items()}
-
     def show(self, q: Array) -> None:
         """Show joint values, shape (n,)."""
         self.q = q.copy()
@@ -103,27 +93,7 @@ class Desk:
 
     def publish(self) -> None:
         """Tell the pages everything about the arm, and its state."""
-        description, numbers = self.arm.description, self.arm.description.numbers
-        bounds = zip(numbers.lower, numbers.upper, numbers.velocity, numbers.effort, strict=True)
-        self.view.panel(
-            "arm",
-            {
-                "name": description.name,
-                "n": description.n,
-                "joints": [
-                    {"name": joint.name, "unit": "m" if slides else "rad"}
-                    | dict(zip(("lower", "upper", "velocity", "effort"), listed(np.array(row)) or (), strict=True))
-                    for joint, slides, row in zip(description.joints, numbers.prismatic, bounds, strict=True)
-                ],
-                "configurations": [*self.named(), "random"],
-                "named": {name: q.tolist() for name, q in self.named().items()},
-                "family": self.arm.family,
-                "closed_form": classify(description).fit is not None,
-                "bodies": all(joint.bodies for joint in description.joints),
-                "assumed_bodies": self.assumed_bodies,
-                "reach": description.reach,
-            },
-        )
+        self.view.panel("arm", arm_state(self.arm.description, assumed_bodies=self.assumed_bodies))
         self._contacts.prepare(self.arm, self.publish_state)
         self.show(self.q)
 

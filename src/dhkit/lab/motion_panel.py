@@ -17,12 +17,14 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.lab.contacts import touching
-from dhkit.lab.desk import Desk, file_content, listed
+from dhkit.lab.desk import Desk, file_content
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.tool_panel import solved
 from dhkit.planning import Progress
 from dhkit.trajectories import Trajectory, read_motion
+from dhkit.viewer.interactive import limits_state
+from dhkit.viewer.motion import exceeded_limit
 
 __all__ = ["MotionPanel", "literal"]
 
@@ -228,7 +230,6 @@ class MotionPanel:
         if motion.duration > LONGEST:
             raise ValueError(f"the motion lasts {motion.duration:g} s; expected at most {LONGEST:g} s")
         arm = self.desk.arm
-        numbers = arm.description.numbers
         times = np.linspace(0.0, motion.duration, SHOWN)
         shown, speeds = motion.q(times), motion.qd(times)
         torques = motion.tau(times) if all(joint.bodies for joint in arm.description.joints) else None
@@ -239,9 +240,9 @@ class MotionPanel:
             "q": shown.tolist(),
             "qd": speeds.tolist(),
             "tau": None if torques is None else torques.tolist(),
-            "limits": {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")},
+            "limits": limits_state(arm.description),
             "touching": None,
-            "excess": _excess(arm, shown, speeds, torques),
+            "excess": exceeded_limit(arm.description, shown, speeds, torques),
         }
         q = motion.q(np.linspace(0.0, motion.duration, CHECKED))
         if not np.isfinite(q).all() or np.abs(q).max() > LARGEST_JOINT_VALUE:
@@ -309,22 +310,3 @@ def _circle(arm: Arm, start: Array, duration: float | None) -> tuple[Trajectory,
         except DhkitError as error:
             wrong = error
     raise wrong or DescriptionError("the tool stands on the base's axis; expected a place beside it")
-
-
-def _excess(arm: Arm, q: Array, qd: Array, tau: Array | None) -> str | None:
-    """Return the limit that is exceeded most by samples, shape (N, n) each, in words, or None."""
-    numbers = arm.description.numbers
-    shares = {
-        "speed": np.abs(qd).max(axis=0) / numbers.velocity,
-        "range": np.maximum(q - numbers.upper, numbers.lower - q).max(axis=0) + 1.0,
-    }
-    if tau is not None:
-        shares["torque"] = np.abs(tau).max(axis=0) / numbers.effort
-    worst = max(((float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items()))
-    share, name, joint = worst
-    if share <= 1 + 1e-6:
-        return None
-    who = arm.description.joints[joint].name
-    if name == "range":
-        return f"{who} leaves its range"
-    return f"the {name} of {who} is {100 * share:.0f} % of its limit"

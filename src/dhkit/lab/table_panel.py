@@ -15,10 +15,10 @@ from dhkit.errors import DhkitError
 from dhkit.kinematics import classify
 from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
+from dhkit.viewer.interactive import COLUMNS, table_texts
 
-__all__ = ["COLUMNS", "TablePanel"]
+__all__ = ["TablePanel"]
 
-COLUMNS = ("theta", "d", "a", "alpha")
 MOST_STEPS = 200
 """Of undo."""
 LARGEST = 1e4
@@ -38,7 +38,7 @@ class Table:
     @classmethod
     def of(cls, description: Description) -> Table:
         """Return the table of an arm."""
-        return cls(tuple(tuple(str(getattr(j, name)) for name in COLUMNS) for j in description.joints), description)
+        return cls(table_texts(description), description)
 
 
 class TablePanel:

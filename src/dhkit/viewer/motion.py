@@ -14,7 +14,7 @@ from dhkit.description.numbers import Array
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
 
-__all__ = ["Motion", "PlayedMotion", "check_motion", "played_motion", "sampled"]
+__all__ = ["Motion", "PlayedMotion", "check_motion", "exceeded_limit", "played_motion", "sampled"]
 
 Motion = Trajectory | SimulationResult | tuple[ArrayLike, ArrayLike]
 """What can be played: the last are times (N,), s, and joint values (N, n), rad and m."""
@@ -113,6 +113,25 @@ def sampled(times: Array, q: Array) -> tuple[Array, Array]:
 def frame_times(duration: float) -> Array:
     """Return the times of a page's frames from 0 to a duration, shape (N,), s."""
     return np.linspace(0.0, duration, int(np.clip(np.ceil(RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
+
+
+def exceeded_limit(description: Description, q: Array, qd: Array, tau: Array | None) -> str | None:
+    """Return the limit that is exceeded most by samples, shape (N, n) each, in words, or None."""
+    numbers = description.numbers
+    shares = {
+        "speed": np.abs(qd).max(axis=0) / numbers.velocity,
+        "range": np.maximum(q - numbers.upper, numbers.lower - q).max(axis=0) + 1.0,
+    }
+    if tau is not None:
+        shares["torque"] = np.abs(tau).max(axis=0) / numbers.effort
+    worst = max(((float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items()))
+    share, name, joint = worst
+    if share <= 1 + 1e-6:
+        return None
+    who = description.joints[joint].name
+    if name == "range":
+        return f"{who} leaves its range"
+    return f"the {name} of {who} is {100 * share:.0f} % of its limit"
 
 
 def _first(wrong: np.ndarray) -> int:

@@ -5,10 +5,15 @@ from __future__ import annotations
 import base64
 import html
 import json
-from collections.abc import Sequence
+import posixpath
+import re
+import string
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
 from dhkit.errors import ModelError
 
@@ -34,6 +39,7 @@ MODULES = (
 LAB_FILES = (
     "lab.js",
     "lab.css",
+    "panels.js",
     "requests.js",
     "dom.js",
     "joints.js",
@@ -41,6 +47,7 @@ LAB_FILES = (
     "gizmo.js",
     "table.js",
     "motion.js",
+    "curves.js",
     "own.js",
     "control.js",
     "plot.js",
@@ -49,6 +56,30 @@ LAB_FILES = (
 )
 """Of the panels, in the folder ``lab``: loaded where Python answers requests. uPlot is a copy of 1.6.32 from npm."""
 
+OFFLINE_MODULES = (
+    "offline/panels.js",
+    "offline/desk.js",
+    "offline/kinematics.js",
+    "offline/expressions.js",
+    "offline/solids.js",
+    "offline/about.js",
+    "offline/recorded.js",
+    "lab/lab.js",
+    "lab/dom.js",
+    "lab/joints.js",
+    "lab/tool.js",
+    "lab/gizmo.js",
+    "lab/table.js",
+    "lab/curves.js",
+    "lab/plot.js",
+)
+"""Of a page with panels and without Python."""
+
+IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
+PLAIN = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
+"""What stands in a ``data:`` address as it is: base64 would be a quarter longer."""
+SPARED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
+"""Indentation, empty lines and comments of whole lines; no text of the modules goes over several lines."""
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
@@ -98,7 +129,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     return files
 
 
-def offline_page(messages: Sequence[bytes], title: str) -> str:
+def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str, Any] | None = None) -> str:
     """Return one HTML file that shows messages without a server: no request leaves it.
 
     Parameters
@@ -107,30 +138,50 @@ def offline_page(messages: Sequence[bytes], title: str) -> str:
         As :mod:`dhkit.viewer.protocol` encodes them, in the order a page needs them.
     title
         The page's title.
+    interactive
+        What the panels of a page without Python know, as :func:`dhkit.viewer.interactive.interactive_data` gives it;
+        a page without panels if None.
     """
     data = [base64.b64encode(message).decode() for message in messages]
+    style, extra, modules = _static("viewer.css"), "", list(MODULES)
+    if interactive is not None:
+        style += _static("lab/lab.css") + _static("lab/uplot.css")
+        extra = _script(_json(interactive), ' type="application/json" id="offline"') + _script(_static("lab/uplot.js"))
+        modules += OFFLINE_MODULES
     return _replaced(
         _static("index.html"),
         {
             "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{OFFLINE_POLICY}">',
             "<title>dhkit</title>": f"<title>{html.escape(title)}</title>",
-            '<link rel="stylesheet" href="viewer.css">': f"<style>\n{_static('viewer.css')}</style>",
+            '<link rel="stylesheet" href="viewer.css">': f"<style>\n{style}</style>",
             '<script src="meshcat.js"></script>': _script(meshcat_bundle().decode()),
-            '<script type="module" src="main.js"></script>': _modules(),
-            "<!-- messages -->": _script(json.dumps(data), ' type="application/json" id="messages"'),
+            '<script type="module" src="main.js"></script>': _modules(modules),
+            "<!-- messages -->": _script(_json(data), ' type="application/json" id="messages"') + extra,
         },
     )
 
 
-def _modules() -> str:
-    """Return the modules as an import map of ``data:`` addresses and the first of them inline."""
-    sources = {name: _static(name).replace('from "./', 'from "dhkit/') for name in MODULES}
+def _modules(names: Sequence[str]) -> str:
+    """Return modules as an import map of ``data:`` addresses and the first of them inline."""
+    sources = {name: _absolute(name, _static(name)) for name in names}
     first = sources.pop("main.js")
-    imports = {
-        f"dhkit/{name}": f"data:text/javascript;base64,{base64.b64encode(source.encode()).decode()}"
-        for name, source in sources.items()
-    }
+    imports = {f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=PLAIN)}" for name, source in sources.items()}
     return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(first, ' type="module"')
+
+
+def _absolute(name: str, source: str) -> str:
+    """Return a module with its imports named as the import map names them, without comments and indentation."""
+    folder = posixpath.dirname(name)
+
+    def named(found: re.Match[str]) -> str:
+        return f'{found[1]}"dhkit/{posixpath.normpath(posixpath.join(folder, found[2]))}"'
+
+    return IMPORT.sub(named, SPARED.sub("", source))
+
+
+def _json(data: Any) -> str:
+    """Return data as JSON that cannot end or change the script element that it stands in."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _script(content: str, attributes: str = "") -> str:

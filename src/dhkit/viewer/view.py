@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import threading
 import webbrowser
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
+from dhkit.viewer.interactive import interactive_data
 from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
 from dhkit.viewer.page import offline_page
@@ -33,6 +35,12 @@ if TYPE_CHECKING:
 __all__ = ["View"]
 
 IFRAME_HEIGHT = 480
+DRAWN_BESIDE = (
+    (Slot.POINTS, "points of the workspace", "#7f8794"),
+    (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),
+    (Slot.OBSTACLES, "obstacles", "var(--obstacle)"),
+)
+"""What a page says of things drawn beside the arm, and in which color of its style."""
 ELLIPSOID = 0.25
 """What an ellipsoid's longest half axis is drawn as, of the arm's size."""
 
@@ -83,6 +91,10 @@ class View:
         self._closed = False
         self._lock = threading.RLock()
         self._state: dict[Slot, bytes] = {Slot.SCENE: self._scene(description)}
+        self._q = first_configuration(description)
+        self._played: Motion | None = None
+        self._ghost_names: tuple[tuple[str, str], ...] = ()
+        """Names and colors of the ghosts."""
         self.frames(frames)
         self.show(first_configuration(description))
 
@@ -126,6 +138,7 @@ class View:
             raise ValueError(f"q has shape {q.shape}; expected ({self._description.n},): play shows a motion")
         if not np.isfinite(q).all():
             raise ValueError(f"q is {q.tolist()}; expected finite values")
+        self._q, self._played = q.copy(), None
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
     def replace(self, description: Description, q: ArrayLike | None = None) -> None:
@@ -148,6 +161,7 @@ class View:
             self._description = description
             for slot in OF_ONE_ARM:
                 self._state.pop(slot, None)
+            self._ghost_names = ()
             self._publish(Slot.SCENE, scene)
             self.show(first_configuration(description) if q is None else q)
 
@@ -183,6 +197,7 @@ class View:
         transforms, ghost = node_transforms(self._description, q), None
         if reference_q is not None:
             ghost = node_transforms(self._description, reference_q), ghost_tints(1)
+        self._played = motion
         self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace, ghost=ghost))
 
     def trace(self, points: ArrayLike | None) -> None:
@@ -248,7 +263,7 @@ class View:
         transforms = none if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
         self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
 
-    def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None) -> None:
+    def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None, names: Sequence[str] | None = None) -> None:
         """Draw translucent copies of the arm in further states, in place of the last; None takes them away.
 
         Parameters
@@ -258,17 +273,26 @@ class View:
             kinematics solution can be given as they are.
         tints
             Red, green and blue from 0 to 1, shape (k, 3) or (3,) for all; each its own if not given.
+        names
+            What they are, k texts, which a page with panels says beside them.
 
         Raises
         ------
         ValueError
-            Other shapes, or colors below 0 or above 1.
+            Other shapes, another number of names, or colors below 0 or above 1.
         """
         states = np.zeros((0, self._description.n)) if q is None else joint_array(self._description, q)
         if states.ndim != 2:
             raise ValueError(f"q has shape {states.shape}; expected (k, {self._description.n})")
         colors = ghost_tints(len(states)) if tints is None else color_bytes(tints, len(states), "tints")
-        shown = np.isfinite(states).all(axis=1)
+        if names is not None and len(names) != len(states):
+            raise ValueError(f"{len(names)} names; expected {len(states)}, one a ghost")
+        shown = np.atleast_1d(np.isfinite(states).all(axis=1))
+        self._ghost_names = tuple(
+            (str(name), f"#{bytes(color).hex()}")
+            for name, color, drawn in zip(names or (), colors, shown, strict=names is not None)
+            if drawn
+        )
         transforms = node_transforms(self._description, states[shown])
         self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
 
@@ -304,16 +328,76 @@ class View:
         """
         self._live().wait(timeout)
 
-    def html(self) -> str:
-        """Return the present state as one HTML page that needs no server and no network."""
-        with self._lock:
-            messages = [self._state[slot] for slot in sorted(self._state)]
-        return offline_page(messages, f"{self._description.name} · dhkit")
+    def html(
+        self,
+        *,
+        interactive: bool = False,
+        motions: Mapping[str, Motion] | None = None,
+        title: str | None = None,
+        caption: str = "",
+        links: Mapping[str, str] | None = None,
+    ) -> str:
+        """Return the present state as one HTML page that needs no server and no network.
 
-    def save_html(self, path: str | Path) -> Path:
-        """Write :meth:`html` to a file and return its path."""
+        Parameters
+        ----------
+        interactive
+            With panels: sliders of the joints, the tool's pose, a table that can be edited, and the motions.
+        motions
+            What an interactive page plays, by name, as :meth:`play` takes them; the motion on show if not given.
+        title
+            The page's title; the arm's name if not given.
+        caption
+            What an interactive page says about itself: paragraphs, one a line.
+        links
+            Addresses of further pages, relative to this one, by the text that leads there.
+
+        Raises
+        ------
+        ValueError, TypeError, DescriptionError
+            A motion that cannot be played: see :meth:`play`.
+        """
+        with self._lock:
+            state, description, played = dict(self._state), self._description, self._played
+            q, ghosts = self._q, self._ghost_names
+        title = f"{description.name} · dhkit" if title is None else title
+        if not interactive:
+            return offline_page([state[slot] for slot in sorted(state)], title)
+        if motions is None:
+            motions = {} if played is None else {"motion": played}
+        overlays = [(text, color) for slot, text, color in DRAWN_BESIDE if slot in state]
+        data = interactive_data(
+            description, q, motions, caption=caption, links=links or {}, ghosts=ghosts, overlays=overlays
+        )
+        state.pop(Slot.MOTION)
+        return offline_page([state[slot] for slot in sorted(state)], title, data)
+
+    def save_html(
+        self,
+        path: str | Path,
+        *,
+        interactive: bool = False,
+        motions: Mapping[str, Motion] | None = None,
+        title: str | None = None,
+        caption: str = "",
+        links: Mapping[str, str] | None = None,
+    ) -> Path:
+        """Write :meth:`html` to a file and return its path.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from dhkit.description.library import library_robot
+        >>> view = View(library_robot("planar2r"))
+        >>> motions = {"up": ([0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]])}
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     page = view.save_html(f"{folder}/arm.html", interactive=True, motions=motions)
+        ...     print(page.name)
+        arm.html
+        """
         path = Path(path)
-        write_atomically(path, self.html())
+        text = self.html(interactive=interactive, motions=motions, title=title, caption=caption, links=links)
+        write_atomically(path, text)
         return path
 
     def close(self) -> None:

@@ -57,11 +57,24 @@ class Page {
 
   async openLab() {
     document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href: "lab/lab.css" }));
+    const [{ Requests }, { PANELS }] = await Promise.all([import("./lab/requests.js"), import("./lab/panels.js")]);
+    await this.showLab(PANELS, (failed) => new Requests(this.connection, failed));
+    for (const message of this.early.splice(0)) this.takePanel(message);
+  }
+
+  // The panels of a page without Python, which answers itself; its style is in the page.
+  async openOffline(data) {
+    const [{ OfflineDesk }, { PANELS }] = await Promise.all([import("./offline/desk.js"), import("./offline/panels.js")]);
+    await this.showLab(PANELS, (failed) => new OfflineDesk(this, data, failed));
+    this.lab.requests.begin();
+  }
+
+  // ask: what makes the requests that answer the panels.
+  async showLab(panels, ask) {
     const { Lab } = await import("./lab/lab.js");
-    this.lab = new Lab(this);
+    this.lab = new Lab(this, panels, ask);
     this.stage.beside();
     this.takeOverlay(() => {});
-    for (const message of this.early.splice(0)) this.takePanel(message);
   }
 
   takeScene(message) {
@@ -238,6 +251,8 @@ function start() {
   const inlined = element("messages");
   if (inlined) {
     for (const text of JSON.parse(inlined.textContent)) page.receive(bytes(text));
+    const offline = element("offline");
+    if (offline) page.openOffline(JSON.parse(offline.textContent)).catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     return;
   }
   const url = new URL("socket", location.href.replace(/^http/, "ws"));

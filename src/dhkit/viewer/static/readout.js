@@ -14,7 +14,7 @@ export class Readout {
 
   set(about) {
     this.name.textContent = about.name;
-    document.title = `${about.name} · dhkit`;
+    if (!document.getElementById("messages")) document.title = `${about.name} · dhkit`; // a saved page has its own
     this.units = about.joints.map((joint) => joint.unit);
     this.joints.replaceChildren(...about.joints.map((joint) => row(joint.name)));
     this.tool.replaceChildren(...["x", "y", "z"].map(row));

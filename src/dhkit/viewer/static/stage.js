@@ -151,24 +151,48 @@ export class Stage {
     for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
     this.nodes.push(node("tool"));
     if (this.plain) this.nodes.forEach((n) => n.traverse(matt));
-    // Looked up among the children: finding a path in the tree would create it.
-    this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
-    for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
-    // A scene begins with its triads hidden: what a person has switched on stays on.
-    for (const triad of this.triads) if (triad) triad.visible = this.framesShown;
+    this.parts = null; // of Python, where others are drawn
     this.grid = node("grid", "<object>");
     this.grid.castShadow = this.grid.receiveShadow = false;
     this.grid.material.depthWrite = false;
     this.size = about.size;
     this.trail.begin(about.size);
     this.up = new THREE.Vector3(...about.up);
-    this.labels.set(about.labels);
+    this.takeParts(about.labels);
+    this.setUp();
+    this.color();
+  }
+
+  // What belongs to the nodes' present parts.
+  takeParts(labels) {
+    // Looked up among the children: finding a path in the tree would create it.
+    this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
+    for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
+    // A scene begins with its triads hidden: what a person has switched on stays on.
+    for (const triad of this.triads) if (triad) triad.visible = this.framesShown;
+    this.labels.set(labels);
     this.boxes = this.nodes.map((n) => localBox(n));
     this.warned = null;
     this.seen.makeEmpty();
     this.framed.makeEmpty();
-    this.setUp();
-    this.color();
+  }
+
+  // Draw other parts than Python's: objects of each node, and labels; null: Python's again.
+  redraw(objects, labels) {
+    this.parts ??= this.nodes.map((node) => [...node.children]);
+    this.nodes.forEach((node, i) => {
+      node.clear();
+      for (const object of objects ? [...objects[i], this.triad()] : this.parts[i]) node.add(object);
+    });
+    if (!objects) this.parts = null;
+    this.takeParts(labels);
+    this.dirty();
+  }
+
+  triad() {
+    const triad = this.axes(TRIAD * this.size, 0.004 * this.size);
+    triad.name = "frame";
+    return triad;
   }
 
   // A program whose last material goes is compiled anew for the next: the old materials go behind the next picture.
@@ -255,7 +279,7 @@ export class Stage {
     this.boxes.forEach((box, i) => {
       const at = k * this.boxes.length + i;
       const position = new THREE.Vector3().fromArray(positions, 3 * at);
-      whole.union(new THREE.Box3(position, position).expandByScalar(around));
+      whole.union(new THREE.Box3(position.clone(), position.clone()).expandByScalar(around));
       if (box.isEmpty()) return;
       pose.compose(position, new THREE.Quaternion().fromArray(quaternions, 4 * at), one);
       whole.union(box.clone().applyMatrix4(pose));
@@ -345,9 +369,16 @@ export class Stage {
     this.moving.quaternion.slerpQuaternions(p.turn, q.turn, share);
   }
 
-  // A frame of three rods, longer and thinner than the triads of the arm.
+  // A frame that is longer and thicker than the triads of the arm.
   addMoving() {
-    const axes = new THREE.Group(), length = 1.6 * TRIAD * this.size, thickness = 0.006 * this.size;
+    const axes = this.axes(1.6 * TRIAD * this.size, 0.006 * this.size);
+    this.viewer.scene.add(axes);
+    return axes;
+  }
+
+  // Three rods along x, y and z.
+  axes(length, thickness) {
+    const axes = new THREE.Group();
     AXIS_COLORS.forEach((color, k) => {
       const rod = new THREE.Mesh(new THREE.CylinderGeometry(thickness, thickness, length, 8), new THREE.MeshBasicMaterial({ color, depthTest: false, transparent: true }));
       rod.position.setComponent(k, length / 2);
@@ -356,7 +387,6 @@ export class Stage {
       rod.renderOrder = 9;
       axes.add(rod);
     });
-    this.viewer.scene.add(axes);
     return axes;
   }
 

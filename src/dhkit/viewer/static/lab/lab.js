@@ -1,40 +1,25 @@
 // The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
 
 import { h } from "./dom.js";
-import { ControlPanel } from "./control.js";
-import { JointPanel } from "./joints.js";
-import { MotionPanel } from "./motion.js";
-import { OwnPanel } from "./own.js";
-import { Requests } from "./requests.js";
-import { TablePanel } from "./table.js";
-import { ToolPanel } from "./tool.js";
-
-const PANELS = [
-  ["joints", "Joints", JointPanel],
-  ["tool", "Tool", ToolPanel],
-  ["table", "DH table", TablePanel],
-  ["motion", "Motion", MotionPanel],
-  ["control", "Control", ControlPanel],
-  ["own", "Yours", OwnPanel],
-];
 const SHORT = 6000; // ms that a message stays
 
 export class Lab {
-  constructor(page) {
+  // panels: [name, title, class] each; requests(failed): what answers them.
+  constructor(page, panels, requests) {
     this.page = page;
     this.stage = page.stage;
     this.state = {};
-    this.requests = new Requests(page.connection, (error, request) => this.complain(error, request));
+    this.requests = requests((error, request) => this.complain(error, request));
     this.units = { angle: remembered("angle", "deg"), length: remembered("length", "m") };
-    this.build();
+    this.build(panels);
     document.body.classList.add("lab");
     document.getElementById("readout").open = false;
     this.stage.resize();
   }
 
-  build() {
+  build(panels) {
     const tabs = [], bodies = [];
-    this.panels = PANELS.map(([name, title, Panel], k) => {
+    this.panels = panels.map(([name, title, Panel], k) => {
       const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
       const body = h("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}`, hidden: true });
       tabs.push(tab);
@@ -43,12 +28,12 @@ export class Lab {
     });
     this.title = h("h1", {}, "");
     this.family = h("p", { class: "family" });
-    this.copy = h("button", { type: "button", class: "quiet", title: "The lines of Python that do the same", onclick: () => this.copyPython() }, "Copy as Python");
+    this.copy = h("button", { type: "button", class: "quiet", title: "The lines of Python that do the same", hidden: !this.can("python"), onclick: () => this.copyPython() }, "Copy as Python");
     this.message = h("p", { class: "message", role: "alert", hidden: true });
     const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
     document.body.prepend(root);
     this.addViews();
-    this.open(Math.max(0, PANELS.findIndex(([name]) => name === remembered("tab", "joints"))));
+    this.open(Math.max(0, panels.findIndex(([name]) => name === remembered("tab", panels[0][0]))));
   }
 
   addViews() {
@@ -108,6 +93,11 @@ export class Lab {
     if (!player.active || !this.state.motion || this.state.control?.running) return;
     player.pause();
     await this.ask("motion.show", { time: player.time });
+  }
+
+  // Whether there is an answer to a request: a page without Python has not all of them.
+  can(name) {
+    return this.requests.can?.(name) ?? true;
   }
 
   ask(name, data) {

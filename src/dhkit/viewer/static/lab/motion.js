@@ -1,7 +1,7 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
-import { base64Of, beyond, bytes, DEGREES, fixed, h, save, touchingText, typed, unitsOf } from "./dom.js";
-import { Plot, legend } from "./plot.js";
+import { Curves, exceeding } from "./curves.js";
+import { base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
 const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
 const LARGEST_FILE = 500000; // bytes
@@ -19,9 +19,7 @@ export class MotionPanel {
     this.points = h("ol", { class: "points" });
     this.file = h("input", { type: "file", accept: ".csv,.mat,.npz,.yaml,.yml", "aria-label": "File with a motion", onchange: () => this.read() });
     this.degrees = h("input", { type: "checkbox" });
-    this.plots = { q: new Plot("joints", "° or m"), qd: new Plot("rates", "°/s or m/s"), tau: new Plot("torques", "N m or N") };
-    this.legend = h("div");
-    this.figures = h("div", { hidden: true }, this.legend, Object.values(this.plots).map((plot) => plot.root));
+    this.curves = new Curves();
     const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
     this.files = h("div", { class: "buttons", hidden: true }, this.replay, download("csv"), download("npz"), h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"));
@@ -31,7 +29,7 @@ export class MotionPanel {
       this.job,
       this.facts,
       this.files,
-      this.figures,
+      this.curves.root,
       h("fieldset", {}, h("legend", {}, "Waypoints"), h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"), h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear")), this.points),
       h("fieldset", {}, h("legend", {}, "From a file"), h("label", { class: "line" }, this.file), h("label", { class: "line" }, this.degrees, " angles in degrees")),
     );
@@ -103,18 +101,9 @@ export class MotionPanel {
 
   // An animation is at a time: so are the curves.
   moved(q, time) {
-    if (q && this.motion) this.warn(time);
+    if (q && this.motion) this.lab.stage.warn(...exceeding(this.motion, time));
     if (!q || !this.visible) return;
-    for (const plot of Object.values(this.plots)) plot.mark(time);
-  }
-
-  // What is beyond a limit at a time, or touches, is marked on the arm.
-  warn(time) {
-    const { duration, limits, q, qd, tau, times, touching } = this.motion;
-    const at = (samples) => (duration > 0 ? Math.round((time / duration) * (samples - 1)) : 0), k = at(times.length);
-    const fast = (value, limit) => limit !== null && Math.abs(value) > limit * (1 + 1e-6);
-    const joints = this.arm.joints.flatMap((_, i) => (beyond(q[k][i], limits.lower[i], limits.upper[i]) || fast(qd[k][i], limits.velocity[i]) || (tau && fast(tau[k][i], limits.effort[i])) ? [i] : []));
-    this.lab.stage.warn(joints, touching ? touching[at(touching.length)] : []);
+    this.curves.mark(time);
   }
 
   async read() {
@@ -139,35 +128,18 @@ export class MotionPanel {
 
   take_motion(motion) {
     this.motion = motion;
-    this.files.hidden = this.figures.hidden = !motion;
+    this.files.hidden = this.curves.root.hidden = !motion;
     this.facts.textContent = "";
     if (!motion) return;
     const still = this.lab.state.control?.running ? "not played: a controller moves the arm" : null;
     const touching = motion.touching && touchingText(motion.touching.find((links) => links.length));
     this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching, still].filter(Boolean).join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
-    this.draw();
-  }
-
-  draw() {
-    const { motion, arm } = this, { joints } = arm;
-    this.plots.q.setUnit(unitsOf(joints, "°", "m"));
-    this.plots.qd.setUnit(unitsOf(joints, "°/s", "m/s"));
-    this.plots.tau.setUnit(unitsOf(joints, "N m", "N"));
-    const names = joints.map((joint) => joint.name), scales = joints.map((joint) => (joint.unit === "m" ? 1 : DEGREES));
-    this.legend.replaceChildren(legend(names));
-    const curves = (rows, scale) => [motion.times, ...joints.map((_, i) => rows.map((row) => row[i] * scale[i]))];
-    const pairs = (lower, upper, scale) => joints.map((_, i) => [lower[i], upper[i]].map((x) => (x === null ? null : x * scale[i])));
-    const both = (limit, scale) => pairs(limit.map((x) => (x === null ? null : -x)), limit, scale);
-    const ones = joints.map(() => 1), { limits } = motion;
-    this.plots.q.set(names, curves(motion.q, scales), pairs(limits.lower, limits.upper, scales));
-    this.plots.qd.set(names, curves(motion.qd, scales), both(limits.velocity, scales));
-    this.plots.tau.root.hidden = !motion.tau;
-    if (motion.tau) this.plots.tau.set(names, curves(motion.tau, ones), both(limits.effort, ones));
+    this.curves.draw(motion, this.arm.joints);
   }
 
   shown(visible) {
     this.visible = visible;
-    if (visible && this.motion) requestAnimationFrame(() => Object.values(this.plots).forEach((plot) => plot.resize()));
+    if (visible && this.motion) requestAnimationFrame(() => this.curves.resize());
   }
 }

@@ -10,6 +10,7 @@ let loading = null;
 
 // uPlot's script and style, once.
 function load() {
+  if (globalThis.uPlot) return Promise.resolve(globalThis.uPlot); // a page without Python has it inside
   loading ??= new Promise((resolve, reject) => {
     document.head.append(h("link", { rel: "stylesheet", href: "lab/uplot.css" }));
     document.head.append(h("script", { src: "lab/uplot.js", onload: () => resolve(globalThis.uPlot), onerror: reject }));

@@ -21,7 +21,7 @@ export class TablePanel {
     const file = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.note = h("p", { class: "note", role: "status" });
     this.step = h("div", { class: "step" });
-    root.append(h("div", { class: "line" }, this.convention, this.frames), h("div", { class: "wide" }, h("table", { class: "dh" }, h("thead", {}, this.head), this.body)), h("div", { class: "buttons" }, this.undo, this.redo, this.reset, file("toml"), file("urdf")), this.note, h("p", { class: "hint" }, "Metres and radians; expressions such as pi/2, 90*deg or 17*inch are fine. A row's number shows its four steps."), this.step);
+    root.append(h("div", { class: "line" }, this.convention, this.frames), h("div", { class: "wide" }, h("table", { class: "dh" }, h("thead", {}, this.head), this.body)), h("div", { class: "buttons" }, this.undo, this.redo, this.reset, lab.can("table.download") ? [file("toml"), file("urdf")] : null), this.note, h("p", { class: "hint" }, "Metres and radians; expressions such as pi/2, 90*deg or 17*inch are fine. A row's number shows its four steps."), this.step);
   }
 
   showFrames() {

@@ -29,7 +29,11 @@ export class ToolPanel {
     this.clear = h("button", { type: "button", hidden: true, onclick: () => lab.ask("tool.clear") }, "Remove the target");
     this.branches = h("div", { class: "branches", role: "group", "aria-label": "Branches" });
     this.jog = this.jogs();
-    root.append(h("h2", {}, "Pose of the tool"), this.pose, this.matrix, h("div", { class: "buttons" }, this.grab, this.clear), this.note, this.jog, this.branches);
+    root.append(h("h2", {}, "Pose of the tool"), this.pose, this.matrix);
+    if (lab.can("tool.target")) root.append(h("div", { class: "buttons" }, this.grab, this.clear), this.note, this.jog, this.branches);
+    else root.append(this.note);
+    this.matrix.open = !lab.can("tool.target"); // there is room
+    for (const input of this.fields) input.readOnly = !lab.can("tool.pose");
   }
 
   jogs() {
