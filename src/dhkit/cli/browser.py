@@ -48,6 +48,6 @@ def run_view(arm: Arm, page: Path | None, *, open_browser: bool) -> int:
     check_outputs(((page, PAGES),))
     with arm.view() as view:
         if page is not None:
-            say(f"wrote {view.save_html(page)}")
+            say(f"wrote {view.save_html(page, interactive=True)}")
             return 0
         return until_interrupted(view.url, arm.name, open_browser=open_browser)

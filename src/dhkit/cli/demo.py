@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
@@ -27,6 +28,7 @@ from dhkit.symbolic import operation_count
 from dhkit.symbolic.equations import equations_latex, latex_document, readable
 from dhkit.trajectories import Trajectory
 from dhkit.verification import VerificationReport
+from dhkit.viewer.motion import Motion
 
 __all__ = ["run"]
 
@@ -34,6 +36,13 @@ PRINTED = 5_000
 """Terms of M, C and g that are printed; of longer ones M and g."""
 SAMPLES = 801
 """By which a motion's largest torque is told."""
+QUICKEST = "least time"
+PAGES = {
+    "equations.html": "the equations of motion",
+    "plan.html": "motions in least time",
+    "control.html": "simulated controllers",
+}
+"""What the arm's page leads to."""
 OWN = 1e-6
 """Share of the reach: an arm whose frames are all nearer to another's than this looks the same."""
 
@@ -74,10 +83,11 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
     stage("equations", lambda: _equations(arm, folder))
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
     shown: list[Shown] = []
+    motions: dict[str, Motion] = {}
     stage("ik", lambda: _inverse(arm, shown))
-    stage("plan", lambda: _plan(arm, folder, 16 if quick else None))
-    stage("control", lambda: _control(arm, folder))
-    stage("page", lambda: _page(arm, shown[0], folder / "index.html"))
+    stage("plan", lambda: _plan(arm, folder, 16 if quick else None, motions))
+    stage("control", lambda: _control(arm, folder, motions))
+    stage("page", lambda: _page(arm, shown[0], folder / "index.html", motions))
     ok = all(report.ok for report in reports)
     if json:
         print_json({"robot": arm.name, "folder": str(folder), "ok": ok, "stages": stages})
@@ -163,7 +173,7 @@ def _followed(line: Line | None) -> str:
     return f"a line of {line.length:.2g} m in {len(line.q)} poses: {line.switches} switches"
 
 
-def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
+def _plan(arm: Arm, folder: Path, intervals: int | None, motions: dict[str, Motion]) -> str:
     """Plan a motion in least time, and write it with what it and the quintic use of the limits, and a page of both."""
     from dhkit.viewer import plot_uses
 
@@ -173,9 +183,16 @@ def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
         return f"skipped: {error}"
     best.save(folder / "plan.npz")
     write_figure(plot_uses({"least time": best, "quintic": quintic}), folder / "plan.png")
-    with arm.view() as view:
-        view.play(there_and_back(best, quintic))
-        view.save_html(folder / "plan.html")
+    motions |= {QUICKEST: best, "the quintic between the same states": quintic}
+    both = {"there in least time, back by the quintic": there_and_back(best, quintic)}
+    _save(
+        arm,
+        folder / "plan.html",
+        "motions in least time",
+        both | motions,
+        f"A motion in {best.duration:.3f} s, the least that the limits of speed and torque allow, beside the quintic "
+        f"between the same states, {quintic.duration:.3f} s. The curves of both, with the limits, are under Motions.",
+    )
     certificate = best.report.certificate
     kept = "all limits kept" if certificate.ok else "limits NOT kept"
     return (
@@ -184,7 +201,7 @@ def _plan(arm: Arm, folder: Path, intervals: int | None) -> str:
     )
 
 
-def _control(arm: Arm, folder: Path) -> str:
+def _control(arm: Arm, folder: Path, motions: dict[str, Motion]) -> str:
     """Simulate independent joints and computed torque on one motion; write a figure, and a page of the first."""
     from dhkit.viewer import plot_comparison
 
@@ -196,9 +213,16 @@ def _control(arm: Arm, folder: Path) -> str:
     if compared.failures:
         return "; ".join(f"{name}: {reason}" for name, reason in compared.failures.items())
     write_figure(plot_comparison(compared.results), folder / "control.png")
-    with arm.view() as view:
-        view.play(compared.results["pid"])
-        view.save_html(folder / "control.html")
+    simulated = {f"simulated: {name}": result for name, result in compared.results.items()}
+    motions |= simulated
+    _save(
+        arm,
+        folder / "control.html",
+        "simulated controllers",
+        simulated,
+        "The simulated arm under two controllers; the grey arm beside it is the motion that was asked for. A PID of "
+        "each joint does not know the arm's dynamics, computed torque does.",
+    )
     errors = [f"{name} errs by {1000 * run.tool_norms.peak:.2g} mm" for name, run in compared.results.items()]
     seconds = f"{motion.duration:.3g} s at 1 kHz"
     return f"{seconds}: {', '.join(errors)}; {folder / 'control.html'}: pid, with the motion asked for as a ghost"
@@ -210,20 +234,34 @@ def _worth(motion: Trajectory) -> str:
     return f"{motion.duration:.3f} s with torques up to {largest:.0f} %"
 
 
-def _page(arm: Arm, shown: Shown, path: Path) -> str:
-    """Write a page with the arm's motion and, at the pose where that begins, its other branches as ghosts."""
+def _page(arm: Arm, shown: Shown, path: Path, motions: dict[str, Motion]) -> str:
+    """Write a page with the arm's motions and, at the pose where the first begins, its other branches as ghosts."""
     line = shown.line
     times, q = tour(arm, None if line is None else line.q)
+    first = "tour of the configurations" if line is None else "tour, with a straight line of the tool"
+    beside = _apart(arm, shown.ways.q, q[0])
+    lines = [arm.description.source, f'The motion "{first}" plays first; more are under Motions.']
+    if beside.any():
+        lines.append("Translucent arms are the other ways to reach the pose with which it begins.")
     with arm.view() as view:
-        view.ghosts(_apart(arm, shown.ways.q, q[0]))
+        view.show(q[0])
+        view.ghosts(shown.ways.q[beside], names=[x for x, drawn in zip(shown.ways.names, beside, strict=True) if drawn])
         view.trace(None if line is None else line.T[:, :3, 3])
-        view.play((times, q))
-        view.save_html(path)
-    return f"{path}, {times[-1]:.1f} s of motion"
+        links = {text: name for name, text in PAGES.items() if (path.parent / name).exists()}
+        played = {first: (times, q)} | motions
+        view.save_html(path, interactive=True, motions=played, caption="\n".join(lines), links=links)
+    return f"{path}, with sliders, the table and {1 + len(motions)} motions"
 
 
-def _apart(arm: Arm, q: Array, own: Array) -> Array:
-    """Return the states (k, n) of which something is seen beside the arm in its own: others would only tint it."""
+def _save(arm: Arm, path: Path, title: str, motions: Mapping[str, Motion], caption: str) -> None:
+    links = {"the arm, its branches and all motions": "index.html"}
+    with arm.view() as view:
+        view.save_html(
+            path, interactive=True, motions=motions, title=f"{arm.name}: {title} · dhkit", caption=caption, links=links
+        )
+
+
+def _apart(arm: Arm, q: Array, own: Array) -> NDArray[np.bool_]:
+    """Return of which states (k, n) something is seen beside the arm in its own, (k,): others would only tint it."""
     gaps = np.abs(arm.frames(q) - arm.frames(own))[..., :3, 3].max(axis=(1, 2))
-    seen: Array = q[gaps > OWN * arm.description.reach]
-    return seen
+    return np.asarray(gaps > OWN * arm.description.reach)

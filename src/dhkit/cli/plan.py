@@ -97,7 +97,7 @@ class Files:
             with task.arm.view() as view:
                 view.obstacles(task.obstacles)
                 view.play(motion)
-                yield view.save_html(self.page)
+                yield view.save_html(self.page, interactive=True)
         if self.figure is not None:
             from dhkit.viewer import plot
 

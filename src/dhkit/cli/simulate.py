@@ -46,7 +46,7 @@ class Files:
         if self.page is not None:
             with arm.view() as view:
                 view.play(result)
-                yield view.save_html(self.page)
+                yield view.save_html(self.page, interactive=True)
         if self.figure is not None:
             from dhkit.viewer import plot
 

@@ -37,6 +37,8 @@ class Branches:
 
     q: Array
     """Joint values, shape (k, n), rad and m."""
+    names: tuple[str, ...]
+    """What each is called, k texts."""
     error: float | None
     """How far fk of these is from the pose at most, m and rad; None for an arm that only aims."""
     closed_form: bool
@@ -69,13 +71,15 @@ def branches(arm: Arm, q: Array) -> Branches:
     fit = classify(arm.description).fit
     if fit is None:
         solutions = _searched(arm, T, q)
-        return Branches(solutions, float(np.abs(arm.fk(solutions) - T).max()), closed_form=False)
+        names = tuple(f"solution {k}" for k in range(1, len(solutions) + 1))
+        return Branches(solutions, names, float(np.abs(arm.fk(solutions) - T).max()), closed_form=False)
     found = arm.ik(T, seed=q)
     solutions = found.q[found.valid]
+    names = tuple(name for name, valid in zip(found.branches, found.valid, strict=True) if valid)
     missed = np.abs(arm.fk(solutions) - T)
     if len(fit.met) < 6:
         missed = missed[:, :3, 3]
-    return Branches(solutions, float(missed.max()) if "x" in fit.met else None, closed_form=True)
+    return Branches(solutions, names, float(missed.max()) if "x" in fit.met else None, closed_form=True)
 
 
 def straight_line(arm: Arm) -> Line | None:

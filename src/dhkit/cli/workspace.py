@@ -174,7 +174,9 @@ def _page(arm: Arm, space: Workspace, path: Path) -> Path:
     with arm.view() as view:
         view.points(space.positions[shown], heat_colors(space.manipulability[shown]))
         view.ellipsoid(velocity_ellipsoid(arm.description, first_configuration(arm.description)))
-        view.save_html(path)
+        view.save_html(
+            path, interactive=True, caption="Points that the tool reaches; brighter: it moves more easily there."
+        )
     return path
 
 

@@ -145,8 +145,11 @@ def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str
     data = [base64.b64encode(message).decode() for message in messages]
     style, extra, modules = _static("viewer.css"), "", list(MODULES)
     if interactive is not None:
-        style += _static("lab/lab.css") + _static("lab/uplot.css")
-        extra = _script(_json(interactive), ' type="application/json" id="offline"') + _script(_static("lab/uplot.js"))
+        style += _static("lab/lab.css")
+        extra = _script(_json(interactive), ' type="application/json" id="offline"')
+        if interactive["motions"]:  # whose curves it draws
+            style += _static("lab/uplot.css")
+            extra += _script(_static("lab/uplot.js"))
         modules += OFFLINE_MODULES
     return _replaced(
         _static("index.html"),

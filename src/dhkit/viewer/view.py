@@ -367,7 +367,13 @@ class View:
             motions = {} if played is None else {"motion": played}
         overlays = [(text, color) for slot, text, color in DRAWN_BESIDE if slot in state]
         data = interactive_data(
-            description, q, motions, caption=caption, links=links or {}, ghosts=ghosts, overlays=overlays
+            description,
+            q,
+            motions,
+            caption=caption or description.source,
+            links=links or {},
+            ghosts=ghosts,
+            overlays=overlays,
         )
         state.pop(Slot.MOTION)
         return offline_page([state[slot] for slot in sorted(state)], title, data)
