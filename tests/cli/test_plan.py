@@ -51,7 +51,9 @@ def facts(plan):
 def watched(monkeypatch, slot):
     """Return a list that takes what every page is written with."""
     messages, save = [], View.save_html
-    monkeypatch.setattr(View, "save_html", lambda view, path: messages.append(view._state[slot]) or save(view, path))
+    monkeypatch.setattr(
+        View, "save_html", lambda view, path, **about: messages.append(view._state[slot]) or save(view, path, **about)
+    )
     return messages
 
 

@@ -146,9 +146,9 @@ def test_compare_prints_a_table_and_draws_it(dhkit, tmp_path):
 def test_play_writes_pages_of_motions_and_simulations(dhkit, tmp_path, monkeypatch):
     shown, save = [], View.save_html
 
-    def spy(view, path):
+    def spy(view, path, **about):
         shown.append(view._state[Slot.MOTION])
-        return save(view, path)
+        return save(view, path, **about)
 
     monkeypatch.setattr(View, "save_html", spy)
     motion = ARM.quintic([0.1, 0.2], [0.5, -0.3], 1.0)

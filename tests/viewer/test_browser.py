@@ -213,19 +213,6 @@ def test_a_page_says_when_python_is_gone(page, signal_arm):
     assert time.monotonic() - started < LOST
 
 
-def test_a_notebook_shows_the_arm(page, signal_arm, tmp_path):
-    view = View(signal_arm)
-    frame = view._repr_html_().replace("<iframe", '<iframe sandbox="allow-scripts"')
-    (tmp_path / "notebook.html").write_text(
-        f"<!doctype html><body>{frame}<script>document.body.dataset.ready=1</script>"
-    )
-    page.call("Page.navigate", url=f"file://{tmp_path}/notebook.html")
-    deadline = time.monotonic() + 20
-    while not shows_the_arm(page.screenshot()):
-        assert time.monotonic() < deadline, page.errors
-    assert hosts(page) == []
-
-
 @pytest.mark.parametrize(
     ("size", "dark"),
     [((390, 844), False), ((390, 844), True), ((768, 1024), True), ((1200, 800), False), ((844, 390), True)],

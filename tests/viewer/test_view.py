@@ -228,12 +228,6 @@ def test_equal_views_are_equal_files():
     assert View(arm).html() == View(arm).html()
 
 
-def test_a_notebook_gets_the_state_or_the_live_page():
-    with View(library_robot("planar2r")) as view:
-        assert 'srcdoc="&lt;!doctype html&gt;' in view._repr_html_()
-        assert f'src="{view.url}"' in view._repr_html_()
-
-
 def test_a_closed_view_says_so_at_once():
     view = View(library_robot("planar2r"))
     assert view.url

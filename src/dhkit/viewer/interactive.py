@@ -118,6 +118,7 @@ def interactive_data(
         "motions": [_motion_state(description, name, motion) for name, motion in motions.items()],
         "about": {
             "caption": caption,
+            "source": description.source,
             "links": [{"text": text, "href": address} for text, address in links.items()],
             "ghosts": [{"text": text, "color": color} for text, color in ghosts],
             "overlays": [{"text": text, "color": color} for text, color in overlays],

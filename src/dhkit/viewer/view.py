@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import threading
 import webbrowser
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from dhkit.errors import ModelError
 from dhkit.viewer import protocol
 from dhkit.viewer.interactive import interactive_data
 from dhkit.viewer.motion import Motion, played_motion
+from dhkit.viewer.notebook import framed_page, notebook_widget
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
 from dhkit.viewer.page import offline_page
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["View"]
 
-IFRAME_HEIGHT = 480
 DRAWN_BESIDE = (
     (Slot.POINTS, "points of the workspace", "#7f8794"),
     (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),
@@ -88,6 +87,8 @@ class View:
         self._description = description
         self._answer, self._port, self._token = answer, port, token
         self._server: ViewerServer | None = None
+        self._widget: Any = None
+        """What shows this in a notebook."""
         self._closed = False
         self._lock = threading.RLock()
         self._state: dict[Slot, bytes] = {Slot.SCENE: self._scene(description)}
@@ -161,9 +162,10 @@ class View:
             self._description = description
             for slot in OF_ONE_ARM:
                 self._state.pop(slot, None)
-            self._ghost_names = ()
+            self._ghost_names, self._played = (), None
+            self._q = first_configuration(description) if q is None else joint_array(description, q)
             self._publish(Slot.SCENE, scene)
-            self.show(first_configuration(description) if q is None else q)
+            self.show(self._q)
 
     def panel(self, name: str, data: Any) -> None:
         """Tell pages the state of a panel, of what JSON can hold, in place of the last of this name."""
@@ -370,12 +372,12 @@ class View:
             description,
             q,
             motions,
-            caption=caption or description.source,
+            caption=caption,
             links=links or {},
             ghosts=ghosts,
             overlays=overlays,
         )
-        state.pop(Slot.MOTION)
+        state.pop(Slot.MOTION, None)
         return offline_page([state[slot] for slot in sorted(state)], title, data)
 
     def save_html(
@@ -423,12 +425,21 @@ class View:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Show the page in a notebook: live where the server runs, else the present state."""
-        server = self._server
-        source = f'src="{server.url}"' if server is not None else f'srcdoc="{html.escape(self.html())}"'
-        name = html.escape(self._description.name)
-        style = f"width: 100%; height: {IFRAME_HEIGHT}px; border: 0; border-radius: 8px"
-        return f'<iframe {source} title="{name}" style="{style}"></iframe>'
+        """Show the present state as a page of its own."""
+        return framed_page(self.html(interactive=True), self._description.name)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any] | Any:
+        """Show the page in a notebook, such that it follows :meth:`show` where anywidget is installed."""
+        page = self.html(interactive=True)
+        with self._lock:
+            if self._widget is None:
+                self._widget = notebook_widget(page, self._description.name)
+            else:
+                self._widget.page = page
+            widget = self._widget
+        if widget is None:
+            return {"text/html": framed_page(page, self._description.name), "text/plain": repr(self)}
+        return widget._repr_mimebundle_(include=include, exclude=exclude)
 
     def _scene(self, description: Description) -> bytes:
         from dhkit.model.shapes import link_parts
@@ -454,3 +465,11 @@ class View:
             self._state[slot] = message
             if self._server is not None:
                 self._server.publish(slot, message)
+            if self._widget is None:
+                return
+            if slot == Slot.SCENE:
+                self._widget.page = self.html(interactive=True)
+            elif slot == Slot.MOTION and self._played is None:
+                self._widget.send({"q": self._q.tolist()})
+            else:
+                self._widget.send({}, [message])

@@ -62,17 +62,23 @@ class Page {
     for (const message of this.early.splice(0)) this.takePanel(message);
   }
 
+  // Joint values that come from the page around this one.
+  showJoints(q) {
+    this.lab?.requests.show?.(q);
+  }
+
   // The panels of a page without Python, which answers itself; its style is in the page.
   async openOffline(data) {
     const [{ OfflineDesk }, { PANELS }] = await Promise.all([import("./offline/desk.js"), import("./offline/panels.js")]);
-    await this.showLab(PANELS, (failed) => new OfflineDesk(this, data, failed));
+    await this.showLab(PANELS, (failed) => new OfflineDesk(this, data, failed), data.about.caption || data.motions.length ? "about" : "joints");
     this.lab.requests.begin();
+    if (parent !== window) parent.postMessage("ready", "*");
   }
 
-  // ask: what makes the requests that answer the panels.
-  async showLab(panels, ask) {
+  // ask: what makes the requests that answer the panels; first: the panel that is open at first.
+  async showLab(panels, ask, first = "joints") {
     const { Lab } = await import("./lab/lab.js");
-    this.lab = new Lab(this, panels, ask);
+    this.lab = new Lab(this, panels, ask, first);
     this.stage.beside();
     this.takeOverlay(() => {});
   }
@@ -251,6 +257,7 @@ function start() {
   const inlined = element("messages");
   if (inlined) {
     for (const text of JSON.parse(inlined.textContent)) page.receive(bytes(text));
+    follow(page);
     const offline = element("offline");
     if (offline) page.openOffline(JSON.parse(offline.textContent)).catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     return;
@@ -263,6 +270,16 @@ function start() {
     lost: () => page.lab?.requests.drop(),
   });
   banner("Connecting to Python …");
+}
+
+// A page in a frame, such as a notebook's output, is moved by the page around it: {q}, or a message of Python.
+function follow(page) {
+  if (parent === window) return;
+  addEventListener("message", ({ source, data }) => {
+    if (source !== parent) return;
+    if (data instanceof ArrayBuffer) page.receive(data);
+    else if (Array.isArray(data?.q)) page.showJoints(data.q);
+  });
 }
 
 function bytes(base64) {

@@ -5,19 +5,19 @@ const SHORT = 6000; // ms that a message stays
 
 export class Lab {
   // panels: [name, title, class] each; requests(failed): what answers them.
-  constructor(page, panels, requests) {
+  constructor(page, panels, requests, first) {
     this.page = page;
     this.stage = page.stage;
     this.state = {};
     this.requests = requests((error, request) => this.complain(error, request));
     this.units = { angle: remembered("angle", "deg"), length: remembered("length", "m") };
-    this.build(panels);
+    this.build(panels, first);
     document.body.classList.add("lab");
     document.getElementById("readout").open = false;
     this.stage.resize();
   }
 
-  build(panels) {
+  build(panels, first) {
     const tabs = [], bodies = [];
     this.panels = panels.map(([name, title, Panel], k) => {
       const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
@@ -33,7 +33,7 @@ export class Lab {
     const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
     document.body.prepend(root);
     this.addViews();
-    this.open(Math.max(0, panels.findIndex(([name]) => name === remembered("tab", panels[0][0]))));
+    this.open(Math.max(0, panels.findIndex(([name]) => name === remembered("tab", first))));
   }
 
   addViews() {

@@ -8,14 +8,14 @@ export class AboutPanel {
     this.root = root;
   }
 
-  take_about({ caption, ghosts, links, overlays }) {
+  take_about({ caption, ghosts, links, overlays, source }) {
     const swatch = (color) => h("i", { style: `background:${color}` });
     const meaning = (color, text) => h("li", {}, swatch(color), text);
     const colors = [meaning("var(--accent)", "orange: the tool's path, and links beyond a limit")];
     colors.push(h("li", {}, swatch("#e5484d"), swatch("#30a46c"), swatch("#3b82f6"), "red, green and blue: the x, y and z axis of a frame"));
     colors.push(...ghosts.map(({ text, color }) => meaning(color, text)), ...overlays.map(({ text, color }) => meaning(color, text)));
     this.root.replaceChildren(
-      ...caption.split("\n").filter((text) => text.trim()).map((text) => h("p", { class: "caption" }, text)),
+      ...(caption || source).split("\n").filter((text) => text.trim()).map((text) => h("p", { class: "caption" }, text)),
       h("h2", {}, "Colours"),
       h("ul", { class: "colors" }, colors),
       ...(links.length ? [h("h2", {}, "Read on"), h("ul", { class: "links" }, links.map(({ text, href }) => h("li", {}, h("a", { href }, text))))] : []),
