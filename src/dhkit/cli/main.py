@@ -417,6 +417,37 @@ def play(
 
 
 @app.command()
+def picture(
+    robot: Robot,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file: .png, or .gif of a motion.")],
+    at: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Joint values, or the name of a configuration.")
+    ] = None,
+    motion: Annotated[Path | None, typer.Option(help="A motion or a simulation: pictures of it.")] = None,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Width and height, px.")] = None,
+    count: Annotated[int, typer.Option(min=2, max=900, help="PNG files of a motion.")] = 6,
+    rate: Annotated[float, typer.Option(min=1, max=50, help="Pictures a second of a GIF.")] = 15.0,
+    frames: Annotated[bool, typer.Option("--frames", help="Draw the DH frames.")] = False,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles are in degrees.")] = False,
+) -> int:
+    """Write a picture of an arm, or of a motion: PNG files or a GIF; no browser is needed."""
+    from dhkit.cli import picture as picture_command
+
+    words = None if at is None else [at]
+    return picture_command.run(
+        Arm.load(robot),
+        output,
+        at=words,
+        motion=motion,
+        size=size,
+        count=count,
+        rate=rate,
+        frames=frames,
+        degrees=degrees,
+    )
+
+
+@app.command()
 def lab(
     robot: Robot,
     port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,

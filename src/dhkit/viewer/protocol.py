@@ -51,6 +51,7 @@ __all__ = [
     "ProtocolError",
     "decode_animation",
     "decode_ellipsoids",
+    "decode_frames",
     "decode_ghosts",
     "decode_header",
     "decode_obstacles",
@@ -334,6 +335,11 @@ def decode_obstacles(message: bytes) -> Obstacles:
 def encode_frames(visible: bool) -> bytes:
     """Return a message that shows or hides the triads with their labels."""
     return message_header(MessageType.FRAMES, flags=FLAG * visible)
+
+
+def decode_frames(message: bytes) -> bool:
+    """Return whether a message shows the triads."""
+    return bool(_expect(message, MessageType.FRAMES).flags & FLAG)
 
 
 def stamped(message: bytes, sequence: int) -> bytes:

@@ -16,16 +16,18 @@ from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
-from dhkit.viewer.interactive import interactive_data
 from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.notebook import framed_page, notebook_widget
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
-from dhkit.viewer.page import offline_page
+from dhkit.viewer.picture_files import write_png
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
 from dhkit.viewer.session import OF_ONE_ARM, Slot
+from dhkit.viewer.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from types import TracebackType
+
+    from PIL.Image import Image
 
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
@@ -34,12 +36,6 @@ if TYPE_CHECKING:
 
 __all__ = ["View"]
 
-DRAWN_BESIDE = (
-    (Slot.POINTS, "points of the workspace", "#7f8794"),
-    (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),
-    (Slot.OBSTACLES, "obstacles", "var(--obstacle)"),
-)
-"""What a page says of things drawn beside the arm, and in which color of its style."""
 ELLIPSOID = 0.25
 """What an ellipsoid's longest half axis is drawn as, of the arm's size."""
 
@@ -359,26 +355,7 @@ class View:
         ValueError, TypeError, DescriptionError
             A motion that cannot be played: see :meth:`play`.
         """
-        with self._lock:
-            state, description, played = dict(self._state), self._description, self._played
-            q, ghosts = self._q, self._ghost_names
-        title = f"{description.name} · dhkit" if title is None else title
-        if not interactive:
-            return offline_page([state[slot] for slot in sorted(state)], title)
-        if motions is None:
-            motions = {} if played is None else {"motion": played}
-        overlays = [(text, color) for slot, text, color in DRAWN_BESIDE if slot in state]
-        data = interactive_data(
-            description,
-            q,
-            motions,
-            caption=caption,
-            links=links or {},
-            ghosts=ghosts,
-            overlays=overlays,
-        )
-        state.pop(Slot.MOTION, None)
-        return offline_page([state[slot] for slot in sorted(state)], title, data)
+        return self._snapshot().page(interactive, motions, title, caption, links or {})
 
     def save_html(
         self,
@@ -407,6 +384,30 @@ class View:
         text = self.html(interactive=interactive, motions=motions, title=title, caption=caption, links=links)
         write_atomically(path, text)
         return path
+
+    def picture(self, size: tuple[int, int] = (960, 720)) -> Image:
+        """Return the present state as a picture, with ghosts, path and frames, drawn without a browser.
+
+        Parameters
+        ----------
+        size
+            Width and height, px.
+        """
+        return self._snapshot().picture(size)
+
+    def save_png(self, path: str | Path, size: tuple[int, int] = (960, 720)) -> Path:
+        """Write :meth:`picture` as PNG and return the path."""
+        return write_png(self.picture(size), path)
+
+    def save_gif(self, path: str | Path, size: tuple[int, int] = (480, 360), rate: float = 15.0) -> Path:
+        """Write the motion that was last given to :meth:`play` as a GIF, so many pictures a second; return the path.
+
+        Raises
+        ------
+        ValueError
+            No motion is on show, or one of more than 900 pictures.
+        """
+        return self._snapshot().write_gif(path, size, rate)
 
     def close(self) -> None:
         """Stop the server; pages say that the connection is lost, and the view cannot be moved any more."""
@@ -440,6 +441,10 @@ class View:
         if widget is None:
             return {"text/html": framed_page(page, self._description.name), "text/plain": repr(self)}
         return widget._repr_mimebundle_(include=include, exclude=exclude)
+
+    def _snapshot(self) -> Snapshot:
+        with self._lock:
+            return Snapshot(self._description, dict(self._state), self._q, self._played, self._ghost_names)
 
     def _scene(self, description: Description) -> bytes:
         from dhkit.model.shapes import link_parts

@@ -1,0 +1,61 @@
+"""`dhkit picture`: an arm, or a motion of a file, as PNG or GIF."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from dhkit.arm import Arm
+from dhkit.cli.arguments import joint_values
+from dhkit.cli.output import say
+from dhkit.cli.outputs import check_outputs
+from dhkit.control import SimulationResult
+from dhkit.control.result_files import SIMULATION
+from dhkit.errors import DescriptionError
+from dhkit.trajectories import read_motion, written_by_dhkit
+from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs, write_png
+from dhkit.viewer.pictures import picture
+
+__all__ = ["run"]
+
+SIZE = re.compile(r"(\d{1,5})x(\d{1,5})")
+
+
+def run(
+    arm: Arm,
+    output: Path,
+    *,
+    at: Sequence[str] | None,
+    motion: Path | None,
+    size: str | None,
+    count: int,
+    rate: float,
+    frames: bool,
+    degrees: bool,
+) -> int:
+    """Write a picture of an arm, or pictures of a motion."""
+    moving = motion is not None
+    check_outputs(((output, (".png", ".gif") if moving else (".png",)),))
+    if moving and at is not None:
+        raise DescriptionError("--at and --motion: expected one of them")
+    shape = _size(size or ("480x360" if output.suffix.lower() == ".gif" else "960x720"))
+    if motion is None:
+        q = None if at is None else joint_values(arm, at, degrees)
+        say(f"wrote {write_png(picture(arm.description, q, size=shape, frames=frames), output)}")
+        return 0
+    simulated = written_by_dhkit(motion) == SIMULATION.title
+    played = SimulationResult.load(motion) if simulated else read_motion(motion, arm.description, degrees=degrees)
+    if output.suffix.lower() == ".gif":
+        say(f"wrote {write_motion_gif(arm.description, played, output, rate=rate, size=shape, frames=frames)}")
+        return 0
+    for path in write_motion_pngs(arm.description, played, output, count=count, size=shape, frames=frames):
+        say(f"wrote {path}")
+    return 0
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = SIZE.fullmatch(text)
+    if found is None:
+        raise DescriptionError(f"--size {text[:40]}: expected width and height in px, such as 960x720")
+    return int(found[1]), int(found[2])
