@@ -126,7 +126,7 @@ def test_the_schema_is_printed(dhkit):
         (["verify", "ur5", "--samples", "0"], "Invalid value"),
         (["verify", "ur5", "--samples", "many"], "Invalid value"),
         (["build", "ur5", "-o", "/nowhere/at/all.urdf"], "no such folder"),
-        (["schema", "cake"], "no schema 'cake'; expected robot"),
+        (["schema", "cake"], "no schema 'cake'; expected robot or assignment"),
         (["demo", "--robot", "cake"], "no robot 'cake'"),
     ],
 )

@@ -19,3 +19,26 @@ def open_lab():
     yield make
     for lab in opened:
         lab.close()
+
+
+@pytest.fixture
+def open_page(chromium, open_lab):
+    """Return what opens a lab and a page on it, checked at the end: no error, and no request to anyone else."""
+    pages = []
+
+    def make(name, **size):
+        lab = open_lab(name)
+        page = chromium.page(**({"width": 1280, "height": 800} | size))
+        pages.append((page, lab.url))
+        page.open(lab.url)
+        page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints")
+        return lab, page
+
+    yield make
+    for page, url in pages:
+        own = url.removeprefix("http://").split("/")[0]
+        hosts = {address.split("/")[2] for address in page.requests if not address.startswith(("data:", "blob:"))}
+        errors = page.errors
+        page.close()
+        assert errors == []
+        assert hosts == {own}

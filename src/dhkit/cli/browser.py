@@ -10,7 +10,8 @@ from pathlib import Path
 from dhkit.arm import Arm
 from dhkit.cli.output import say
 from dhkit.cli.outputs import PAGES, check_outputs
-from dhkit.lab import serve
+from dhkit.lab import Assignment, serve
+from dhkit.lab.assignment import is_assignment
 from dhkit.programs import protect_from_children
 
 __all__ = ["run_lab", "run_view", "until_interrupted"]
@@ -29,18 +30,31 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
 
 
 def run_lab(
-    arm: Arm,
+    robot: str,
     port: int | None,
     *,
     open_browser: bool,
     own: Path | Sequence[str] | None = None,
     sandbox: str | None = None,
+    solid: Path | None = None,
 ) -> int:
-    """Serve a lab."""
+    """Serve a lab of a robot, or of an assignment."""
+    assignment = Assignment.read(robot) if is_assignment(robot) else None
+    arm = Arm.load(robot) if assignment is None else assignment.arm
+    what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
     if own is not None:
         protect_from_children()
-    with serve(arm, block=False, port=port, open_browser=False, own=own, sandbox=sandbox) as lab:
-        return until_interrupted(lab.url, f"the lab of {arm.name}", open_browser=open_browser)
+    with serve(
+        arm,
+        block=False,
+        port=port,
+        open_browser=False,
+        own=own,
+        sandbox=sandbox,
+        solid=solid,
+        assignment=assignment,
+    ) as lab:
+        return until_interrupted(lab.url, what, open_browser=open_browser)
 
 
 def run_view(arm: Arm, page: Path | None, *, open_browser: bool) -> int:

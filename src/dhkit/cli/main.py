@@ -449,7 +449,7 @@ def picture(
 
 @app.command()
 def lab(
-    robot: Robot,
+    robot: Annotated[str, typer.Argument(help="A library name, a robot file or an assignment (.toml).")],
     port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,
     mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
     run: Annotated[
@@ -457,6 +457,7 @@ def lab(
     ] = None,
     arguments: Annotated[list[str] | None, typer.Argument(help="Of the program of --run.")] = None,
     sandbox: Annotated[str | None, typer.Option(help="bwrap: your program in bubblewrap.")] = None,
+    solid: Annotated[Path | None, typer.Option(help="An STL file for the panel of transforms.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> int:
     """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
@@ -467,7 +468,7 @@ def lab(
     if arguments and run is None:
         raise DescriptionError(f"{arguments[0]!r} behind the robot; expected --run PROGRAM for arguments")
     own = mine if run is None else [run, *(arguments or [])]
-    return browser.run_lab(Arm.load(robot), port, open_browser=not no_browser, own=own, sandbox=sandbox)
+    return browser.run_lab(robot, port, open_browser=not no_browser, own=own, sandbox=sandbox, solid=solid)
 
 
 @app.command()
@@ -656,13 +657,18 @@ def bench(
 
 
 @app.command()
-def schema(what: Annotated[str, typer.Argument(help="Which file: robot.")]) -> None:
+def schema(what: Annotated[str, typer.Argument(help="Which file: robot or assignment.")]) -> None:
     """Print the JSON Schema of a file format."""
-    from dhkit.description.schema import robot_schema
+    if what == "robot":
+        from dhkit.description.schema import robot_schema
 
-    if what != "robot":
-        raise DescriptionError(f"no schema {what!r}; expected robot")
-    print_json(robot_schema(), indent=2)
+        print_json(robot_schema(), indent=2)
+    elif what == "assignment":
+        from dhkit.lab.assignment_form import assignment_schema
+
+        print_json(assignment_schema(), indent=2)
+    else:
+        raise DescriptionError(f"no schema {what!r}; expected robot or assignment")
 
 
 @app.command()

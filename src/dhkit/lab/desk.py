@@ -58,6 +58,8 @@ class Desk:
         self._contacts = Contacts()
         self.aimed: Array | None = None
         """Joint values at the target of the tool, which a simulation may follow, shape (n,)."""
+        self.shown: list[Callable[[Array], None]] = []
+        """Called with the joint values, shape (n,), of every state that is shown."""
         self.changed: list[Callable[[], None]] = []
         """Called after another arm has taken this one's place."""
 
@@ -90,6 +92,8 @@ class Desk:
         self.q = q.copy()
         self.view.show(self.q)
         self.publish_state()
+        for call in self.shown:
+            call(self.q)
 
     def publish(self) -> None:
         """Tell the pages everything about the arm, and its state."""

@@ -10,16 +10,22 @@ from typing import Any
 
 from dhkit.arm import Arm
 from dhkit.errors import ModelError
+from dhkit.lab.assignment import Assignment
 from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import Desk
+from dhkit.lab.dynamics_panel import DynamicsPanel
 from dhkit.lab.fields import Fields
 from dhkit.lab.jobs import Jobs
 from dhkit.lab.joint_panel import JointPanel
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_lines import python_lines
+from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import TablePanel
+from dhkit.lab.task_panel import TaskPanel
 from dhkit.lab.tool_panel import ToolPanel
+from dhkit.lab.transforms_panel import Solid, TransformsPanel
+from dhkit.lab.workspace_panel import WorkspacePanel
 from dhkit.viewer import View
 
 __all__ = ["Lab"]
@@ -40,6 +46,10 @@ class Lab:
         command; see :class:`dhkit.programs.Program`.
     sandbox
         What it runs in: ``"bwrap"``, or None.
+    solid
+        What the panel of transforms turns and moves: an ``.stl`` file, a box unless given.
+    assignment
+        Texts and goals that the page shows first; its robot is the arm.
     port, token
         Where the page is, for pages that are to find it again; any free port and a new token unless given.
 
@@ -47,6 +57,8 @@ class Lab:
     ------
     ModelError
         A mesh that cannot be read, or the server did not start.
+    DescriptionError
+        The assignment is about another robot.
 
     Examples
     --------
@@ -62,11 +74,18 @@ class Lab:
         token: str | None = None,
         own: Path | Sequence[str] | None = None,
         sandbox: str | None = None,
+        solid: Path | None = None,
+        assignment: Assignment | None = None,
     ) -> None:
+        if assignment is not None:
+            assignment.require(arm)
         self._lock = threading.RLock()
         self._closed = False
+        given = None if solid is None else Solid.read(solid)
         self.view = View(arm.description, answer=self.answer, port=port, token=token)
         self.desk = Desk(arm, self.view)
+        if assignment is not None and assignment.start is not None:
+            self.desk.q = assignment.start.copy()
         jobs = Jobs(lambda state: self.view.panel("job", state), self._lock)
         joints = JointPanel(self.desk)
         self._tool = ToolPanel(self.desk)
@@ -74,6 +93,11 @@ class Lab:
         self._motions = MotionPanel(self.desk, jobs)
         self._own = OwnPanel(self.desk, own, sandbox)
         self._control = ControlPanel(self.desk, self._motions, self._own)
+        self._dynamics = DynamicsPanel(self.desk)
+        self._workspace = WorkspacePanel(self.desk)
+        self._submit = SubmitPanel(self.desk)
+        transforms = TransformsPanel(self.desk, given)
+        task = TaskPanel(self.desk, self._motions, self._own, assignment)
         self._requests: dict[str, Callable[[dict[str, Any]], Any]] = {
             "joints.set": joints.set,
             "joints.named": joints.named,
@@ -110,6 +134,15 @@ class Lab:
             "control.download": self._control.download,
             "own.ghosts": self._own.ghosts,
             "own.score": self._own.score,
+            "dynamics.read": self._dynamics.read,
+            "dynamics.ellipsoid": self._dynamics.ellipsoid,
+            "dynamics.entry": self._dynamics.entry,
+            "workspace.show": self._workspace.show,
+            "workspace.read": self._workspace.read,
+            "transforms.apply": transforms.apply,
+            "submit.grade": self._submit.grade,
+            "submit.cancel": self._submit.cancel,
+            "task.reset": task.reset,
             "bodies.assume": self._control.assume,
             "arm.planar": self._control.lock_to_planar,
             "python": self._python,
@@ -119,6 +152,10 @@ class Lab:
         table.publish()
         self._motions.publish()
         self._control.publish()
+        self._dynamics.publish()
+        self._workspace.publish()
+        transforms.publish()
+        task.publish()
         self._own.begin()
 
     @property
@@ -151,6 +188,8 @@ class Lab:
         self._motions.close()
         self._control.close()
         self._own.close()
+        for panel in (self._dynamics, self._workspace, self._submit):
+            panel.close()
         self.desk.close()
         self.view.close()
 

@@ -52,6 +52,8 @@ class MotionPanel:
     def __init__(self, desk: Desk, jobs: Jobs) -> None:
         self.desk, self.jobs = desk, jobs
         self.motion: Trajectory | None = None
+        self.excess: str | None = None
+        """The limit that the motion exceeds most, in words."""
         self.kind = ""
         self.waypoints: list[Array] = []
         self.changed: list[Callable[[], None]] = []
@@ -233,6 +235,7 @@ class MotionPanel:
         times = np.linspace(0.0, motion.duration, SHOWN)
         shown, speeds = motion.q(times), motion.qd(times)
         torques = motion.tau(times) if all(joint.bodies for joint in arm.description.joints) else None
+        excess = exceeded_limit(arm.description, shown, speeds, torques)
         state = {
             "kind": kind,
             "duration": motion.duration,
@@ -242,13 +245,13 @@ class MotionPanel:
             "tau": None if torques is None else torques.tolist(),
             "limits": limits_state(arm.description),
             "touching": None,
-            "excess": exceeded_limit(arm.description, shown, speeds, torques),
+            "excess": excess,
         }
         q = motion.q(np.linspace(0.0, motion.duration, CHECKED))
         if not np.isfinite(q).all() or np.abs(q).max() > LARGEST_JOINT_VALUE:
             raise ValueError(f"the motion's joint values go beyond {LARGEST_JOINT_VALUE:g}")
         self.desk.view.panel("motion", state)
-        self.motion, self.kind, self.made = motion, kind, made
+        self.motion, self.excess, self.kind, self.made = motion, excess, kind, made
         if not planned:
             self.jobs.cancel()
             self.desk.view.panel("job", None)

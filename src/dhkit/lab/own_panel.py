@@ -41,6 +41,8 @@ class OwnPanel:
         self.desk, self.source, self._sandbox = desk, source, sandbox
         self.changed: list[Callable[[], None]] = []
         """Called when there are other functions."""
+        self.scored: list[Callable[[Arm, dict[str, Any]], None]] = []
+        """Called with a score, as :meth:`dhkit.programs.CheckReport.to_dict` has it, and the arm that it is about."""
         self._state: dict[str, Any] = {}
         self._seen: Any = None
         self._lock = threading.Lock()
@@ -211,8 +213,13 @@ class OwnPanel:
             except DhkitError as error:
                 return {"error": str(error)}
 
+        def take(report: dict[str, Any]) -> None:
+            self._tell(scoring=False, report=report)
+            for call in self.scored:
+                call(arm, report)
+
         self._tell(scoring=True)
-        self._scores.start("score", work, lambda report: self._tell(scoring=False, report=report))
+        self._scores.start("score", work, take)
 
 
 def _forward(arm: Arm, q: Array, program: Program) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from dhkit.arm import Arm
 from dhkit.description import write_atomically
 from dhkit.errors import ModelError
+from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
 
 __all__ = ["serve"]
@@ -31,6 +32,8 @@ def serve(
     open_browser: bool = True,
     own: Path | Sequence[str] | None = None,
     sandbox: str | None = None,
+    solid: Path | None = None,
+    assignment: Assignment | str | Path | None = None,
 ) -> Lab:
     """Open a lab in the browser.
 
@@ -47,6 +50,10 @@ def serve(
         Whether the page is opened in the default browser.
     own, sandbox
         A program that is held against the arm, and what it runs in: see :class:`Lab`.
+    solid
+        An ``.stl`` file for the panel of transforms; a box unless given.
+    assignment
+        Texts and goals about this arm: read, or the file.
 
     Returns
     -------
@@ -57,6 +64,8 @@ def serve(
     ------
     ModelError
         The server did not start, or the place where a port's token is kept can be written by others.
+    DescriptionError
+        The assignment cannot be read, or is about another robot.
     ValueError
         A port that is none for programs of users.
 
@@ -70,7 +79,8 @@ def serve(
     """
     if port is not None and not 1024 <= port < 65_536:
         raise ValueError(f"port is {port}; expected 1024 to 65535")
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox)
+    given = Assignment.read(assignment) if isinstance(assignment, (str, Path)) else assignment
+    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox, solid, given)
     if not block:
         if open_browser:
             webbrowser.open(lab.url)

@@ -17,7 +17,7 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
 from dhkit.viewer.interactive import COLUMNS, table_texts
 
-__all__ = ["TablePanel"]
+__all__ = ["TablePanel", "moved", "turned", "typed"]
 
 MOST_STEPS = 200
 """Of undo."""
@@ -57,7 +57,7 @@ class TablePanel:
         fields = Fields("table.edit", data, ["row", "column", "text"])
         row = fields.whole("row", 0, self.desk.arm.n - 1)
         column = COLUMNS.index(fields.choice("column", COLUMNS))
-        text = _typed(fields.text("text").strip())
+        text = typed(fields.text("text").strip())
         texts = [list(entries) for entries in self._now.texts]
         texts[row][column] = text
         table = self._read(tuple(map(tuple, texts)), self._now.description)
@@ -103,8 +103,8 @@ class TablePanel:
         T = arm.frames(q)[row]
         A = np.eye(4)
         steps = [{"title": f"frame {row}", "T": T.ravel().tolist()}]
-        for title, moved in _elementary(arm.description, q, row):
-            A = A @ moved
+        for title, step in _elementary(arm.description, q, row):
+            A = A @ step
             steps.append({"title": title, "T": (T @ A).ravel().tolist()})
         return {"steps": steps, "A": A.ravel().tolist()}
 
@@ -211,7 +211,7 @@ class TablePanel:
         self.publish()
 
 
-def _typed(text: str) -> str:
+def typed(text: str) -> str:
     """Return an entry as expressions are written: 90° is 90*deg, π is pi, a decimal comma a point."""
     return re.sub(r"(?<=\d),(?=\d)", ".", text.replace("°", "*deg").replace("π", "pi").replace("−", "-"))
 
@@ -229,16 +229,17 @@ def _elementary(description: Description, q: Array, row: int) -> list[tuple[str,
     theta = float(numbers.theta[row] + (0.0 if slides else q[row]))
     d = float(numbers.d[row] + (q[row] if slides else 0.0))
     a, alpha = float(numbers.a[row]), float(numbers.alpha[row])
-    turned = (f"turn about z by {np.degrees(theta):.4g}°", _turned(2, theta))
-    along = (f"move along z by {d:.4g} m", _moved(2, d))
-    shifted = (f"move along x by {a:.4g} m", _moved(0, a))
-    twisted = (f"turn about x by {np.degrees(alpha):.4g}°", _turned(0, alpha))
+    about_z = (f"turn about z by {np.degrees(theta):.4g}°", turned(2, theta))
+    along_z = (f"move along z by {d:.4g} m", moved(2, d))
+    along_x = (f"move along x by {a:.4g} m", moved(0, a))
+    about_x = (f"turn about x by {np.degrees(alpha):.4g}°", turned(0, alpha))
     if description.convention is Convention.STANDARD:
-        return [turned, along, shifted, twisted]
-    return [twisted, shifted, turned, along]
+        return [about_z, along_z, along_x, about_x]
+    return [about_x, along_x, about_z, along_z]
 
 
-def _turned(axis: int, angle: float) -> Array:
+def turned(axis: int, angle: float) -> Array:
+    """Return a rotation about x, y or z (0, 1, 2), rad, shape (4, 4)."""
     T = np.eye(4)
     i, j = [(1, 2), (2, 0), (0, 1)][axis]
     T[i, i] = T[j, j] = np.cos(angle)
@@ -246,7 +247,8 @@ def _turned(axis: int, angle: float) -> Array:
     return T
 
 
-def _moved(axis: int, length: float) -> Array:
+def moved(axis: int, length: float) -> Array:
+    """Return a translation along x, y or z (0, 1, 2), m, shape (4, 4)."""
     T = np.eye(4)
     T[axis, 3] = length
     return T

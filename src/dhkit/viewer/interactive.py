@@ -66,6 +66,7 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
         "closed_form": fit.fit is not None,
         "bodies": all(joint.bodies for joint in description.joints),
         "assumed_bodies": assumed_bodies,
+        "parameters": list(numbers.values),
         "reach": description.reach,
     }
 

@@ -50,6 +50,12 @@ LAB_FILES = (
     "curves.js",
     "own.js",
     "control.js",
+    "dynamics.js",
+    "workspace.js",
+    "transforms.js",
+    "submit.js",
+    "formula.js",
+    "task.js",
     "plot.js",
     "uplot.js",
     "uplot.css",
@@ -122,7 +128,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     ModelError
         As :func:`meshcat_bundle`.
     """
-    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in LAB_FILES))
+    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in LAB_FILES), "offline/kinematics.js")
     files = {name: (f"{CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
     files[""] = files.pop("index.html")
     files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())

@@ -31,7 +31,7 @@ class Page {
       [ANIMATION]: () => this.takeAnimation(message),
       [TRACE]: () => this.stage.setTrace(this.stage.given, message.points),
       [FRAMES]: () => this.showFrames(message.flag),
-      [POINTS]: () => this.takeOverlay(() => this.stage.setPoints(message)),
+      [POINTS]: () => this.takePoints(message),
       [ELLIPSOIDS]: () => this.takeOverlay(() => this.stage.setEllipsoids(message)),
       [GHOSTS]: () => this.takeOverlay(() => this.stage.setGhosts(message)),
       [OBSTACLES]: () => this.takeOverlay(() => this.stage.setObstacles(message)),
@@ -125,6 +125,11 @@ class Page {
     this.stage.setTrace(this.stage.drawn, points);
     this.stage.trail.clear();
     this.player.load(motion.times[motion.times.length - 1]);
+  }
+
+  takePoints(message) {
+    this.takeOverlay(() => this.stage.setPoints(message));
+    if (this.lab && message.points.length) this.stage.frameAll();
   }
 
   takeOverlay(draw) {

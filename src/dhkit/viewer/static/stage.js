@@ -58,6 +58,7 @@ export class Stage {
     this.held = false; // whether it does not move at all: a person drags something
     this.preset = null; // direction to look from
     this.overlays = new Overlays(this.viewer.scene, THREE);
+    this.rendered = []; // called after each picture
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.color());
     this.color();
@@ -246,6 +247,13 @@ export class Stage {
     this.seen.union(this.boxOf(placement));
     if (!this.steady) this.overlays.growBox(this.seen);
     if (this.held || this.touched || this.framed.containsBox(this.seen)) return;
+    this.frame(this.seen);
+  }
+
+  // Take what is drawn beside the arm into view, unless someone has turned the camera.
+  frameAll() {
+    if (this.touched) return;
+    this.overlays.growBox(this.seen);
     this.frame(this.seen);
   }
 
@@ -486,6 +494,7 @@ export class Stage {
     for (const material of this.old.splice(0)) material.dispose();
     this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
+    for (const call of this.rendered) call();
     const named = this.naming && this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
     this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));
   }

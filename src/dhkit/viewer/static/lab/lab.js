@@ -20,11 +20,11 @@ export class Lab {
   build(panels, first) {
     const tabs = [], bodies = [];
     this.panels = panels.map(([name, title, Panel], k) => {
-      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
+      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, hidden: Boolean(Panel.optional), onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
       const body = h("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}`, hidden: true });
       tabs.push(tab);
       bodies.push(body);
-      return { name, tab, body, panel: new Panel(this, body) };
+      return { name, title, tab, body, panel: new Panel(this, body), against: new Set(Panel.optional ? [name] : []) };
     });
     this.title = h("h1", {}, "");
     this.family = h("p", { class: "family" });
@@ -33,7 +33,8 @@ export class Lab {
     const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
     document.body.prepend(root);
     this.addViews();
-    this.open(Math.max(0, panels.findIndex(([name]) => name === remembered("tab", first))));
+    const wanted = [remembered("tab", first), first].map((name) => this.panels.findIndex((panel) => panel.name === name));
+    this.open(Math.max(0, wanted.find((k) => k >= 0) ?? 0));
   }
 
   addViews() {
@@ -51,11 +52,22 @@ export class Lab {
     remember("tab", this.panels[k].name);
   }
 
-  // A panel that is not for every lab.
-  showTab(name, visible) {
-    const k = this.panels.findIndex((panel) => panel.name === name), { tab } = this.panels[k];
-    tab.hidden = !visible;
-    if (!visible && tab.getAttribute("aria-selected") === "true") this.open(0);
+  // A panel that is not for every lab. Who hides it: it is there when nobody does, in whatever order they say so.
+  showTab(name, visible, who = name) {
+    const { tab, against } = this.panels.find((panel) => panel.name === name);
+    if (visible) against.delete(who);
+    else against.add(who);
+    tab.hidden = against.size > 0;
+    if (tab.hidden && tab.getAttribute("aria-selected") === "true") this.open(Math.max(0, this.panels.findIndex((panel) => !panel.against.size)));
+  }
+
+  openPanel(name) {
+    const k = this.panels.findIndex((panel) => panel.name === name);
+    if (!this.panels[k].tab.hidden) this.open(k);
+  }
+
+  panelTitle(name) {
+    return this.panels.find((panel) => panel.name === name).title;
   }
 
   moveTab(event, k) {
@@ -106,7 +118,11 @@ export class Lab {
 
   // What Python says of a request begins with the request's name, which is for programs.
   complain(error, request = "") {
-    this.message.textContent = request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error;
+    this.tell(request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error);
+  }
+
+  tell(text) {
+    this.message.textContent = text;
     this.message.hidden = false;
     clearTimeout(this.quiet);
     this.quiet = setTimeout(() => (this.message.hidden = true), SHORT);

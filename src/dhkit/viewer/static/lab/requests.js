@@ -1,7 +1,7 @@
 // Requests to Python. Of those that a drag repeats one is under way, and behind it waits only the latest (of each joint), so
 // that nothing queues; others, such as steps and edits, are all sent, and answered in order.
 
-const REPEATED = new Set(["joints.set", "tool.read", "tool.target", "motion.show"]);
+const REPEATED = new Set(["joints.set", "dynamics.read", "workspace.read", "tool.read", "tool.target", "motion.show"]);
 
 export class Requests {
   constructor(connection, failed) {

@@ -1,0 +1,289 @@
+"""The assignment file's form, format 1: one definition that validates files and prints as JSON Schema."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic.dataclasses import dataclass
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from dhkit.errors import DescriptionError, ExpressionError
+from dhkit.expressions import parse
+from dhkit.lab.tool_panel import ORDERS
+
+__all__ = ["AssignmentForm", "GoalForm", "PoseForm", "StepForm", "assignment_schema", "panel_names", "validated"]
+
+CONDITIONS = ("pose", "joints", "motion", "own")
+MOST_STEPS, MOST_GOALS, MOST_JOINTS = 20, 20, 32
+LONGEST_TEXT, LONGEST_LINE, LONGEST_EXPRESSION = 4_000, 200, 200
+"""Characters of a step's text; of a title, a goal's text and a name; of a number that is an expression."""
+LARGEST = 1e4
+"""rad or m of a number."""
+PANEL = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
+STEERING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that turn the direction of the text behind them, and so what a reader sees."""
+
+
+@cache
+def panel_names() -> tuple[str, ...]:
+    """Return the names of the lab's panels that an assignment may show, as the page lists them."""
+    script = (resources.files("dhkit.viewer") / "static" / "lab" / "panels.js").read_text("utf-8")
+    return tuple(name for name in PANEL.findall(script) if name != "task")
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise PydanticCustomError("expected", "a number, or an expression in quotes")
+    if isinstance(value, str) and len(value) > LONGEST_EXPRESSION:
+        raise PydanticCustomError("expected", f"an expression of at most {LONGEST_EXPRESSION} characters")
+    try:
+        number = float(parse(value)) if isinstance(value, str) else float(value)
+    except ExpressionError as error:
+        reason = " ".join(str(error).split())[:150]
+        raise PydanticCustomError("expected", "an expression such as pi/2 ({reason})", {"reason": reason}) from None
+    except OverflowError:
+        number = float("inf")
+    if not abs(number) <= LARGEST:
+        raise PydanticCustomError("expected", f"a finite number of at most {LARGEST:g}")
+    return number
+
+
+def _joint_values(value: object) -> str | tuple[float, ...]:
+    if isinstance(value, str) and 0 < len(value) <= LONGEST_LINE:
+        return value
+    if not isinstance(value, list) or len(value) > MOST_JOINTS:
+        raise PydanticCustomError("expected", "a configuration's name, or a list of joint values")
+    return tuple(map(_number, value))
+
+
+def _readable(text: str) -> str:
+    for letter in text:
+        if letter in STEERING or (unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t"):
+            raise PydanticCustomError("text", f"found the control character U+{ord(letter):04X}; expected plain text")
+    if not text.strip():
+        raise PydanticCustomError("text", "found an empty text; expected words")
+    return text
+
+
+def _in_one_line(text: str) -> str:
+    if len(text.splitlines()) > 1:
+        raise PydanticCustomError("text", "found several lines; expected one")
+    return text
+
+
+def _panel(name: str) -> str:
+    if name not in panel_names():
+        raise PydanticCustomError("text", f"no panel {name[:40]!r}{_hint(name, panel_names())}")
+    return name
+
+
+def _order(name: str) -> str:
+    if name not in ORDERS:
+        raise PydanticCustomError("expected", f"one of {', '.join(ORDERS)}")
+    return name
+
+
+STRICT = ConfigDict(extra="forbid")
+NUMBER = {"type": ["number", "string"], "description": "a number, or an expression such as pi/2"}
+NAME = {"type": "string", "minLength": 1, "maxLength": LONGEST_LINE}
+Number = Annotated[float, PlainValidator(_number), WithJsonSchema(NUMBER)]
+Triple = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
+JointValues: TypeAlias = Annotated[
+    str | tuple[float, ...],
+    PlainValidator(_joint_values),
+    WithJsonSchema({"anyOf": [NAME, {"type": "array", "items": NUMBER, "maxItems": MOST_JOINTS}]}),
+]
+Line = Annotated[str, Field(max_length=LONGEST_LINE), AfterValidator(_readable), AfterValidator(_in_one_line)]
+Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_readable)]
+Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=[*panel_names()]))]
+Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*ORDERS]))]
+Points = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
+Within = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(strict=True, gt=0, le=600, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class PoseForm:
+    """A pose of the tool: position, m, and Euler angles, rad; without angles the position alone counts."""
+
+    xyz: Triple
+    euler: Triple | None = None
+    order: Order = "XYZ"
+
+
+@dataclass(frozen=True, config=STRICT)
+class ToleranceForm:
+    """How near is near enough: position, m; angle between two rotations, rad; joint values, rad or m."""
+
+    position: Within = 0.005
+    angle: Within = 0.02
+    joint: Within = 0.01
+
+
+@dataclass(frozen=True, config=STRICT)
+class MotionForm:
+    """A motion from one configuration to another, within the limits, in at most ``duration`` seconds."""
+
+    begin: JointValues = Field(alias="from")
+    end: JointValues = Field(alias="to")
+    duration: Seconds | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
+class OwnForm:
+    """A share of the points of a function of the person's own program."""
+
+    function: Literal["fk", "ik", "controller"]
+    share: Within = 1.0
+
+
+@dataclass(
+    frozen=True,
+    config=ConfigDict(extra="forbid", json_schema_extra={"oneOf": [{"required": [name]} for name in CONDITIONS]}),
+)
+class GoalForm:
+    """What is to be reached: one of pose, joints, motion and own."""
+
+    text: Line
+    points: Points = 1.0
+    pose: PoseForm | None = None
+    joints: JointValues | None = None
+    motion: MotionForm | None = None
+    own: OwnForm | None = None
+    tolerance: ToleranceForm = Field(default_factory=ToleranceForm)
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> GoalForm:
+        given = [name for name in CONDITIONS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise PydanticCustomError(
+                "text", f"found {' and '.join(given) or 'none'}; expected exactly one of {', '.join(CONDITIONS)}"
+            )
+        return self
+
+
+@dataclass(frozen=True, config=STRICT)
+class StepForm:
+    """A step: what is to be read, and what is to be reached."""
+
+    title: Line
+    text: Text | None = None
+    panel: Panel | None = None
+    goal: Annotated[tuple[GoalForm, ...], Field(max_length=MOST_GOALS)] = ()
+
+
+@dataclass(frozen=True, config=STRICT)
+class AssignmentForm:
+    """An assignment file."""
+
+    kind: Literal["assignment"]
+    format: Literal[1]
+    title: Line
+    robot: Annotated[str, Field(min_length=1, max_length=LONGEST_LINE)]
+    step: Annotated[tuple[StepForm, ...], Field(min_length=1, max_length=MOST_STEPS)]
+    start: JointValues | None = None
+    panels: Annotated[tuple[Panel, ...], Field(min_length=1, max_length=40)] | None = None
+
+
+FORMS: dict[str, type] = {
+    "step": StepForm,
+    "goal": GoalForm,
+    "pose": PoseForm,
+    "tolerance": ToleranceForm,
+    "motion": MotionForm,
+    "own": OwnForm,
+}
+"""By the key that a table stands behind."""
+
+
+def assignment_schema() -> dict[str, Any]:
+    """Return the JSON Schema of assignment files, made from the definition that validates them."""
+    schema = TypeAdapter(AssignmentForm).json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dhkit assignment, format 1"} | {
+        key: value for key, value in schema.items() if key != "title"
+    }
+
+
+def validated(document: Mapping[str, Any]) -> AssignmentForm:
+    """Check a parsed assignment's keys, types and sizes.
+
+    Raises
+    ------
+    DescriptionError
+        The first thing wrong: where, what was found, what was expected.
+    """
+    try:
+        return TypeAdapter(AssignmentForm).validate_python(dict(document))
+    except ValidationError as error:
+        # A mistyped key is also a missing one: what is there says more than what is not.
+        found = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
+        raise DescriptionError(_one_line(found[0])) from None
+
+
+def _one_line(error: ErrorDetails) -> str:
+    path, found = tuple(error["loc"]), error["input"]
+    match error["type"]:
+        case "missing":
+            return f"{_place(path[:-1])}key {path[-1]!r} is missing"
+        case "unexpected_keyword_argument":
+            key = str(path[-1])
+            return f"{_place(path[:-1])}unknown key {key[:80]!r}{_hint(key, _known(path[:-1]))}"
+        case "text":
+            return _place(path) + error["msg"]
+        case "too_long" | "too_short":
+            bounds = error["ctx"]
+            bound = f"at most {bounds['max_length']}" if "max_length" in bounds else f"at least {bounds['min_length']}"
+            return f"{_place(path)}found {len(found)} entries; expected {bound}"
+        case "string_too_long":
+            return f"{_place(path)}found {len(found)} characters; expected at most {error['ctx']['max_length']}"
+        case "dataclass_type":
+            expected = "a table"
+        case "tuple_type":
+            expected = "a list"
+        case _:
+            expected = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    return f"{_place(path)}found {_shown(found)}; expected {expected}"
+
+
+def _place(path: tuple[int | str, ...]) -> str:
+    """Say where in words: ``step 2: goal 1: pose.xyz[0]: ``."""
+    words = ""
+    while len(path) > 1 and path[0] in ("step", "goal") and isinstance(path[1], int):
+        words += f"{path[0]} {path[1] + 1}: "
+        path = path[2:]
+    keys = "".join(f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path).removeprefix(".")
+    return words + (f"{keys}: " if keys else "")
+
+
+def _known(path: tuple[int | str, ...]) -> list[str]:
+    """Return the keys of the table that a path leads to."""
+    names = [part for part in path if isinstance(part, str)]
+    aliases = {"begin": "from", "end": "to"}
+    return [aliases.get(field.name, field.name) for field in fields(FORMS[names[-1]] if names else AssignmentForm)]
+
+
+def _hint(name: str, known: tuple[str, ...] | list[str]) -> str:
+    close = difflib.get_close_matches(name[:80].lower(), known, n=1)
+    return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
+
+
+def _shown(found: object) -> str:
+    text = repr(found)
+    return text if len(text) <= 60 else f"{text[:57]}..."

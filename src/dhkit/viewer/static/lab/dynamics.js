@@ -1,0 +1,81 @@
+// Dynamics of the state on show: gravity torques as bars, the mass matrix, the ellipsoid of the tool's velocities.
+
+import { fixed, h } from "./dom.js";
+import { formula } from "./formula.js";
+
+export class DynamicsPanel {
+  constructor(lab, root) {
+    this.lab = lab;
+    this.note = h("p", { class: "note", role: "status" });
+    this.bars = h("div", { class: "bars" });
+    this.matrix = h("div", { class: "wide" });
+    this.ellipsoid = h("button", { type: "button", "aria-pressed": "false", onclick: () => lab.ask("dynamics.ellipsoid", { on: this.ellipsoid.getAttribute("aria-pressed") !== "true" }) }, "Ellipsoid of velocities");
+    this.facts = h("p", { class: "facts" });
+    this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
+    root.append(this.note, h("h2", {}, "Gravity torques"), this.bars, h("h2", {}, "Mass matrix"), this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
+  }
+
+  take_arm(arm) {
+    this.arm = arm;
+    this.note.textContent = arm.bodies ? (arm.assumed_bodies ? "the links' masses are assumed: uniform rods" : "") : "this arm has no masses: assume uniform links in Control";
+    this.built = null;
+    this.read();
+  }
+
+  take_joints({ q }) {
+    if (!this.lab.page.player.active) this.read(q);
+  }
+
+  take_dynamics({ ellipsoid }) {
+    this.ellipsoid.setAttribute("aria-pressed", String(ellipsoid));
+  }
+
+  moved(q) {
+    this.read(q ? [...q] : this.lab.state.joints?.q);
+  }
+
+  shown(visible) {
+    this.visible = visible;
+    const { player, motion } = this.lab.page;
+    if (visible && player.active && motion?.times) this.lab.page.showTime(player.time);
+    else this.read();
+  }
+
+  async read(q = this.lab.state.joints?.q) {
+    if (!this.visible || !q || q.length !== this.arm?.n) return;
+    const numbers = await this.lab.ask("dynamics.read", { q });
+    if (numbers) this.show(numbers);
+  }
+
+  show({ M, g, effort, lengths, manipulability, condition }) {
+    const { joints } = this.arm;
+    if (this.built !== this.arm) this.build(Boolean(M));
+    const largest = Math.max(1e-9, ...(g ?? []).map(Math.abs));
+    this.rows.forEach(({ bar, value }, i) => {
+      const limit = effort[i], share = Math.min(1, Math.abs(g[i]) / (limit ?? largest)), unit = joints[i].unit === "m" ? "N" : "N m";
+      bar.style.width = `${50 * share}%`;
+      bar.style.left = g[i] < 0 ? `${50 - 50 * share}%` : "50%";
+      bar.classList.toggle("over", limit !== null && Math.abs(g[i]) > limit);
+      value.textContent = `${fixed(g[i], 2)} ${unit}${limit === null ? "" : ` (${fixed((100 * Math.abs(g[i])) / limit, 0)} %)`}`;
+    });
+    if (M) this.cells.forEach((row, i) => row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))));
+    const axes = lengths.filter((x) => x !== null).map((x) => fixed(x, 3)).join(", ");
+    this.facts.textContent = `half axes ${axes}; manipulability ${manipulability.toPrecision(3)}; condition number ${condition === null ? "infinite: singular" : condition.toPrecision(3)}`;
+  }
+
+  build(bodies) {
+    const { arm } = this, ask = (name) => () => this.lab.ask("dynamics.entry", { name });
+    this.built = arm;
+    this.rows = bodies ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) })) : [];
+    this.bars.replaceChildren(...this.rows.map(({ bar, value }, i) => h("div", { class: "bar" }, h("button", { type: "button", class: "quiet", title: `formula of g${i + 1}`, onclick: ask(`g${i + 1}`) }, arm.joints[i].name), h("span", { class: "track" }, bar), value)));
+    this.cells = bodies ? arm.joints.map((_, i) => arm.joints.map((_, j) => h("button", { type: "button", class: "quiet", title: `formula of M${i + 1}${j + 1}`, "aria-label": `M${i + 1}${j + 1}`, onclick: ask(`M${i + 1}${j + 1}`) }))) : [];
+    this.matrix.replaceChildren(h("table", { class: "numbers" }, h("tbody", {}, this.cells.map((row) => h("tr", {}, row.map((cell) => h("td", {}, cell)))))));
+  }
+
+  take_entry(entry) {
+    if (!entry) return this.entry.replaceChildren();
+    if (entry.deriving) return this.entry.replaceChildren(h("p", { class: "hint" }, `deriving ${entry.name} …`));
+    const shown = formula(entry.mathml);
+    this.entry.replaceChildren(shown ?? h("p", { class: "bad" }, entry.error ?? ""));
+  }
+}

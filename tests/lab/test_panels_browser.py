@@ -1,0 +1,166 @@
+"""The panels of dynamics, workspace, transforms and answers in a headless Chromium, driven as a person does."""
+
+# ruff: noqa: E501 - JavaScript in one line
+
+import json
+
+import numpy as np
+import pytest
+
+from dhkit import Arm
+from dhkit.description import pose
+
+pytestmark = pytest.mark.slow
+
+PRINTED = 5.1e-5
+"""Half of the last digit of an entry of M, and rounding."""
+TORQUE = 5.1e-3
+"""N m: the same of a torque."""
+HOSTILE = '<img src=x onerror="globalThis.hacked=1">'
+
+
+def panel(page, name):
+    page.click(f"document.getElementById('tab-{name}')")
+    assert page.evaluate(f"document.getElementById('panel-{name}').hidden") is False
+
+
+def labelled(label):
+    return f"document.querySelector({json.dumps(f'#lab [aria-label={json.dumps(label)}]')})"
+
+
+def button(text, within="#lab"):
+    return (
+        f"[...document.querySelectorAll({json.dumps(within + ' button')})]"
+        f".find(b => b.offsetWidth && b.textContent.trim() === {json.dumps(text)})"
+    )
+
+
+def texts(page, selector):
+    return page.evaluate(f"[...document.querySelectorAll({json.dumps(selector)})].map(e => e.textContent)")
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford"])
+def test_dynamics_shows_the_numbers_of_the_state_and_formulas(open_page, name):
+    lab, page = open_page(name)
+    lab.answer("joints.named", {"name": "nominal"})
+    panel(page, "dynamics")
+    arm = lab.desk.arm
+    for q in (lab.desk.q, lab.desk.q + 0.1):
+        lab.answer("joints.set", {"q": q.tolist()})
+        M, g = arm.mass_matrix(q), arm.gravity_torque(q)
+        page.until(f"Math.abs(Number(document.querySelector('#panel-dynamics td button')?.textContent) - {M[0, 0]}) < {PRINTED}")
+        shown = np.reshape([float(x) for x in texts(page, "#panel-dynamics td button")], M.shape)
+        assert np.abs(shown - M).max() < PRINTED
+        torques = [float(text.split()[0]) for text in texts(page, "#panel-dynamics .bar .value")]
+        assert np.abs(np.array(torques) - g).max() < TORQUE
+    page.click(labelled("M22"))
+    page.until("document.querySelector('#panel-dynamics .entry math')")
+    assert texts(page, "#panel-dynamics .entry math")[0].startswith("M22=")
+    page.click(button("Ellipsoid of velocities"))
+    page.until("dhkit.stage.overlays.layers.ellipsoids.group.children.length === 1")
+    page.click(button("Ellipsoid of velocities"))
+    page.until("dhkit.stage.overlays.layers.ellipsoids.group.children.length === 0")
+
+
+def test_an_arm_without_masses_says_what_to_do(open_page):
+    _, page = open_page(Arm.from_dh([[0, 0.4, 0, "pi/2"], [0, 0, 0.3, 0]]))
+    panel(page, "dynamics")
+    page.until("document.querySelector('#panel-dynamics .note').textContent.includes('assume uniform links')")
+    page.until("document.querySelector('#panel-dynamics .facts').textContent.includes('manipulability')")
+
+
+def test_the_workspace_is_drawn_and_the_distance_is_live(open_page):
+    lab, page = open_page("planar2r")
+    panel(page, "workspace")
+    page.choose(labelled("Workspace"), "points")
+    page.until("dhkit.stage.overlays.layers.points.group.children.length === 1")
+    page.until("document.querySelector('#panel-workspace .note').textContent.startsWith('10000 points')")
+    l1, l2 = lab.desk.arm.description.numbers.a
+    for q in ([0.3, 0.4], [1.0, 2.0]):
+        lab.answer("joints.set", {"q": q})
+        radius = float(np.linalg.norm(lab.desk.arm.fk(q)[:3, 3]))
+        distance = 1000 * min(l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf)
+        page.until(f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < 0.051")
+    page.choose(labelled("Workspace"), "none")
+    page.until("dhkit.stage.overlays.layers.points.group.children.length === 0")
+
+
+def test_a_box_is_turned_and_moved_step_by_step(open_page):
+    _, page = open_page("puma560")
+    panel(page, "transforms")
+    page.until("dhkit.lab.state.solid.vertices.length === 8")
+    page.click(labelled("amount of step 1"))
+    page.write("45°")
+    page.click(button("Add a step"))
+    page.choose(labelled("kind of step 2"), "move")
+    page.choose(labelled("axis of step 2"), "y")
+    page.click(labelled("amount of step 2"))
+    page.write("0.5")
+    page.click(button("Apply step by step"))
+    page.until("document.querySelectorAll('#panel-transforms .step li').length === 2")
+    T = pose(euler=(np.pi / 4, 0, 0), order="ZYX") @ pose((0, 0.5, 0))
+    own = "dhkit.lab.panels.find(p => p.name === 'transforms').panel"
+    page.until(f"{own}.T.every((x, i) => Math.abs(x - {T.ravel().tolist()}[i]) < 1e-12)", timeout=10)
+    assert texts(page, "#panel-transforms .step math")[3].startswith("T2=T1")
+    assert "T1−1p" in "".join(texts(page, "#panel-transforms .step math")).replace(" ", "")
+    # Numbers stand at the vertices, where the page projects them.
+    labels = page.evaluate(f"{own}.labels.labels.length")
+    assert labels == 8
+    after = page.evaluate("[...document.querySelectorAll('#panel-transforms tbody tr')].map(r => r.cells[2].textContent.trim().split(/\\s+/).map(Number))")
+    vertices = np.array(page.evaluate("dhkit.lab.state.solid.vertices"))
+    assert np.abs(np.array(after) - (vertices @ T[:3, :3].T + T[:3, 3])).max() < PRINTED
+    page.click("document.querySelector('#panel-transforms input[type=checkbox]')")
+    assert page.evaluate("dhkit.stage.nodes.every(node => !node.visible)")
+    panel(page, "joints")
+    assert page.evaluate(f"dhkit.stage.nodes.every(node => node.visible) && !{own}.group.visible")
+    panel(page, "transforms")
+    page.click(labelled("amount of step 1"))
+    page.write("many")
+    page.click(button("Apply step by step"))
+    page.until("document.querySelector('#lab .message').textContent.startsWith('step 1: amount')")
+
+
+def test_an_answer_is_judged_on_the_page(open_page):
+    _, page = open_page("planar2r")
+    panel(page, "submit")
+    assert "m1, m2" in texts(page, "#panel-submit .hint")[0]
+    page.evaluate(f"{labelled('Answer')}.value = 'M22 = m2*l2^2/3\\ng2 = m2*g*l2*c2/2'")
+    page.click(button("Judge"))
+    page.until("document.querySelectorAll('#panel-submit article').length === 2", timeout=60)
+    assert texts(page, "#panel-submit h3") == ["M22: correct", "g2: wrong"]
+    assert page.evaluate("document.querySelectorAll('#panel-submit article math').length") == 3
+    assert "angle" in texts(page, "#panel-submit .diagnosis")[0]
+    page.evaluate(f"{labelled('Answer')}.value = {json.dumps(f'V = {HOSTILE}')}")
+    page.click(button("Judge"))
+    page.until("document.querySelector('#panel-submit .note').textContent.length > 12", timeout=60)
+    assert page.evaluate("document.querySelectorAll('img').length") == 0
+    assert page.evaluate("globalThis.hacked ?? null") is None
+
+
+def test_formulas_take_over_mathematics_alone(open_page):
+    _, page = open_page("planar2r")
+    hostile = "<math><mi href='javascript:globalThis.hacked=1' style='color:red'>x</mi><script xmlns='http://www.w3.org/1999/xhtml'>globalThis.hacked=1</script></math>"
+    found = page.evaluate(
+        f"import('./lab/formula.js').then(({{ formula }}) => {{ const e = formula({json.dumps(hostile)}); document.body.append(e); return [e.outerHTML, formula('<math><mi>'), formula('')]; }})"
+    )
+    assert "href" not in found[0]
+    assert "style" not in found[0]
+    assert "<script" not in found[0]
+    assert found[1:] == [None, None]
+    assert page.evaluate("globalThis.hacked ?? null") is None
+
+
+@pytest.mark.parametrize("size", [(768, 800), (1280, 720), (390, 844)])
+def test_every_panel_fits_and_names_its_controls(open_page, size):
+    _, page = open_page("puma560", width=size[0], height=size[1])
+    for name in ("dynamics", "workspace", "transforms", "submit"):
+        page.evaluate(f"document.getElementById('tab-{name}').click()")
+        page.settle()
+        assert page.evaluate(f"document.getElementById('panel-{name}').scrollWidth <= document.getElementById('panel-{name}').clientWidth + 1"), name
+        unnamed = page.evaluate(
+            f"[...document.querySelectorAll('#panel-{name} :is(input, select, button, textarea)')]"
+            ".filter(e => e.offsetWidth && !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).map(e => e.outerHTML)"
+        )
+        assert unnamed == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    assert Arm.load("puma560").n == page.evaluate("document.querySelectorAll('#panel-dynamics .bar').length")
