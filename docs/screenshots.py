@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import sys
 import time
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 import dhkit
-from dhkit.lab import Lab
+from dhkit.lab import Assignment, Lab
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZE = 1280, 720
@@ -84,7 +85,71 @@ def control(lab, page):
     page.evaluate("document.querySelector('.panels').scrollTop = 470")
 
 
-PANELS = {"joints": joints, "tool": tool, "table": table, "motion": motion, "control": control}
+def dynamics(lab, page):
+    """Show gravity torques, the mass matrix, a formula, and the ellipsoid of the tool's velocities."""
+    lab.answer("control.stop", {})
+    lab.answer("joints.named", {"name": "nominal"})
+    lab.answer("dynamics.entry", {"name": "M33"})
+    lab.answer("dynamics.ellipsoid", {"on": True})
+    page.until("document.querySelector('#panel-dynamics .entry math')", timeout=60.0)
+    time.sleep(0.5)
+
+
+def workspace(lab, page):
+    """Show a slice of what the tool reaches."""
+    lab.answer("dynamics.ellipsoid", {"on": False})
+    lab.answer("workspace.show", {"kind": "slice"})
+    page.until(f"{STATE}.workspace.count > 1000", timeout=60.0)
+    time.sleep(1.5)
+
+
+def transforms(lab, page):
+    """Show the course's box after two of three steps, without the arm."""
+    lab.answer("workspace.show", {"kind": "none"})
+    own = "dhkit.lab.panels.find(panel => panel.name === 'transforms').panel"
+    steps = [("turn", "z", "30°", "fixed"), ("move", "y", "0.3", "current"), ("turn", "x", "60°", "current")]
+    listed = [dict(zip(("kind", "axis", "amount", "about"), step, strict=True)) for step in steps]
+    page.evaluate(f"{own}.change(() => ({own}.steps = {json.dumps(listed)}))")
+    page.evaluate("document.querySelector('#panel-transforms input[type=checkbox]').click()")
+    page.evaluate(f"{own}.run()")
+    page.until("document.querySelectorAll('#panel-transforms .step li').length === 3")
+    time.sleep(3.2)
+    page.evaluate("document.getElementById('reset').click()")
+
+
+PANELS = {
+    "joints": joints,
+    "tool": tool,
+    "table": table,
+    "motion": motion,
+    "control": control,
+    "dynamics": dynamics,
+    "workspace": workspace,
+    "transforms": transforms,
+}
+
+
+def task(browser):
+    """Return a picture of an assignment of which a part is done."""
+    assignment = Assignment.read(ROOT / "docs" / "examples" / "assignment_puma.toml")
+    with Lab(assignment.arm, assignment=assignment) as lab:
+        page = browser.page(*SIZE)
+        page.open(lab.url)
+        page.until(f"globalThis.dhkit?.lab?.state.task && {STATE}.control")
+        lab.answer("joints.set", {"q": [np.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0]})
+        page.until(f"{STATE}.task.points === 1")
+        page.settle()
+        picture = page.screenshot(fine=True)
+        page.close()
+    return picture
+
+
+def write(name, picture):
+    """Write a picture, shape (height, width, 3), as docs/lab-NAME.png."""
+    content = compressed(picture)
+    if len(content) > LARGEST:
+        raise ValueError(f"lab-{name}.png has {len(content)} bytes; expected {LARGEST} at most")
+    (ROOT / "docs" / f"lab-{name}.png").write_bytes(content)
 
 
 def compressed(picture: np.ndarray) -> bytes:
@@ -119,11 +184,9 @@ def main() -> None:
                 page.evaluate(f"document.getElementById('tab-{name}').click()")
                 prepare(lab, page)
                 time.sleep(0.5)
-                content = compressed(page.screenshot(fine=True))
-                if len(content) > LARGEST:
-                    raise ValueError(f"lab-{name}.png has {len(content)} bytes; expected {LARGEST} at most")
-                (ROOT / "docs" / f"lab-{name}.png").write_bytes(content)
+                write(name, page.screenshot(fine=True))
             page.close()
+        write("task", task(browser))
     finally:
         browser.close()
 

@@ -25,7 +25,7 @@ class ExpressionError(DhkitError):
 
 
 class DescriptionError(DhkitError):
-    """A robot file or a table that describes no robot: names file, joint and key, what was found and expected."""
+    """A robot file, table or assignment that cannot be used: names file, joint and key, what was found and expected."""
 
 
 class ModelError(DhkitError):

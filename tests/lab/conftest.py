@@ -3,7 +3,7 @@
 import pytest
 
 from dhkit import Arm
-from dhkit.lab import Lab
+from dhkit.lab import Assignment, Lab
 
 
 @pytest.fixture
@@ -42,3 +42,30 @@ def open_page(chromium, open_lab):
         page.close()
         assert errors == []
         assert hosts == {own}
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Return what reads an assignment of a text."""
+
+    def make(text):
+        file = tmp_path / "task.toml"
+        file.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return Assignment.read(file)
+
+    return make
+
+
+@pytest.fixture
+def begin():
+    """Return what opens labs with an assignment, each closed at the end."""
+    opened = []
+
+    def make(assignment, **options):
+        lab = Lab(assignment.arm, assignment=assignment, **options)
+        opened.append(lab)
+        return lab
+
+    yield make
+    for lab in opened:
+        lab.close()

@@ -160,7 +160,13 @@ def test_configurations_by_name(visit):
 
 # Tool
 
-GIZMO = "dhkit.lab.panels[1].panel.gizmo"
+
+def of(name):
+    """Return a panel's object, as JavaScript."""
+    return f"dhkit.lab.panels.find(p => p.name === '{name}').panel"
+
+
+GIZMO = f"{of('tool')}.gizmo"
 
 
 def in_scene(page, point):
@@ -429,12 +435,12 @@ def test_a_motion_is_planned_played_scrubbed_and_taken_over(visit):
     page.until("dhkit.player.time > 0.2")
     page.until("!dhkit.player.playing")
     wait_for(lambda: plots(page, "motion") == 3)
-    assert np.abs(np.array(page.evaluate("[...dhkit.lab.panels[0].panel.q]")) - goal).max() < 1e-6
+    assert np.abs(np.array(page.evaluate(f"[...{of('joints')}.q]")) - goal).max() < 1e-6
     x, y = page.centre("document.getElementById('time')")
     page.drag([(x + 40, y), (x + 20, y), (x, y)])
     middle = page.evaluate("dhkit.player.time")
     assert middle == pytest.approx(0.75, abs=0.05)
-    assert np.abs(page.evaluate("[...dhkit.lab.panels[0].panel.q]") - lab._motions.motion.q(middle)).max() < 1e-3
+    assert np.abs(page.evaluate(f"[...{of('joints')}.q]") - lab._motions.motion.q(middle)).max() < 1e-3
     assert np.abs(lab.desk.q - start).max() == 0
     page.click(button("Teach this state"))
     wait_for(lambda: len(lab._motions.waypoints) == 1)
@@ -449,20 +455,21 @@ def test_a_motion_is_planned_played_scrubbed_and_taken_over(visit):
 @only_accepting
 def test_waypoints_are_taught_and_gone_through(visit):
     lab, page = visit("puma560")
+    named = {"zero": np.zeros(6)} | dict(lab.desk.arm.configurations)
     for k, name in enumerate(("ready", "zero", "nominal"), start=1):
         panel(page, "joints")
         page.click(button(name, "#panel-joints"))
-        near(lab, lab.desk.named()[name])
+        near(lab, named[name])
         panel(page, "motion")
         page.click(button("Teach this state"))
         page.until(f"document.querySelectorAll('.points li').length === {k}")
     page.click(button("waypoint 1"))
-    near(lab, lab.desk.named()["ready"])
+    near(lab, named["ready"])
     page.choose(labelled("Goal"), "waypoints")
     page.click(button("Plan from here"))
     page.until("dhkit.lab.state.motion")
     motion = lab._motions.motion
-    ends = [lab.desk.named()[name] for name in ("ready", "nominal")]
+    ends = [named[name] for name in ("ready", "nominal")]
     assert np.abs(motion.q(np.array([0.0, motion.duration])) - ends).max() < 1e-9
     page.click(labelled("Forget waypoint 2"))
     page.until("document.querySelectorAll('.points li').length === 2")
@@ -508,7 +515,7 @@ def test_a_controller_is_started_pushed_changed_and_stopped(visit):
     lab.answer("joints.named", {"name": "nominal"})
     panel(page, "control")
     page.click(button("Start"))
-    page.until("dhkit.lab.state.control.running && dhkit.lab.panels[4].panel.rows.length > 20")
+    page.until(f"dhkit.lab.state.control.running && {of('control')}.rows.length > 20")
     wait_for(lambda: plots(page, "control") >= 1)
     calm = np.abs(lab.desk.q - lab.desk.arm.configurations["nominal"]).max()
     assert calm < 1e-3
@@ -519,8 +526,8 @@ def test_a_controller_is_started_pushed_changed_and_stopped(visit):
     wait_for(lambda: lab._control.settings.controller == "pid")
     write(page, "Payload", "2")
     wait_for(lambda: lab._control.settings.payload == 2.0)
-    count = page.evaluate("dhkit.lab.panels[4].panel.rows.length")
-    page.until(f"dhkit.lab.panels[4].panel.rows.length > {count} + 20")
+    count = page.evaluate(f"{of('control')}.rows.length")
+    page.until(f"{of('control')}.rows.length > {count} + 20")
     page.click(button("Pause"))
     page.until("dhkit.lab.state.control.paused")
     page.click(button("Go on"))
@@ -544,8 +551,8 @@ def test_joints_2_and_3_alone_and_an_arm_without_bodies(visit):
     page.until("dhkit.lab.state.control.planar")
     page.choose(labelled_list("Follows"), "sine")
     page.click(button("Start"))
-    page.until("dhkit.lab.panels[4].panel.rows.length > 10")
-    assert page.evaluate("dhkit.lab.panels[4].panel.columns") == ["t", "e2", "e3", "tau2", "tau3", "tool"]
+    page.until(f"{of('control')}.rows.length > 10")
+    assert page.evaluate(f"{of('control')}.columns") == ["t", "e2", "e3", "tau2", "tau3", "tool"]
     page.click(button("Stop"))
     page.until("!dhkit.lab.state.control.running")
 
@@ -683,7 +690,7 @@ def nearby(lab):
 
 def act(page, lab, name):
     """Show a panel with something in it."""
-    page.evaluate(f"dhkit.lab.open({PANELS.index(name)})")
+    page.evaluate(f"dhkit.lab.openPanel('{name}')")
     if name == "tool":
         lab.answer("tool.target", {"T": lab.desk.arm.fk(lab.desk.q).ravel().tolist()})
         page.until("dhkit.lab.state.target")
@@ -698,7 +705,7 @@ def act(page, lab, name):
     if name == "control":
         lab.answer("motion.clear", {})
         lab.answer("control.start", {"reference": "sine", "controller": "pid"})
-        page.until("dhkit.lab.panels[4].panel.rows.length > 90")
+        page.until(f"{of('control')}.rows.length > 90")
     time.sleep(0.3)
 
 
@@ -904,7 +911,7 @@ def test_gate_of_a_running_controller(visit, slack):
     panel(page, "control")
     page.choose(labelled_list("Follows"), "sine")
     page.click(button("Start"))
-    page.until("dhkit.lab.panels[4].panel.rows.length > 60")
+    page.until(f"{of('control')}.rows.length > 60")
     rate = drawn(page, 4.0)
     print(f"control at 60 Hz, 860x720: {rate:.1f} pictures a second, {lab._control._speed:.2f} of real time")
     assert rate > 20 / slack()

@@ -48,7 +48,9 @@ def test_dynamics_shows_the_numbers_of_the_state_and_formulas(open_page, name):
     for q in (lab.desk.q, lab.desk.q + 0.1):
         lab.answer("joints.set", {"q": q.tolist()})
         M, g = arm.mass_matrix(q), arm.gravity_torque(q)
-        page.until(f"Math.abs(Number(document.querySelector('#panel-dynamics td button')?.textContent) - {M[0, 0]}) < {PRINTED}")
+        page.until(
+            f"Math.abs(Number(document.querySelector('#panel-dynamics td button')?.textContent) - {M[0, 0]}) < {PRINTED}"
+        )
         shown = np.reshape([float(x) for x in texts(page, "#panel-dynamics td button")], M.shape)
         assert np.abs(shown - M).max() < PRINTED
         torques = [float(text.split()[0]) for text in texts(page, "#panel-dynamics .bar .value")]
@@ -60,6 +62,25 @@ def test_dynamics_shows_the_numbers_of_the_state_and_formulas(open_page, name):
     page.until("dhkit.stage.overlays.layers.ellipsoids.group.children.length === 1")
     page.click(button("Ellipsoid of velocities"))
     page.until("dhkit.stage.overlays.layers.ellipsoids.group.children.length === 0")
+
+
+def test_torques_are_those_of_the_motion_or_the_controller_that_moves_the_arm(open_page):
+    lab, page = open_page("planar2r")
+    heading = "document.querySelector('#panel-dynamics h2').textContent"
+    panel(page, "dynamics")
+    page.until(f"{heading} === 'Gravity torques'")
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": [0.9, -0.4]}, "duration": 1.0})
+    page.until("dhkit.player.active && dhkit.lab.state.motion")
+    page.evaluate("dhkit.player.pause(), dhkit.player.seek(0.5)")
+    page.until(f"{heading} === 'Torques of the motion'")
+    tau = lab._motions.motion.tau(0.5)
+    value = "parseFloat(document.querySelector('#panel-dynamics .bar .value').textContent)"
+    page.until(f"Math.abs({value} - {tau[0]}) < {2 * TORQUE}")
+    lab.answer("motion.clear", {})
+    lab.answer("control.start", {"controller": "pd"})
+    page.until(f"{heading} === 'Torques of the controller'")
+    lab.answer("control.stop", {})
+    page.until(f"{heading} === 'Gravity torques'")
 
 
 def test_an_arm_without_masses_says_what_to_do(open_page):
@@ -80,7 +101,9 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(open_page):
         lab.answer("joints.set", {"q": q})
         radius = float(np.linalg.norm(lab.desk.arm.fk(q)[:3, 3]))
         distance = 1000 * min(l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf)
-        page.until(f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < 0.051")
+        page.until(
+            f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < 0.051"
+        )
     page.choose(labelled("Workspace"), "none")
     page.until("dhkit.stage.overlays.layers.points.group.children.length === 0")
 
@@ -106,7 +129,9 @@ def test_a_box_is_turned_and_moved_step_by_step(open_page):
     # Numbers stand at the vertices, where the page projects them.
     labels = page.evaluate(f"{own}.labels.labels.length")
     assert labels == 8
-    after = page.evaluate("[...document.querySelectorAll('#panel-transforms tbody tr')].map(r => r.cells[2].textContent.trim().split(/\\s+/).map(Number))")
+    after = page.evaluate(
+        "[...document.querySelectorAll('#panel-transforms tbody tr')].map(r => r.cells[2].textContent.trim().split(/\\s+/).map(Number))"
+    )
     vertices = np.array(page.evaluate("dhkit.lab.state.solid.vertices"))
     assert np.abs(np.array(after) - (vertices @ T[:3, :3].T + T[:3, 3])).max() < PRINTED
     page.click("document.querySelector('#panel-transforms input[type=checkbox]')")
@@ -156,7 +181,9 @@ def test_every_panel_fits_and_names_its_controls(open_page, size):
     for name in ("dynamics", "workspace", "transforms", "submit"):
         page.evaluate(f"document.getElementById('tab-{name}').click()")
         page.settle()
-        assert page.evaluate(f"document.getElementById('panel-{name}').scrollWidth <= document.getElementById('panel-{name}').clientWidth + 1"), name
+        assert page.evaluate(
+            f"document.getElementById('panel-{name}').scrollWidth <= document.getElementById('panel-{name}').clientWidth + 1"
+        ), name
         unnamed = page.evaluate(
             f"[...document.querySelectorAll('#panel-{name} :is(input, select, button, textarea)')]"
             ".filter(e => e.offsetWidth && !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).map(e => e.outerHTML)"

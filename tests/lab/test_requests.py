@@ -428,6 +428,7 @@ BAD = {
     "own.ghosts": [{}, {"on": 1}, {"on": True, "off": False}],
     "own.score": [{}, {"robot": "ur5"}],
     "waypoints.remove": [{}, {"index": 0}],
+    "task.reset": [{}, {"all": True}],
     "control.start": [
         {"controller": "mine"},
         {"bandwidth": 0},

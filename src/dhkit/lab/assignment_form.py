@@ -258,7 +258,7 @@ def _one_line(error: ErrorDetails) -> str:
         case "tuple_type":
             expected = "a list"
         case _:
-            expected = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+            expected = error["msg"].removeprefix("Input should be ").replace("a valid ", "a ")
     return f"{_place(path)}found {_shown(found)}; expected {expected}"
 
 

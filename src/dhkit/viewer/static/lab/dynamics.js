@@ -1,4 +1,5 @@
-// Dynamics of the state on show: gravity torques as bars, the mass matrix, the ellipsoid of the tool's velocities.
+// Dynamics of the state on show: torques as bars (of gravity, of a motion, or of a running controller), the mass matrix, the
+// ellipsoid of the tool's velocities.
 
 import { fixed, h } from "./dom.js";
 import { formula } from "./formula.js";
@@ -8,11 +9,13 @@ export class DynamicsPanel {
     this.lab = lab;
     this.note = h("p", { class: "note", role: "status" });
     this.bars = h("div", { class: "bars" });
+    this.heading = h("h2", {}, "Gravity torques");
+    this.torques = null; // of a controller or a motion, by joint; gravity's where there are none
     this.matrix = h("div", { class: "wide" });
     this.ellipsoid = h("button", { type: "button", "aria-pressed": "false", onclick: () => lab.ask("dynamics.ellipsoid", { on: this.ellipsoid.getAttribute("aria-pressed") !== "true" }) }, "Ellipsoid of velocities");
     this.facts = h("p", { class: "facts" });
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
-    root.append(this.note, h("h2", {}, "Gravity torques"), this.bars, h("h2", {}, "Mass matrix"), this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
+    root.append(this.note, this.heading, this.bars, h("h2", {}, "Mass matrix"), this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
   }
 
   take_arm(arm) {
@@ -30,8 +33,22 @@ export class DynamicsPanel {
     this.ellipsoid.setAttribute("aria-pressed", String(ellipsoid));
   }
 
-  moved(q) {
+  moved(q, time) {
+    const { motion } = this.lab.state, tau = q && motion?.tau;
+    this.torques = tau ? { title: "Torques of the motion", tau: tau[Math.round((time / motion.duration) * (tau.length - 1))] } : null;
     this.read(q ? [...q] : this.lab.state.joints?.q);
+  }
+
+  // Joints that a run has locked have no torque of a controller.
+  samples({ columns, rows }) {
+    if (!this.visible || !rows.length) return;
+    const last = rows.subarray(rows.length - columns.length), tau = new Array(this.arm.n).fill(0);
+    columns.forEach((name, k) => name.startsWith("tau") && (tau[Number(name.slice(3)) - 1] = last[k]));
+    this.torques = { title: "Torques of the controller", tau };
+  }
+
+  take_control({ running }) {
+    if (!running) this.torques = null;
   }
 
   shown(visible) {
@@ -50,13 +67,14 @@ export class DynamicsPanel {
   show({ M, g, effort, lengths, manipulability, condition }) {
     const { joints } = this.arm;
     if (this.built !== this.arm) this.build(Boolean(M));
-    const largest = Math.max(1e-9, ...(g ?? []).map(Math.abs));
+    const tau = this.torques?.tau ?? g ?? [], largest = Math.max(1e-9, ...tau.map(Math.abs));
+    this.heading.textContent = this.torques?.title ?? "Gravity torques";
     this.rows.forEach(({ bar, value }, i) => {
-      const limit = effort[i], share = Math.min(1, Math.abs(g[i]) / (limit ?? largest)), unit = joints[i].unit === "m" ? "N" : "N m";
+      const limit = effort[i], share = Math.min(1, Math.abs(tau[i]) / (limit ?? largest)), unit = joints[i].unit === "m" ? "N" : "N m";
       bar.style.width = `${50 * share}%`;
-      bar.style.left = g[i] < 0 ? `${50 - 50 * share}%` : "50%";
-      bar.classList.toggle("over", limit !== null && Math.abs(g[i]) > limit);
-      value.textContent = `${fixed(g[i], 2)} ${unit}${limit === null ? "" : ` (${fixed((100 * Math.abs(g[i])) / limit, 0)} %)`}`;
+      bar.style.left = tau[i] < 0 ? `${50 - 50 * share}%` : "50%";
+      bar.classList.toggle("over", limit !== null && Math.abs(tau[i]) > limit);
+      value.textContent = `${fixed(tau[i], 2)} ${unit}${limit === null ? "" : ` (${fixed((100 * Math.abs(tau[i])) / limit, 0)} %)`}`;
     });
     if (M) this.cells.forEach((row, i) => row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))));
     const axes = lengths.filter((x) => x !== null).map((x) => fixed(x, 3)).join(", ");
