@@ -140,3 +140,14 @@ def test_a_rubric_that_asks_for_more_than_is_there(puma, tmp_path):
     report = checked(puma, solution("right"), tmp_path, rubric=rubric, samples=5)
     assert report.points == 100 and report.most == 200
     assert np.isclose(report.functions["controller"][0].points, 0.0)
+
+
+def test_a_controller_is_scored_on_an_arm_whose_configurations_are_one_state(tmp_path):
+    arm = Arm.load("puma560_cao")
+    assert np.array_equal(arm.configurations["ready"], np.zeros(6))
+    source = tmp_path / "still.py"
+    source.write_text("import numpy as np\ndef controller(t, q, qd, setpoint):\n    return np.zeros(6)\n")
+    with Program(source) as program:
+        (part,) = check(arm, program, seed=1).functions["controller"]
+    assert part.points == 0
+    assert "peak error" in part.text

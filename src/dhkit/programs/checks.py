@@ -20,6 +20,11 @@ from dhkit.programs.rubric import CheckRubric
 
 __all__ = ["check"]
 
+APART = 1e-6
+"""rad and m between states that are not the same."""
+MOVED = 0.5
+"""rad, and shares of the reach, that joints are moved where the configurations of a task are one state."""
+
 
 def check(
     arm: Arm,
@@ -127,8 +132,7 @@ def _fk_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, ...
 
 def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int) -> Iterator[Part]:
     task, most = rubric.controller, rubric.points("controller")["follows"]
-    start = np.array(arm.configurations.get(task.start, np.zeros(arm.n)))
-    goal = np.array(arm.configurations.get(task.goal, np.zeros(arm.n)))
+    start, goal = _ends(arm, task.start, task.goal)
     plant = arm.with_payload(task.payload) if task.payload else arm
 
     motion = arm.quintic(start, goal, task.duration)
@@ -144,6 +148,18 @@ def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Gene
     name = arm.description.joints[joint].name
     text = f"peak error {peak:.3g} in joint {joint + 1} ({name}); {task.bound:g} rad or m are asked for"
     yield Part("follows", most * share, most, text, call.said())
+
+
+def _ends(arm: Arm, start: str, goal: str) -> tuple[Array, Array]:
+    """Return two configurations by name; where they are the same state, another one takes the place of the second."""
+    known = {"zero": np.zeros(arm.n)} | {name: np.array(q) for name, q in arm.configurations.items()}
+    first, second = known.get(start, known["zero"]), known.get(goal, known["zero"])
+    if np.abs(second - first).max() > APART:
+        return first, second
+    numbers = arm.description.numbers
+    room = np.where(numbers.upper - first >= first - numbers.lower, numbers.upper - first, numbers.lower - first)
+    way = np.where(numbers.prismatic, MOVED * (arm.description.reach or 1.0), MOVED)
+    return first, first + np.clip(room / 2, -way, way)
 
 
 def _listed(q: Array) -> str:
