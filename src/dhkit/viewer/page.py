@@ -50,6 +50,7 @@ LAB_FILES = (
     "curves.js",
     "own.js",
     "control.js",
+    "following.js",
     "dynamics.js",
     "workspace.js",
     "transforms.js",

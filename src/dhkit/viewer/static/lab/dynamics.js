@@ -2,11 +2,12 @@
 // ellipsoid of the tool's velocities.
 
 import { fixed, h } from "./dom.js";
+import { FollowingPanel } from "./following.js";
 import { formula } from "./formula.js";
 
-export class DynamicsPanel {
+export class DynamicsPanel extends FollowingPanel {
   constructor(lab, root) {
-    this.lab = lab;
+    super(lab, "dynamics.read");
     this.note = h("p", { class: "note", role: "status" });
     this.bars = h("div", { class: "bars" });
     this.heading = h("h2", {}, "Gravity torques");
@@ -19,14 +20,9 @@ export class DynamicsPanel {
   }
 
   take_arm(arm) {
-    this.arm = arm;
     this.note.textContent = arm.bodies ? (arm.assumed_bodies ? "the links' masses are assumed: uniform rods" : "") : "this arm has no masses: assume uniform links in Control";
     this.built = null;
-    this.read();
-  }
-
-  take_joints({ q }) {
-    if (!this.lab.page.player.active) this.read(q);
+    super.take_arm(arm);
   }
 
   take_dynamics({ ellipsoid }) {
@@ -36,7 +32,7 @@ export class DynamicsPanel {
   moved(q, time) {
     const { motion } = this.lab.state, tau = q && motion?.tau;
     this.torques = tau ? { title: "Torques of the motion", tau: tau[Math.round((time / motion.duration) * (tau.length - 1))] } : null;
-    this.read(q ? [...q] : this.lab.state.joints?.q);
+    super.moved(q);
   }
 
   // Joints that a run has locked have no torque of a controller.
@@ -49,19 +45,6 @@ export class DynamicsPanel {
 
   take_control({ running }) {
     if (!running) this.torques = null;
-  }
-
-  shown(visible) {
-    this.visible = visible;
-    const { player, motion } = this.lab.page;
-    if (visible && player.active && motion?.times) this.lab.page.showTime(player.time);
-    else this.read();
-  }
-
-  async read(q = this.lab.state.joints?.q) {
-    if (!this.visible || !q || q.length !== this.arm?.n) return;
-    const numbers = await this.lab.ask("dynamics.read", { q });
-    if (numbers) this.show(numbers);
   }
 
   show({ M, g, effort, lengths, manipulability, condition }) {

@@ -1,12 +1,13 @@
 // What the tool reaches, as points or a slice, and how far it is from the boundary.
 
 import { fixed, h } from "./dom.js";
+import { FollowingPanel } from "./following.js";
 
 const KINDS = [["none", "nothing"], ["points", "points that the tool reaches"], ["slice", "a slice through axis 1 and the tool"]];
 
-export class WorkspacePanel {
+export class WorkspacePanel extends FollowingPanel {
   constructor(lab, root) {
-    this.lab = lab;
+    super(lab, "workspace.read");
     this.kind = h("select", { "aria-label": "Workspace", onchange: () => lab.ask("workspace.show", { kind: this.kind.value }) }, KINDS.map(([value, text]) => h("option", { value }, text)));
     this.again = h("button", { type: "button", onclick: () => lab.ask("workspace.show", { kind: this.kind.value }) }, "Draw again");
     this.note = h("p", { class: "note", role: "status" });
@@ -21,31 +22,7 @@ export class WorkspacePanel {
     this.note.textContent = error ?? (progress ? `sampling … ${progress}` : kind === "none" ? "" : `${count} points; ${about}`);
   }
 
-  take_arm(arm) {
-    this.n = arm.n;
-    this.read();
-  }
-
-  take_joints({ q }) {
-    if (!this.lab.page.player.active) this.read(q);
-  }
-
-  moved(q) {
-    this.read(q ? [...q] : this.lab.state.joints?.q);
-  }
-
-  shown(visible) {
-    this.visible = visible;
-    const { player, motion } = this.lab.page;
-    if (visible && player.active && motion?.times) this.lab.page.showTime(player.time);
-    else this.read();
-  }
-
-  async read(q = this.lab.state.joints?.q) {
-    if (!this.visible || !q || q.length !== this.n) return;
-    const found = await this.lab.ask("workspace.read", { q });
-    if (!found) return;
-    const { distance, boundary, point } = found;
+  show({ distance, boundary, point }) {
     this.distance.textContent = distance === null ? "not known in closed form for this arm: the points show it" : `${fixed(1000 * distance, 1)} mm from the ${boundary} boundary${point === "tool" ? "" : ` (of the ${point})`}`;
   }
 }
