@@ -109,3 +109,20 @@ def test_without_one_there_is_nothing_of_it(open_lab):
     for request, data in (("own.score", {}), ("control.start", {"controller": "own"})):
         with pytest.raises(ValueError, match="--mine FILE"):
             lab.answer(request, data)
+
+
+def test_a_score_is_about_the_arm_on_show_alone(tmp_path):
+    source = tmp_path / "mine.py"
+    source.write_text("def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n")
+    with Lab(Arm.load("planar2r"), own=source) as lab:
+        deadline = time.monotonic() + 60
+        while not lab._own._state.get("report"):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        lab.answer("table.edit", {"row": 0, "column": "a", "text": "0.7"})
+        assert lab._own._state["report"] is None
+        assert lab._own._state["edited"]
+        lab.answer("own.score", {})
+        lab.answer("table.reset", {})  # before the score of the edited arm is there
+        time.sleep(1.0)
+        assert lab._own._state["report"] is None

@@ -343,3 +343,15 @@ def _children(psutil):
             yield child
         except psutil.Error:
             continue
+
+
+def test_the_end_of_a_slide_is_a_boundary():
+    arm = Arm.load("cobra600")
+    n = arm.description.numbers
+    for quill in (n.lower[2], n.upper[2]):
+        distance, boundary, point = boundary_distance(arm, [0.3, 1.5, quill, 0.0])
+        assert distance < 1e-9
+        assert boundary in ("upper", "lower")
+        assert point == "tool"
+    middle = (n.lower[2] + n.upper[2]) / 2
+    assert boundary_distance(arm, [0.3, 1.5, middle, 0.0])[0] > 0.05

@@ -142,8 +142,8 @@ def test_its_euler_angles_are_those_of_python(visit):
 @pytest.mark.parametrize(
     "texts",
     [
-        ["pi/2", "-pi/2", "90*deg", "17*inch", "2*(17 + 3/10)*inch", "-2^2", "2**-1", "sqrt(2)/2", "atan2(1, -1)", "1e-3"],
-        ["", "1 +", "(1", "1)", "2 3", "pi pi", "foo", "sin(1, 2)", "constructor", "__proto__", "x.y", "1/0", "()", "alert(1)"],
+        ["pi/2", "-pi/2", "90*deg", "17*inch", "2*(17 + 3/10)*inch", "-2^2", "2**-1", "sqrt(2)/2", "atan2(1, -1)", "1e-3", "abs(-2)", "sin(pi)*1e6", "cos(90*deg)", "tan(45*deg)", "4^0.5"],
+        ["", "1 +", "(1", "1)", "2 3", "pi pi", "foo", "sin(1, 2)", "constructor", "__proto__", "x.y", "1/0", "()", "alert(1)", "tan(90*deg)", "1/cos(90*deg)", "pi/tan(90*deg)-2", "2^0.3", "2^65"],
     ],
 )  # fmt: skip
 def test_its_entries_mean_what_they_mean_in_python(visit, texts):
@@ -160,7 +160,7 @@ def test_its_entries_mean_what_they_mean_in_python(visit, texts):
             assert isinstance(value, str), text
             assert value
             continue
-        assert abs(value - expected) < 1e-15, text
+        assert abs(value - expected) < 1e-15 * max(1.0, abs(expected)), text
 
 
 def test_deep_and_long_entries_are_refused_at_once(visit):
@@ -403,3 +403,56 @@ def test_it_works_in_a_sandboxed_frame_as_notebooks_have_it(chromium, signal_arm
         assert time.monotonic() < deadline, page.errors
     page.close()
     assert page.errors == []
+
+
+@pytest.mark.parametrize(
+    ("links", "error"),
+    [
+        ({"x": "javascript:void(globalThis.hacked=1)"}, ValueError),
+        ({"x": " java\nscript:alert(1)"}, ValueError),
+        ({"x": "data:text/html,x"}, ValueError),
+        ({"x": "file:///etc/passwd"}, ValueError),
+        ({"x": 1}, TypeError),
+        ({"x": None}, TypeError),
+    ],
+)
+def test_links_lead_to_pages_alone(links, error):
+    view = View(Arm.load("planar2r").description)
+    with pytest.raises(error, match="links"):
+        view.html(interactive=True, links=links)
+
+
+def test_relative_and_web_addresses_are_links(visit):
+    links = {"a": "other.html", "b": "a/b.html#c", "c": "https://example.org/x:y", "d": "mailto:a@b.org", "e": "?q=a:b"}
+    page = visit(View(Arm.load("planar2r").description), links=links, caption="links")
+    assert page.evaluate("[...document.querySelectorAll('#panel-about a')].map(a => a.getAttribute('href'))") == list(
+        links.values()
+    )
+
+
+def test_a_long_motion_and_a_short_excess_are_told():
+    from dhkit.viewer.interactive import _motion_state
+
+    arm = Arm.load("planar2r")
+    t = np.linspace(0, 40, 40001)
+    q = np.zeros((40001, 2))
+    q[20010:20030, 0] = 1e3
+    assert _motion_state(arm.description, "spike", (t, q))["excess"] is not None
+    t = np.linspace(0, 36000, 360001)
+    state = _motion_state(arm.description, "long", (t, np.c_[np.sin(2 * np.pi * t / 60), 0 * t]))
+    assert np.ptp(np.array(state["q"])[:, 0]) > 1.9
+    assert state["step"] == pytest.approx(6.0)
+
+
+def test_entries_that_nobody_changed_are_not_read_again(visit):
+    arm = Arm(
+        from_dh([(0, 0, 0.3, 0), (0, 0, "abs(l1)", 0)], order=("theta", "d", "a", "alpha"), parameters={"l1": -0.4})
+    )
+    page = visit(View(arm.description))
+    assert page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: '0.5' })") == {"error": None}
+    tool_is(page, with_entry(arm, 0, "a", "0.5"))
+    # A good entry counts also where it was typed while another was bad.
+    page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: 'x' })")
+    page.evaluate("dhkit.lab.ask('table.edit', { row: 1, column: 'd', text: '0.2' })")
+    page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: '0.6' })")
+    tool_is(page, with_entry(with_entry(arm, 0, "a", "0.6"), 1, "d", "0.2"))

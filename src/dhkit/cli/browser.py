@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 import webbrowser
 from collections.abc import Sequence
@@ -18,7 +20,9 @@ __all__ = ["run_lab", "run_view", "until_interrupted"]
 
 
 def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
-    """Say where a page is, open it, and wait for Ctrl-C; return 0."""
+    """Say where a page is, open it, and wait for Ctrl-C or SIGTERM; return 0."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _interrupted)  # what was started is ended, and folders go
     try:
         say(f"{what} at {url}; Ctrl-C ends it")
         if open_browser:
@@ -27,6 +31,10 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
             time.sleep(3600)
     except KeyboardInterrupt:
         return 0
+
+
+def _interrupted(*_: object) -> None:
+    raise KeyboardInterrupt
 
 
 def run_lab(

@@ -35,7 +35,8 @@ def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes
 def write_atomically(path: Path, content: str | bytes, *, private: bool = False) -> None:
     """Write a file under a temporary name and rename it: it is there whole, or not at all.
 
-    With ``private`` nobody else may read or write it, whatever the umask.
+    With ``private`` nobody else may read or write it, whatever the umask. A link is followed, and what is no file, such
+    as ``/dev/stdout`` or a named pipe, is written to as it is: a file in its place would be another thing.
 
     Raises
     ------
@@ -47,6 +48,11 @@ def write_atomically(path: Path, content: str | bytes, *, private: bool = False)
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(path.parent))
+    if not private:
+        path = path.resolve()
+        if path.exists() and not path.is_file():
+            path.write_bytes(data)
+            return
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:

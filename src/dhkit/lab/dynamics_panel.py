@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,9 @@ ENTRY = re.compile(r"(M)([1-9])([1-9])|(g)([1-9])")
 class DynamicsPanel:
     """Requests ``dynamics.…``."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, lock: AbstractContextManager[Any]) -> None:
         self.desk = desk
-        self._jobs = Jobs(self._failed, None)
+        self._jobs = Jobs(self._failed, lock)
         self._ellipsoid = False
         desk.changed.append(self._replaced)
         desk.shown.append(self._draw)

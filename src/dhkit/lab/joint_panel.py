@@ -31,7 +31,7 @@ class JointPanel:
         """Show a configuration by its name, zero, or random joint values inside the limits."""
         arm = self.desk.arm
         name = Fields("joints.named", data, ["name"]).choice("name", ["zero", "random", *arm.configurations])
-        if name == "random":
+        if name == "random" and name not in arm.configurations:
             q = random_states(arm, self._random, 1)[0]
         else:
             q = np.array(arm.configurations.get(name, np.zeros(arm.n)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,13 @@ LIVE = Limits(seconds=1.0)
 class OwnPanel:
     """Requests ``own.…``; a thread of its own compares the program with the arm, and loads it anew when it is saved."""
 
-    def __init__(self, desk: Desk, source: Path | Sequence[str] | None, sandbox: str | None = None) -> None:
+    def __init__(
+        self,
+        desk: Desk,
+        source: Path | Sequence[str] | None,
+        sandbox: str | None = None,
+        lock: AbstractContextManager[Any] | None = None,
+    ) -> None:
         self.desk, self.source, self._sandbox = desk, source, sandbox
         self.changed: list[Callable[[], None]] = []
         """Called when there are other functions."""
@@ -50,7 +57,8 @@ class OwnPanel:
         self._program: Program | None = None
         self._driver: Program | None = None
         self._judge: Program | None = None
-        self._scores = Jobs(lambda state: None)
+        self._scores = Jobs(lambda state: None, lock)
+        desk.changed.append(self._replaced)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         if source is not None:
@@ -199,6 +207,14 @@ class OwnPanel:
             self.desk.view.ghosts(finite[:16] if len(finite) else None)
         return {"count": len(finite), "right": sum(right), "q": finite[:16].tolist()}
 
+    def _replaced(self) -> None:
+        """Leave what was found about another arm."""
+        if self.source is None:
+            return
+        self._scores.cancel()
+        self._seen = None
+        self._tell(scoring=False, report=None, fk=None, ik=None, edited=True)
+
     def _score(self) -> None:
         source, arm = self.source, self.desk.arm
         assert source is not None  # noqa: S101 - for mypy
@@ -214,11 +230,14 @@ class OwnPanel:
                 return {"error": str(error)}
 
         def take(report: dict[str, Any]) -> None:
+            if arm is not self.desk.arm:  # edited meanwhile
+                self._tell(scoring=False, report=None)
+                return
             self._tell(scoring=False, report=report)
             for call in self.scored:
                 call(arm, report)
 
-        self._tell(scoring=True)
+        self._tell(scoring=True, edited=False)
         self._scores.start("score", work, take)
 
 

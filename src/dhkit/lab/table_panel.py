@@ -212,8 +212,12 @@ class TablePanel:
 
 
 def typed(text: str) -> str:
-    """Return an entry as expressions are written: 90° is 90*deg, π is pi, a decimal comma a point."""
-    return re.sub(r"(?<=\d),(?=\d)", ".", text.replace("°", "*deg").replace("π", "pi").replace("−", "-"))
+    """Return an entry as expressions are written: 90° is 90*deg, π is pi, and a decimal comma a point.
+
+    Where something is called, as in ``atan2(1,2)``, a comma stands between values.
+    """
+    plain = text.replace("°", "*deg").replace("π", "pi").replace("−", "-")
+    return plain if "(" in plain else re.sub(r"(?<=\d),(?=\d)", ".", plain)
 
 
 def _drawn(description: Description) -> Description:

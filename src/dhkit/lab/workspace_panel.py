@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +26,8 @@ SHOWN = 10_000
 """Points that are drawn at most: more are slow without a graphics processor."""
 THIN = 0.02
 """Half the thickness of a slice, share of the arm's reach."""
+SAME = 1e-9
+"""m."""
 WRIST = 5
 """Frame whose origin is the wrist's centre of an arm with six joints, in both conventions."""
 
@@ -32,10 +35,10 @@ WRIST = 5
 class WorkspacePanel:
     """Requests ``workspace.…``."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, lock: AbstractContextManager[Any]) -> None:
         self.desk = desk
         self._state: dict[str, Any] = {"kind": "none"}
-        self._jobs = Jobs(self._told, None)
+        self._jobs = Jobs(self._told, lock)
         desk.changed.append(self._replaced)
 
     def show(self, data: dict[str, Any]) -> dict[str, Any]:
@@ -102,7 +105,8 @@ def boundary_distance(arm: Arm, q: Array) -> tuple[float, str, str] | None:
     Returns
     -------
     tuple[float, str, str] | None
-        Distance, m; the boundary: outer, inner or shoulder; and the point that it bounds, such as ``wrist centre``.
+        Distance, m; the boundary: outer, inner, shoulder, or the upper or lower end of a slide; and the point that it
+        bounds, such as ``wrist centre``.
         None where the boundaries are not known in closed form. Limits of turning joints do not count.
     """
     found = _sections(arm.description)
@@ -113,9 +117,16 @@ def boundary_distance(arm: Arm, q: Array) -> tuple[float, str, str] | None:
     best: tuple[float, str, str] | None = None
     for name, point, section in sections:
         position = arm.fk(q)[:3, 3] if point == "tool" else frames[min(WRIST, arm.n), :3, 3]
-        distance = _from_line(_turned_in(position[None], axis)[0], section)
-        if np.isfinite(distance) and (best is None or distance < best[0]):
-            best = float(distance), name, point
+        place = _turned_in(position[None], axis)[0]
+        candidates = [(_from_line(place, section), name)]
+        heights = section[np.isfinite(section).all(axis=1)]
+        if len(heights) > 1 and np.ptp(heights[:, 0]) < SAME and np.ptp(heights[:, 1]) > SAME:
+            # The wall of a tube that a slide along axis 1 makes: it ends above and below.
+            ends = ((heights[:, 1].max(), "upper"), (heights[:, 1].min(), "lower"))
+            candidates += [(abs(place[1] - height), end) for height, end in ends]
+        for distance, boundary in candidates:
+            if np.isfinite(distance) and (best is None or distance < best[0]):
+                best = float(distance), boundary, point
     return best
 
 

@@ -13,11 +13,13 @@ from dhkit.programs.program import Program
 __all__ = ["CLOSE", "EXAMPLES", "Caller"]
 
 CLOSE = 1e-6
-"""m and entries of a rotation matrix between a pose and the one that is reached."""
+"""Between a pose and the one that is reached: entries of the rotations, and positions in shares of the arm's reach."""
 EXAMPLES = 5
 """Failing poses that are listed."""
 MOST_FAILURES = 3
 """Failures in a row (of those that end a program) after which it is not called again."""
+LONGEST = 600.0
+"""s of all calls of a function together."""
 FATAL = {"late", "memory", "processes", "ended", "garbage"}
 
 
@@ -29,6 +31,7 @@ class Caller:
         self.failures: Counter[str] = Counter()
         self.seconds: list[float] = []
         self._fatal = 0
+        self._begun = time.perf_counter()
 
     def __call__(self, *arguments: Any) -> Array:
         """Return the function's value, as :meth:`Program.fk` and the like give it.
@@ -40,6 +43,9 @@ class Caller:
         """
         if self._fatal >= MOST_FAILURES:
             raise ProgramError("not called any more", "ended")
+        if time.perf_counter() - self._begun > LONGEST:
+            self.failures[f"scoring took longer than {LONGEST:g} s: not called any more"] = 1
+            raise ProgramError("not called any more", "late")
         begin = time.perf_counter()
         try:
             value: Array = getattr(self.program, self.function)(*arguments)

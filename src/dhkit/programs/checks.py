@@ -9,14 +9,14 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
-from dhkit.errors import DhkitError
+from dhkit.errors import AnswerError, DhkitError
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part, share_within
-from dhkit.programs.rubric import CheckRubric
+from dhkit.programs.rubric import CheckRubric, ControllerTask
 
 __all__ = ["check"]
 
@@ -87,7 +87,7 @@ def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, s
     good = np.zeros(samples, dtype=bool)
     for k, q in enumerate(states):
         T = _matrix(call, q)
-        good[k] = T is not None and np.abs(T - truth[k]).max() < CLOSE * max(1.0, arm.description.reach)
+        good[k] = T is not None and _apart(arm, T, truth[k]) < CLOSE
     most = rubric.points("fk")["agrees"]
     text = f"{good.sum()} of {samples} poses agree"
     details = call.said()
@@ -95,6 +95,12 @@ def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, s
         k = int(np.argmin(good))
         details = (f"first at q = {_listed(states[k])}", *_fk_hint(arm, call, rng))
     yield Part("agrees", most * good.mean(), most, text, details)
+
+
+def _apart(arm: Arm, T: Array, other: Array) -> float:
+    """Return how far two poses are apart: entries of the rotations, and positions in shares of the reach."""
+    found = np.abs(T - other)
+    return max(float(found[:3, :3].max()), float(found[:3, 3].max()) / (arm.description.reach or 1.0))
 
 
 def _matrix(call: Caller, q: Array) -> Array | None:
@@ -110,7 +116,7 @@ def _fk_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, ...
     q = random_states(arm, rng, 1)[0]
     scale = np.where(arm.description.numbers.prismatic, 1.0, 180 / np.pi)
     T = _matrix(call, q * scale)
-    if T is not None and np.abs(T - arm.fk(q)).max() < CLOSE:
+    if T is not None and _apart(arm, T, arm.fk(q)) < CLOSE:
         return ("it agrees when it is given degrees; expected radians",)
     for i, joint in enumerate(arm.description.joints):
         moved = q.copy()
@@ -153,7 +159,12 @@ def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Gene
 def _ends(arm: Arm, start: str, goal: str) -> tuple[Array, Array]:
     """Return two configurations by name; where they are the same state, another one takes the place of the second."""
     known = {"zero": np.zeros(arm.n)} | {name: np.array(q) for name, q in arm.configurations.items()}
-    first, second = known.get(start, known["zero"]), known.get(goal, known["zero"])
+    # The usual task begins in "ready", which not every arm has.
+    known.setdefault(ControllerTask.start, known["zero"])
+    for key, name in (("start", start), ("goal", goal)):
+        if name not in known:
+            raise AnswerError(f"controller.{key}: {arm.name} has no configuration {name!r}; it has {', '.join(known)}")
+    first, second = known[start], known[goal]
     if np.abs(second - first).max() > APART:
         return first, second
     numbers = arm.description.numbers

@@ -13,7 +13,7 @@ from dhkit.description import Array
 from dhkit.kinematics import classify
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.process import ProgramError
-from dhkit.programs.random_poses import poses_out_of_reach, regular_states, singular_states
+from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
@@ -23,6 +23,10 @@ SAME = 1e-5
 """rad and m between joint values that count as one solution; near singular poses they are less exact than the pose."""
 FEWEST = 10
 """Singular poses, where there are as many samples."""
+LARGEST = 1e6
+"""rad and m of a solution."""
+RANK = 1e-9
+"""Singular values of a Jacobian, m, that are zero."""
 STRANGERS = 0.1
 """Share of the poses that are out of reach."""
 ORDERS = {"axes 2 and 3 parallel": (0, 2, 1), "axes 2, 3 and 4 parallel": (0, 4, 5, 2, 1, 3)}
@@ -42,11 +46,11 @@ def score_inverse(
     regular = [judge.reached(T) for T in arm.fk(regular_states(arm, rng, samples))]
     seconds = np.median(call.seconds) if call.seconds else np.inf
     far = poses_out_of_reach(arm, rng, max(1, round(STRANGERS * samples)))
-    empty = [judge.empty(T) for T in far]
+    empty = [judge.empty(T) for T in far]  # none where an unlimited slide reaches everything
     # Who returns nothing for any pose has not recognised those out of reach.
     share = float(np.mean([*(bool(found) for found in regular), *empty])) if any(regular) else 0.0
     text = f"{sum(map(bool, regular))} of {len(regular)} poses are met by every solution returned; "
-    text += f"{sum(empty)} of {len(empty)} out of reach are empty"
+    text += f"{sum(empty)} of {len(empty)} out of reach are empty" if len(empty) else "none is out of reach"
     yield Part("closes", (points["closes"] + spare) * share, points["closes"] + spare, text, judge.details())
     if closed:
         yield _branches(judge, regular, points["branches"])
@@ -79,6 +83,13 @@ class _Poses:
 
     def __init__(self, arm: Arm, call: Caller, closed: bool) -> None:
         self.arm, self.call, self.closed = arm, call, closed
+        fit = classify(arm.description).fit
+        q = random_states(arm, np.random.default_rng(0), 1)[0]
+        decides = np.linalg.matrix_rank(arm.jacobian(q)[:3], RANK) == arm.n
+        self._position_alone = fit is not None and set(fit.met) <= {"x", "y", "z"} and bool(decides)
+        """Whether the arm's solutions are those of a position, which decides all joints; else they are of a pose."""
+        self._incomplete = False
+        """Whether the last answer had NaN, infinity or enormous numbers."""
         self.wrong: Counter[str] = Counter()
         self.none = 0
 
@@ -87,6 +98,7 @@ class _Poses:
         rows = self._rows(T)
         if rows is None:
             return Found(False)
+        incomplete = self._incomplete
         if not len(rows):
             self.none += 1
             return Found(False)
@@ -100,7 +112,7 @@ class _Poses:
             hit = {k for found in near for k in found}
             names = tuple(truth.branches[k] for k in sorted(hit))
             missing = tuple(truth.branches[k] for k in exists if k not in hit)
-        right = max(errors) < CLOSE
+        right = all(error < CLOSE for error in errors) and not incomplete
         if not right:
             self._diagnose(rows[int(np.argmax(errors))], T)
         return Found(right, names, missing)
@@ -108,6 +120,8 @@ class _Poses:
     def empty(self, T: Array) -> bool:
         """Return whether nothing is returned for a pose out of reach."""
         rows = self._rows(T)
+        if rows is not None and self._incomplete:
+            return False
         if rows is not None and len(rows):
             self.wrong["solutions were returned for poses that are out of reach; expected none"] += 1
         return rows is not None and not len(rows)
@@ -124,15 +138,16 @@ class _Poses:
             rows = self.call(T, self.arm.n)
         except ProgramError:
             return None
-        finite = np.isfinite(rows).all(axis=1)
+        finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < LARGEST).all(axis=1)
+        self._incomplete = not finite.all()
         if not finite.all():
             self.wrong["NaN or infinity was returned; expected no row where there is no solution"] += 1
         return rows[finite]
 
     def _error(self, q: Array, T: Array) -> float:
-        found = self.arm.fk(q) - T
-        whole = self.arm.n >= 4
-        return float(np.abs(found if whole else found[:3, 3]).max())
+        found = np.abs(self.arm.fk(q) - T)
+        position = float(found[:3, 3].max()) / (self.arm.description.reach or 1.0)
+        return position if self._position_alone else max(position, float(found[:3, :3].max()))
 
     def _apart(self, q: Array, other: Array) -> Array:
         """Return by how much joint values differ, angles by less than half a turn."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import select
 import shutil
 import signal
 import subprocess
@@ -22,7 +23,7 @@ import psutil
 
 from dhkit.errors import DhkitError
 
-__all__ = ["HERE", "Limits", "Process", "ProgramError"]
+__all__ = ["HERE", "Limits", "Process", "ProgramError", "printable"]
 
 HERE = Path(__file__).parent
 LONGEST_LINE = 1 << 22
@@ -106,10 +107,21 @@ class Process:
         self._count += 1
         return self._count
 
-    def write(self, line: bytes) -> None:
-        """Send a request; to a process that has ended, nothing."""
+    def write(self, line: bytes, deadline: float, seconds: float) -> None:
+        """Send a request; to a process that has ended, nothing.
+
+        Raises
+        ------
+        ProgramError
+            It is not read until the deadline, which so many seconds end at.
+        """
         with suppress(BrokenPipeError):
-            os.write(self._requests, line)
+            while line:
+                left = deadline - time.monotonic()
+                if left <= 0 or not select.select([], [self._requests], [], left)[1]:
+                    raise self._failed("late", seconds)
+                with suppress(BlockingIOError):
+                    line = line[os.write(self._requests, line) :]
 
     def read(self, deadline: float, seconds: float) -> dict[str, Any]:
         """Return the next answer; it must come within so many seconds, which end at the deadline.
@@ -152,9 +164,7 @@ class Process:
             self._process.kill()
             self._process.wait()
         # What was seen and is still there: its supervisor was killed by the program.
-        for process in list(self._known.values()):
-            with suppress(psutil.Error):
-                process.kill()
+        self._kill_known()
         os.close(self._requests)
         for thread in self._threads:
             if thread is not threading.current_thread():
@@ -165,6 +175,7 @@ class Process:
         folder = Path(self._folder.name).resolve()
         program = _sandboxed(command(folder), folder, sandbox)
         requests, self._requests = os.pipe()
+        os.set_blocking(self._requests, False)
         self._answers, answers = os.pipe()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - a program of others is what it is for
@@ -195,7 +206,7 @@ class Process:
             "garbage": "wrote what is no answer",
         }
         printed = self.output().strip().splitlines() if self.failure == "ended" else []
-        said = f": {printed[-1][:200]}" if printed else ""
+        said = f": {printable(printed[-1])[:200]}" if printed else ""
         return ProgramError(texts[self.failure] + said, self.failure)
 
     def _status(self) -> str:
@@ -240,7 +251,10 @@ class Process:
                     memory += process.memory_info().rss
                 except psutil.Error:
                     self._known.pop(process.pid, None)
-            if memory > self._limits.memory:
+            if (self._process.poll() or 0) < 0:  # the program has killed its supervisor
+                self.failure = self.failure or "ended"
+                self._kill_known()
+            elif memory > self._limits.memory:
                 self._give_up("memory")
             elif len(self._known) > MOST_PROCESSES:
                 self._give_up("processes")
@@ -251,10 +265,20 @@ class Process:
             for process in psutil.Process(self._process.pid).children(recursive=True):
                 self._known.setdefault(process.pid, process)
 
+    def _kill_known(self) -> None:
+        for process in list(self._known.values()):
+            with suppress(psutil.Error):
+                process.kill()
+
     def _give_up(self, how: Failure) -> None:
         self.failure = self.failure or how
         with suppress(OSError):
             self._process.send_signal(signal.SIGTERM)
+
+
+def printable(text: str) -> str:
+    """Return a program's text without characters that a terminal takes as commands."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _environment(folder: Path) -> dict[str, str]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.programs.process import HERE, Limits, Process, ProgramError
+from dhkit.programs.process import HERE, Limits, Process, ProgramError, printable
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
@@ -27,6 +27,8 @@ FUNCTIONS = ("fk", "ik", "controller")
 """What a program may define."""
 LARGEST_SOURCE = 1_000_000
 """Bytes of a source file."""
+MOST_SOLUTIONS = 64
+"""Of a pose: no arm of six joints has more than 16."""
 LONGEST_START = 30.0
 """s from the start to the first line: importing numpy on a busy machine takes some."""
 
@@ -126,6 +128,8 @@ class Program:
         rows = _numbers("ik", self.call("ik", T=T.tolist()))
         if rows.size and (rows.ndim > 2 or rows.shape[-1] != n):
             raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", "raised")
+        if rows.size > MOST_SOLUTIONS * n:
+            raise ProgramError(f"ik returned {rows.size // n} solutions; expected at most {MOST_SOLUTIONS}", "raised")
         return rows.reshape(-1, n)
 
     def controller(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
@@ -181,9 +185,15 @@ class Program:
     def _asked(self, running: Process, request: dict[str, Any]) -> dict[str, Any]:
         number = running.next_number()
         # Octave reads one character beyond a line: the empty line behind it.
-        running.write(json.dumps({"id": number, **request}).encode() + b"\n\n")
+        line, seconds = json.dumps({"id": number, **request}).encode() + b"\n\n", self.limits.seconds
+        try:
+            running.write(line, time.monotonic() + seconds, seconds)
+        except ProgramError:
+            self._end(keep=True)
+            raise
+
         # Answers to requests that were given up come late: they are passed over.
-        return self._answer(running, self.limits.seconds, lambda message: message.get("id") == number)
+        return self._answer(running, seconds, lambda message: message.get("id") == number)
 
     def _answer(self, running: Process, seconds: float, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         deadline = time.monotonic() + seconds
@@ -241,12 +251,12 @@ def _numbers(function: str, value: Any) -> Array:
     """Return an answer as an array, null as NaN."""
     try:
         return np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ProgramError(f"{function} returned what is no array of numbers", "raised") from None
 
 
 def _text(error: Any) -> str:
-    return " ".join(str(error).split())[:500] or "failed"
+    return " ".join(printable(str(error)).split())[:500] or "failed"
 
 
 def _line(message: dict[str, Any]) -> int | None:

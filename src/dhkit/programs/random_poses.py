@@ -88,8 +88,15 @@ def _range(numbers: Any, i: int) -> tuple[float, float]:
 
 
 def poses_out_of_reach(arm: Arm, rng: np.random.Generator, count: int) -> Array:
-    """Return poses beyond the arm's reach, shape (count, 4, 4)."""
+    """Return poses beyond the arm's reach, shape (count, 4, 4); none of an arm with a slide without limits."""
+    numbers = arm.description.numbers
+    if (numbers.prismatic & ~(np.isfinite(numbers.lower) & np.isfinite(numbers.upper))).any():
+        return np.zeros((0, 4, 4))
     poses: Array = arm.fk(random_states(arm, rng, count))
-    away = poses[:, :3, 3] / np.maximum(np.linalg.norm(poses[:, :3, 3], axis=1, keepdims=True), 1e-9)
-    poses[:, :3, 3] = away * rng.uniform(2.0, 3.0, (count, 1)) * (arm.description.reach or 1.0)
+    base = numbers.T_world_base[:3, 3]
+    away = poses[:, :3, 3] - base
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    away = np.where(length > 1e-9, away / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
+    farthest = arm.description.reach + float(np.linalg.norm(numbers.T_last_tool[:3, 3]))
+    poses[:, :3, 3] = base + away * rng.uniform(2.0, 3.0, (count, 1)) * (farthest or 1.0)
     return poses

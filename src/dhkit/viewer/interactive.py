@@ -13,7 +13,7 @@ from dhkit.control import SimulationResult
 from dhkit.description import Array, Description
 from dhkit.kinematics import classify
 from dhkit.trajectories import Trajectory
-from dhkit.viewer.motion import Motion, exceeded_limit, played_motion
+from dhkit.viewer.motion import Motion, check_motion, exceeded_limit, played_motion
 from dhkit.viewer.scene import frame_labels
 
 if TYPE_CHECKING:
@@ -24,7 +24,9 @@ __all__ = ["COLUMNS", "arm_state", "interactive_data", "limits_state", "listed",
 COLUMNS = ("theta", "d", "a", "alpha")
 RATE = 30.0
 """Samples a second of a motion in a page, which draws straight lines between them."""
-MIN_SAMPLES, MAX_SAMPLES = 121, 601
+MIN_SAMPLES, MAX_SAMPLES = 121, 6001
+CHECKED = 4_001
+"""Samples of a trajectory at which its limits are looked at."""
 DIGITS = 6
 """Of joint values in a page: 1e-6 rad are 6 um on an arm of 6 m."""
 
@@ -60,7 +62,7 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
             | {name: values[i] for name, values in limits.items()}
             for i, joint in enumerate(description.joints)
         ],
-        "configurations": [*named, "random"],
+        "configurations": [*named, *([] if "random" in named else ["random"])],
         "named": {name: q.tolist() for name, q in named.items()},
         "family": fit.words,
         "closed_form": fit.fit is not None,
@@ -130,6 +132,7 @@ def interactive_data(
 def _motion_state(description: Description, name: str, motion: Motion) -> dict[str, Any]:
     """Return a motion at equal steps of time, with rates and torques where they are known."""
     times, q, reference_q = played_motion(description, motion)
+    excess = _exceeded(description, motion)
     grid = np.linspace(0.0, times[-1], int(np.clip(math.ceil(RATE * times[-1]) + 1, MIN_SAMPLES, MAX_SAMPLES)))
     tau: Array | None = None
     if isinstance(motion, Trajectory):
@@ -143,15 +146,28 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
     return {
         "name": name,
         "duration": float(grid[-1]),
-        "times": _rounded(grid),
+        "times": grid.tolist(),
         "q": _rounded(q),
         "qd": _rounded(qd),
         "tau": None if tau is None else _rounded(tau),
         "reference": None if reference_q is None else _rounded(_at(grid, times, reference_q)),
         "limits": limits_state(description),
         "touching": None,
-        "excess": exceeded_limit(description, q, qd, tau),
+        "excess": excess,
+        "step": float(grid[1]) if len(grid) == MAX_SAMPLES else None,
     }
+
+
+def _exceeded(description: Description, motion: Motion) -> str | None:
+    """Return the limit that a motion exceeds most, at its own samples, which a page may have fewer of."""
+    if isinstance(motion, Trajectory):
+        times = np.linspace(0.0, motion.duration, CHECKED)
+        bodies = all(joint.bodies for joint in description.joints)
+        return exceeded_limit(description, motion.q(times), motion.qd(times), motion.tau(times) if bodies else None)
+    if isinstance(motion, SimulationResult):
+        return exceeded_limit(description, motion.q, motion.qd, motion.tau)
+    times, q = check_motion(description, *motion)
+    return exceeded_limit(description, q, np.gradient(q, times, axis=0), None)
 
 
 def _at(grid: Array, times: Array, rows: Array) -> Array:

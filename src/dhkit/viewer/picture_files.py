@@ -87,6 +87,11 @@ def write_motion_gif(
         raise ValueError(f"rate is {rate:g}; expected 1 to 50 pictures a second")
     duration = float(played_motion(description, motion).times[-1])
     count = round(duration * rate) + 1
+    if count > MAX_PICTURES:
+        raise ValueError(
+            f"{duration:g} s at {rate:g} pictures a second are {count} pictures; expected at most {MAX_PICTURES}: "
+            "a lower rate, or a shorter motion"
+        )
     drawn = _motion_pictures(description, motion, count, size, frames, ghosts)
     return write_gif(_told(drawn, count, progress), path, rate)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -42,6 +43,8 @@ GHOST = 0.35
 """Opacity."""
 SIDES = 40
 """Of a round solid."""
+BLOCK = 4_000_000
+"""Pixels of triangles that are drawn at once."""
 LARGEST = 4000
 """Pixels of an edge."""
 
@@ -127,7 +130,10 @@ def pictures(
     references
         Joint values of a ghost that moves along, shape (N, n).
     """
-    width, height = size
+    try:
+        width, height = map(operator.index, size)
+    except (TypeError, ValueError):
+        raise ValueError(f"size is {size!r}; expected width and height in px, whole numbers") from None
     if not (16 <= width <= LARGEST and 16 <= height <= LARGEST):
         raise ValueError(f"size is {width} x {height}; expected 16 to {LARGEST} px an edge")
     solids = _solids(description)
@@ -164,16 +170,20 @@ def _triangles(part: Part) -> Array:
         case Mesh():
             mesh, scale = trimesh.load_scene(part.file, process=False).to_mesh(), float(shape.scale)
         case Box():
-            mesh = trimesh.creation.box([float(edge) for edge in shape.size])
+            edges = np.array([float(edge) for edge in shape.size])
+            mesh, scale = trimesh.creation.box(edges / edges.max()), float(edges.max())
         case Sphere():
-            mesh = trimesh.creation.uv_sphere(float(shape.radius), count=[SIDES // 2, SIDES])
+            mesh, scale = trimesh.creation.uv_sphere(1.0, count=[SIDES // 2, SIDES]), float(shape.radius)
         case Cylinder():
-            mesh = trimesh.creation.cylinder(float(shape.radius), float(shape.length), sections=SIDES)
+            scale = float(shape.radius)  # trimesh takes points that are nearer than 1e-8 for one
+            mesh = trimesh.creation.cylinder(1.0, float(shape.length) / scale, sections=SIDES)
         case Capsule():
-            mesh = trimesh.creation.capsule(float(shape.length), float(shape.radius), count=[SIDES, SIDES // 2])
+            scale = float(shape.radius)
+            mesh = trimesh.creation.capsule(float(shape.length) / scale, 1.0, count=[SIDES, SIDES // 2])
             mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
     T = part.T_link_part
     corners = scale * np.asarray(mesh.triangles, dtype=float)
+    corners = corners[np.isfinite(corners).all(axis=(1, 2))]
     return corners @ T[:3, :3].T + T[:3, 3]
 
 
@@ -213,6 +223,8 @@ class _Camera:
     """Fine pixels."""
     size: tuple[int, int]
     """Fine pixels."""
+    nearest: float
+    """Depth of what is nearer or behind, m."""
 
     @classmethod
     def around(cls, description: Description, points: Array, size: tuple[int, int]) -> _Camera:
@@ -234,13 +246,13 @@ class _Camera:
         across = np.abs((points - centre) @ R[:2].T) * 2 * focus / np.array(fine)
         depth = (points - centre) @ ahead
         distance = float(np.max(MARGIN * across.max(axis=1) - depth))
-        distance = max(distance, 0.3 * scene_size(description))
-        return cls(centre - distance * ahead, R, float(focus), fine)
+        distance = max(distance, 0.3 * float(np.linalg.norm(span)) or scene_size(description))
+        return cls(centre - distance * ahead, R, float(focus), fine, 1e-3 * distance)
 
     def seen(self, points: Array) -> Array:
         """Return points, shape (..., 3), as fine pixels right and down from the upper left, and the depth, m."""
         local = (points - self.eye) @ self.R.T
-        depth = np.maximum(local[..., 2:], 1e-3)
+        depth = np.maximum(local[..., 2:], self.nearest)
         return np.concatenate([self.focus * local[..., :2] / depth + 0.5 * np.array(self.size), depth], axis=-1)
 
 
@@ -287,6 +299,19 @@ def _rasterized(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDAr
         Shape (height, width, 3).
     """
     height, width = image.shape[:2]
+    drawn, nearest = image.reshape(-1, 3).copy(), np.zeros(height * width)
+    # In blocks that cover a few million pixels each: triangles behind each other would need any amount of memory.
+    boxes = np.ptp(np.clip(corners[..., :2], 0, [width, height]), axis=1) + 1
+    block = np.cumsum(boxes.prod(axis=1)) // BLOCK
+    for number in np.unique(block):
+        chosen = block == number
+        _draw_block(corners[chosen], colors[chosen], drawn, nearest, (height, width))
+    return drawn.reshape(image.shape)
+
+
+def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest: Array, size: tuple[int, int]) -> None:
+    """Draw triangles over pixels, shape (height * width, 3), whose nearest 1/depth so far is known, and change both."""
+    height, width = size
     which, y, left, right = _spans(corners[..., :2], height)
     first = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
     counts = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int) - first + 1
@@ -303,12 +328,9 @@ def _rasterized(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDAr
     pixel = y * width + x
     # 1/depth is linear across the picture; the largest is the nearest.
     nearness = 1 / az[which] + beta * (1 / bz - 1 / az)[which] + gamma * (1 / cz - 1 / az)[which]
-    best = np.zeros(height * width)
-    np.maximum.at(best, pixel, nearness)
-    front = nearness >= best[pixel]
-    drawn = image.reshape(-1, 3).copy()
+    np.maximum.at(nearest, pixel, nearness)
+    front = nearness >= nearest[pixel]
     drawn[pixel[front]] = np.rint(colors[which[front]]).astype(np.uint8)
-    return drawn.reshape(image.shape)
 
 
 def _spans(corners: Array, height: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:

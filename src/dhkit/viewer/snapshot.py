@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +53,7 @@ class Snapshot:
         links: Mapping[str, str],
     ) -> str:
         """Return a page without a server: see :meth:`dhkit.viewer.View.html`."""
-        title = f"{self.description.name} · dhkit" if title is None else title
+        title, caption = _text("title", title or f"{self.description.name} · dhkit"), _text("caption", caption)
         if not interactive:
             return offline_page([self.messages[slot] for slot in sorted(self.messages)], title)
         if motions is None:
@@ -62,8 +63,8 @@ class Snapshot:
             self.q,
             motions,
             caption=caption,
-            links=links,
-            ghosts=self.ghost_names,
+            links={_text("links", text): _address(address) for text, address in links.items()},
+            ghosts=[(_text("names", text), color) for text, color in self.ghost_names],
             overlays=[(text, color) for slot, text, color in DRAWN_BESIDE if slot in self.messages],
         )
         # The page works out poses and motions itself.
@@ -93,3 +94,18 @@ class Snapshot:
         ghosts = protocol.decode_ghosts(self.messages[Slot.GHOSTS])
         colors = [(int(r), int(g), int(b)) for r, g, b in ghosts.tints]
         return [Ghost(T, color) for T, color in zip(ghosts.transforms, colors, strict=True)]
+
+
+def _text(name: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is {type(value).__name__}; expected a text")
+    return value.encode("utf-8", "replace").decode()  # lone surrogates are no text
+
+
+def _address(value: object) -> str:
+    """Return an address that a page may lead to."""
+    address = _text("links", value)
+    plain = "".join(address.split())  # browsers pass over white space in a scheme
+    if not re.match(r"(https?://|mailto:|[^:]*$|[^:/?#]*[/?#])", plain) or not address.isprintable():
+        raise ValueError(f"links: found {address[:60]!r}; expected a relative address, or one of http, https or mailto")
+    return address

@@ -48,9 +48,9 @@ export class OwnPanel {
     return imported?.length ? h("p", { class: "bad" }, `it imports ${imported.join(", ")}`) : null;
   }
 
-  showScore({ report, scoring, error }) {
+  showScore({ report, scoring, error, edited }) {
     if (error) return this.score.replaceChildren();
-    if (!report) return this.score.replaceChildren(h("p", { class: "hint" }, scoring ? "scoring …" : ""));
+    if (!report) return this.score.replaceChildren(h("p", { class: "hint" }, scoring ? "scoring …" : edited ? "the arm was changed: score again" : ""));
     if (report.error) return this.score.replaceChildren(h("p", { class: "bad" }, report.error));
     const rows = Object.entries(report.functions).flatMap(([name, parts]) => [h("tr", {}, h("th", { colSpan: 2, scope: "rowgroup" }, name)), ...parts.map((part) => h("tr", {}, h("td", {}, `${part.name}`, h("small", {}, part.text), part.details.map((detail) => h("small", { class: "bad" }, detail))), h("td", { class: part.points < part.most ? "bad" : null }, `${fixed(part.points, 1)} of ${part.most}`)))]);
     this.score.replaceChildren(h("h3", {}, `${fixed(report.points, 1)} of ${report.most} points${scoring ? " (scoring again …)" : ""}`), h("table", {}, h("tbody", {}, rows)));

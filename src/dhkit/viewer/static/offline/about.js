@@ -18,7 +18,7 @@ export class AboutPanel {
       ...(caption || source).split("\n").filter((text) => text.trim()).map((text) => h("p", { class: "caption" }, text)),
       h("h2", {}, "Colours"),
       h("ul", { class: "colors" }, colors),
-      ...(links.length ? [h("h2", {}, "Read on"), h("ul", { class: "links" }, links.map(({ text, href }) => h("li", {}, h("a", { href }, text))))] : []),
+      ...(links.length ? [h("h2", {}, "Read on"), h("ul", { class: "links" }, links.filter(({ href }) => ["file:", "http:", "https:", "mailto:", "about:"].includes(new URL(href, document.baseURI === "about:srcdoc" ? "http://localhost" : document.baseURI).protocol)).map(({ text, href }) => h("li", {}, h("a", { href }, text))))] : []),
       h("p", { class: "hint" }, "This page needs no server and no network. F shows the frames, R brings the whole arm into view; the space bar plays and pauses."),
     );
   }

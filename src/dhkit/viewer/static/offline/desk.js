@@ -18,7 +18,7 @@ export class OfflineDesk {
     Object.assign(this, { page, data, failed });
     this.answers = {
       "joints.set": ({ q }) => this.show(q),
-      "joints.named": ({ name }) => this.show(name === "random" ? this.random() : data.arm.named[name]),
+      "joints.named": ({ name }) => this.show(Object.hasOwn(data.arm.named, name) ? data.arm.named[name] : this.random()),
       "tool.order": ({ order }) => this.choose(order),
       "tool.read": ({ q }) => this.tool(q),
       "table.edit": (edit) => this.edit(edit),
@@ -33,8 +33,8 @@ export class OfflineDesk {
     this.order = "XYZ";
     this.before = [];
     this.after = [];
-    // texts: of each row theta, d, a and alpha as they are typed; rows: the last good numbers.
-    this.first = this.now = { ...data.table, texts: data.table.texts, errors: [] };
+    // texts: of each row theta, d, a and alpha as they are typed; rows, good: the last good numbers, and their texts.
+    this.first = this.now = { ...data.table, good: data.table.texts, errors: [] };
     this.kinematics = new Kinematics(this.now);
     this.q = data.q;
   }
@@ -110,6 +110,7 @@ export class OfflineDesk {
     const rows = this.now.rows.map((last, i) => {
       const numbers = { ...last };
       COLUMNS.forEach((name, k) => {
+        if (texts[i][k] === this.now.good[i][k]) return; // read before, at first by Python
         try {
           numbers[name] = value(texts[i][k], this.data.parameters);
           if (Math.abs(numbers[name]) > LARGEST) throw new Error(`beyond ${LARGEST}`);
@@ -119,7 +120,8 @@ export class OfflineDesk {
       });
       return numbers;
     });
-    this.take({ ...this.now, texts, errors, rows: errors.length ? this.now.rows : rows });
+    const { now } = this;
+    this.take({ ...now, texts, errors, rows: errors.length ? now.rows : rows, good: errors.length ? now.good : texts });
     return { error: errors.find((error) => error.row === row && error.column === column)?.error ?? null };
   }
 

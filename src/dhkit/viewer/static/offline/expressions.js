@@ -2,23 +2,40 @@
 // dhkit/expressions/syntax.py, never evaluated as code.
 
 const CONSTANTS = { pi: Math.PI, deg: Math.PI / 180, mm: 1e-3, cm: 1e-2, inch: 0.0254 };
-const FUNCTIONS = { sin: Math.sin, cos: Math.cos, tan: Math.tan, asin: Math.asin, acos: Math.acos, atan: Math.atan, atan2: Math.atan2, sqrt: Math.sqrt };
+const FUNCTIONS = { sin: (x) => quarters(x)[1], cos: (x) => quarters(x)[0], tan: tangent, abs: Math.abs, asin: Math.asin, acos: Math.acos, atan: Math.atan, atan2: Math.atan2, sqrt: Math.sqrt };
 const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))/y;
-const LONGEST = 1000; // characters
+const LONGEST = 10000; // characters
 const DEEPEST = 50; // brackets, signs and powers in each other
 
-// 90° is 90*deg, π is pi, a decimal comma a point.
+const MOST_POWER = 64;
+
+// Cosine and sine, exact at multiples of 90°.
+function quarters(x) {
+  const turns = Math.round((2 * x) / Math.PI), exact = Math.abs(x - (turns * Math.PI) / 2) <= 4e-16 * Math.abs(x);
+  return exact ? [[1, 0], [0, 1], [-1, 0], [0, -1]][((turns % 4) + 4) % 4] : [Math.cos(x), Math.sin(x)];
+}
+
+function tangent(x) {
+  const [c, s] = quarters(x);
+  return s / c;
+}
+
+// 90° is 90*deg, π is pi, a decimal comma a point, where no function takes several values.
 export function normalized(text) {
-  return text.trim().replaceAll("°", "*deg").replaceAll("π", "pi").replaceAll("\u2212", "-").replace(/(\d),(?=\d)/g, "$1.");
+  return text.trim().replaceAll("°", "*deg").replaceAll("π", "pi").replaceAll("\u2212", "-").replace(/(\d),(?=\d)/g, text.includes("(") ? "$&" : "$1.");
 }
 
 // The value of an expression of names with values; an Error says what is wrong.
 export function value(text, names = {}) {
   const parser = new Parser(text, { ...CONSTANTS, ...names });
-  const result = parser.sum();
+  const result = finite(parser.sum());
   if (parser.at < parser.tokens.length) parser.fail();
-  if (!Number.isFinite(result)) throw new Error(`${text.slice(0, 40)} has no finite value`);
   return result;
+}
+
+function finite(x) {
+  if (!Number.isFinite(x)) throw new Error("no finite value");
+  return x;
 }
 
 class Parser {
@@ -52,7 +69,7 @@ class Parser {
 
   product() {
     let total = this.signed(), sign;
-    while ((sign = this.takes("*", "/"))) total = sign === "*" ? total * this.signed() : total / this.signed();
+    while ((sign = this.takes("*", "/"))) total = finite(sign === "*" ? total * this.signed() : total / this.signed());
     return total;
   }
 
@@ -65,7 +82,10 @@ class Parser {
 
   power() {
     const base = this.atom();
-    return this.takes("^", "**") ? base ** this.signed() : base;
+    if (!this.takes("^", "**")) return base;
+    const exponent = this.signed();
+    if (!Number.isInteger(2 * exponent) || Math.abs(exponent) > MOST_POWER) throw new Error(`an exponent of ${exponent}; expected a whole number or half of one`);
+    return finite(base ** exponent);
   }
 
   atom() {
@@ -80,7 +100,7 @@ class Parser {
       if (!known) throw new Error(`unknown function ${token}; expected one of ${Object.keys(FUNCTIONS).join(", ")}`);
       if (known.length !== values.length) throw new Error(`${token} takes ${known.length} value${known.length > 1 ? "s" : ""}, found ${values.length}`);
       if (!this.takes(")")) this.fail();
-      return known(...values);
+      return finite(known(...values));
     }
     if (!Object.hasOwn(this.names, token)) throw new Error(`unknown name ${token}; known are ${Object.keys(this.names).slice(0, 12).join(", ")}`);
     return this.names[token];

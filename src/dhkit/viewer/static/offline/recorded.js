@@ -27,7 +27,7 @@ export class RecordedPanel {
     this.motion = motion;
     [...this.list.children].forEach((button, k) => button.setAttribute("aria-pressed", String(motion?.index === k)));
     this.curves.root.hidden = !motion;
-    this.facts.textContent = motion ? [motion.excess, motion.reference ? "the grey arm is what was asked for" : null].filter(Boolean).join("; ") : "A motion plays when it is chosen; sliders end it.";
+    this.facts.textContent = motion ? [motion.excess, motion.step ? `long: drawn by a sample every ${fixed(motion.step, 2)} s` : null, motion.reference ? "the grey arm is what was asked for" : null].filter(Boolean).join("; ") : "A motion plays when it is chosen; sliders end it.";
     this.facts.classList.toggle("bad", Boolean(motion?.excess));
     if (motion) this.curves.draw(motion, this.lab.state.arm.joints);
   }
