@@ -41,7 +41,8 @@ def run(
             if json:
                 print_json({"error": str(error), "line": error.line, "output": printed[-2000:]})
             else:
-                sys.stderr.write(f"dhkit: {program.name}: {error}{os.linesep}")
+                said = str(error) if str(error).startswith(f"{source}") else f"{program.name}: {error}"
+                sys.stderr.write(f"dhkit: {said}{os.linesep}")
             return 2
     if json:
         print_json(report.to_dict(), indent=2)

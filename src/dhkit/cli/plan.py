@@ -97,7 +97,8 @@ class Files:
             with task.arm.view() as view:
                 view.obstacles(task.obstacles)
                 view.play(motion)
-                yield view.save_html(self.page, interactive=True)
+                caption = f"A planned motion of {motion.duration:.4g} s; its curves are under Motions, with the limits."
+                yield view.save_html(self.page, interactive=True, motions={"planned": motion}, caption=caption)
         if self.figure is not None:
             from dhkit.viewer import plot
 

@@ -28,6 +28,7 @@ def run(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str | 
     with arm.view() as view:
         view.play(played)
         if page is not None:
-            say(f"wrote {view.save_html(page, interactive=True)}")
+            caption = f"The motion of {path.name}."
+            say(f"wrote {view.save_html(page, interactive=True, motions={path.name: played}, caption=caption)}")
             return 0
         return until_interrupted(view.url, f"playing {path}", open_browser=True)

@@ -46,7 +46,12 @@ class Files:
         if self.page is not None:
             with arm.view() as view:
                 view.play(result)
-                yield view.save_html(self.page, interactive=True)
+                peak = 1000 * result.tool_norms.peak
+                caption = (
+                    f"A simulation of {result.t[-1]:.3g} s; the grey arm is what was asked for, and the tool is "
+                    f"{peak:.3g} mm away from it at most."
+                )
+                yield view.save_html(self.page, interactive=True, motions={"simulation": result}, caption=caption)
         if self.figure is not None:
             from dhkit.viewer import plot
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -202,14 +203,23 @@ class Assignment:
 
 
 def is_assignment(path: str | Path) -> bool:
-    """Return whether a file is TOML that says ``kind = "assignment"``; what else it says is not looked at."""
+    """Return whether a file is TOML that says ``kind = "assignment"``; what else it says is not looked at.
+
+    Raises
+    ------
+    DescriptionError
+        It says a kind that nearly is this one.
+    """
     if Path(path).suffix.lower() != ".toml":
         return False
     try:
         document = toml_document(read_bounded(Path(path), MAX_BYTES_OF_ROBOT).decode())
     except (DhkitError, UnicodeDecodeError):
         return False
-    return document.get("kind") == "assignment"
+    kind = document.get("kind")
+    if isinstance(kind, str) and kind != "assignment" and difflib.get_close_matches(kind, ["assignment"]):
+        raise DescriptionError(f"{path}: kind is {kind[:40]!r}; expected 'assignment', or no kind for a robot file")
+    return kind == "assignment"
 
 
 def _arm_of(name: str, folder: Path) -> Arm:
@@ -289,7 +299,10 @@ def _tool_at(arm: Arm, form: PoseForm, position: float, angle: float, place: str
     reach = numbers.reach + float(np.linalg.norm(numbers.T_last_tool[:3, 3]))
     if away > reach + position:
         raise DescriptionError(f"{place}{away:.4g} m from the base; expected at most {reach:.4g} m, the arm's reach")
-    if form.euler is not None and arm.n >= 6 and classify(description).fit is not None:
+    fit = classify(description).fit
+    # With a rotation the pose must be met; without one, the position of an arm that has no other choice.
+    decided = fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.met) <= {"x", "y", "z"})
+    if decided:
         found = arm.ik(T)
         near = 0 < float(found.distance) <= position  # beyond the workspace by less than the tolerance
         if not near and not bool(np.any(found.valid & found.within)):

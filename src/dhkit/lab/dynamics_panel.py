@@ -15,12 +15,15 @@ from dhkit.kinematics import condition_number, velocity_ellipsoid
 from dhkit.lab.desk import Desk
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.lab.jobs import Job, Jobs
-from dhkit.symbolic.equations import latex_text
+from dhkit.symbolic.equations import latex_lines
 from dhkit.symbolic.equations.quantities import quantities
 from dhkit.viewer.interactive import listed
 
 __all__ = ["DynamicsPanel"]
 
+ROOM = 21.0
+"""em of a line of a formula: what the panel is wide."""
+MOST_LINES = 60
 ENTRY = re.compile(r"(M)([1-9])([1-9])|(g)([1-9])")
 
 
@@ -101,12 +104,13 @@ def _formula(arm: Arm, name: str, job: Job) -> dict[str, Any]:
     place = tuple(int(digit) - 1 for digit in name[1:])
     element = quantity.elements[place]
     head = f"{name[0]}_{{{name[1:]}}}"
-    formula = mathml(f"{head} = {latex_text(element) if element else '0'}")
-    terms = len(element)
+    first, *others = latex_lines(element, ROOM) if element else ["0"]
+    formulas = [mathml(line) for line in (f"{head} = {first}", *(rf"\quad {line}" for line in others))]
+    terms, shown = len(element), len(formulas) <= MOST_LINES and all(formulas)
     return {
         "name": name,
         "deriving": False,
-        "mathml": formula,
+        "lines": formulas if shown else [],
         "terms": terms,
-        "error": None if formula else f"{name} has {terms} terms: dhkit equations writes them to a file",
+        "error": None if shown else f"{name} has {terms} terms: dhkit equations writes them to a file",
     }

@@ -9,12 +9,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import tomlkit
+from tomlkit.exceptions import TOMLKitError
 
 from dhkit.description import Description, to_toml
 from dhkit.errors import AnswerError
@@ -57,11 +58,14 @@ class SubmitPanel:
         """Judge an answer in the background; it is read as text, and never run."""
         fields = Fields("submit.grade", data, ["kind", "text"])
         kind, text = fields.choice("kind", SUFFIXES), fields.text("text", LONGEST)
+        self._replaced()  # an answer that cannot be sent leaves no verdict of another
         if not text.strip():
             raise ValueError("submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot")
         text = text.encode("utf-8", "replace").decode()  # lone surrogates are no text
         content = _sheet(text) if kind == "lines" else text
         description = self.desk.arm.description
+        if kind == "sheet":
+            _require_robot(content, description.name)
         self.desk.view.panel("verdict", {"running": True})
         self._jobs.start(
             "submit",
@@ -114,6 +118,14 @@ def _sheet(text: str) -> str:
     return tomlkit.dumps({"format": 1, "answer": entries})
 
 
+def _require_robot(text: str, name: str) -> None:
+    """Refuse a sheet about another robot; a text that is no sheet is refused where it is judged."""
+    with suppress(TOMLKitError):
+        robot = tomlkit.parse(text).get("robot")
+        if isinstance(robot, str) and Path(robot).stem != name:
+            raise ValueError(f"submit.grade: the sheet is about {str(robot)[:60]!r}; the arm here is {name}")
+
+
 def _judged(description: Description, text: str, suffix: str, job: Job) -> dict[str, Any]:
     """Return a report, made by ``dhkit grade`` in a process that is ended when nobody wants it any more."""
     job.progress("judging")
@@ -158,7 +170,7 @@ def _state(report: GradeReport, folder: str) -> dict[str, Any]:
     """Return what the page shows of a report, which does not name the folder that it was made in."""
     return {
         "running": False,
-        "error": report.error.replace(f"{folder}{os.sep}", "") or None,
+        "error": report.error.replace(f"{folder}{os.sep}answer", "the answer") or None,
         "verdict": report.verdict.value,
         "entries": [_entry(entry) for entry in report.entries if entry.answer],
         "missing": list(report.missing),

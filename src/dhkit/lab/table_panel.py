@@ -173,7 +173,8 @@ class TablePanel:
             beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= LARGEST))
             if len(beyond):
                 return Table(texts, last, {(int(i), int(k)): f"{COLUMNS[k]}: beyond {LARGEST:g}" for k, i in beyond})
-            return Table(texts, description)
+            first = self._first.description  # whoever types the first arm's numbers again has it again, meshes and all
+            return Table(texts, first if description == _drawn(first) else description)
         except (DhkitError, ValueError) as error:
             changed = [(i, k) for i, row in enumerate(texts) for k in range(4) if row[k] != self._now.texts[i][k]]
             return Table(texts, last, dict.fromkeys(changed or [(0, 0)], str(error)))

@@ -26,6 +26,8 @@ MOST_BYTES, MOST_TRIANGLES = 5_000_000, 5_000
 MOST_STEPS = 30
 LISTED = 24
 """Vertices whose coordinates are listed, and whose numbers are drawn."""
+TURN = 2 * np.pi
+"""rad: who turns further has perhaps meant degrees."""
 LARGEST = 1e4
 """rad or m of a step."""
 
@@ -113,7 +115,13 @@ class TransformsPanel:
             formulas = [mathml(latex) for latex in _formulas(k, kind, axis, amount, about)]
             told.append({"amount": amount, "E": E.ravel().tolist(), "T": T.ravel().tolist(), "formulas": formulas})
         corners = self.solid.vertices[:LISTED] @ T[:3, :3].T + T[:3, 3]
-        return {"steps": told, "vertices": corners.tolist()}
+        turns = [step["amount"] if steps[k]["kind"] == "turn" else 0.0 for k, step in enumerate(told)]
+        far = next((k for k, amount in enumerate(turns, start=1) if abs(amount) > TURN), None)
+        note = None
+        if far is not None:
+            amount = told[far - 1]["amount"]
+            note = f"step {far}: {amount:.4g} rad are {np.degrees(amount):.4g}°; degrees are written 90*deg or 90°"
+        return {"steps": told, "vertices": corners.tolist(), "note": note}
 
     def publish(self) -> None:
         """Tell the pages the solid."""
@@ -141,7 +149,7 @@ def _amount(where: str, text: str) -> float:
 
 def _formulas(k: int, kind: str, axis: str, amount: float, about: str) -> tuple[str, str]:
     """Return the pose after step k, and what the step does to points in the world, as LaTeX."""
-    size = f"{np.degrees(amount):.4g}^{{\\circ}}" if kind == "turn" else f"{amount:.4g}"
+    size = f"{np.degrees(amount):.4g}^{{\\circ}}" if kind == "turn" else rf"{amount:.4g}\,\mathrm{{m}}"
     E = f"{'R' if kind == 'turn' else 'D'}_{{{axis}}}({size})"
     if about == "fixed":
         return f"T_{{{k}}} = {E} T_{{{k - 1}}}", f"p' = {E} p"

@@ -15,11 +15,13 @@ from dhkit.programs.inverse import score_inverse
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
-from dhkit.programs.report import CheckReport, Part, share_within
+from dhkit.programs.report import CheckReport, Part, listed, share_within
 from dhkit.programs.rubric import CheckRubric, ControllerTask
 
 __all__ = ["check"]
 
+ROUNDED = 2e-3
+"""Largest difference of poses that may come from rounded numbers."""
 APART = 1e-6
 """rad and m between states that are not the same."""
 MOVED = 0.5
@@ -75,6 +77,10 @@ def check(
         score = {"fk": _fk, "ik": score_inverse, "controller": _controller}[name]
         functions[name] = tuple(score(arm, Caller(program, name), rubric, rng, samples))
     notes = [f"{program.name} imports {module}" for module in program.imported]
+    other = {"fk": "ik", "ik": "fk"}
+    absent = [other[name] for name in wanted if name in other and other[name] not in program.functions]
+    if absent and rubric.named == ():
+        notes.append(f"{program.name} does not define {absent[0]}: a rubric that names it asks for it")
     return CheckReport(arm.name, program.name, functions, tuple(notes), seed)
 
 
@@ -84,16 +90,17 @@ def check(
 def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int) -> Iterator[Part]:
     states = random_states(arm, rng, samples)
     truth = arm.fk(states)
-    good = np.zeros(samples, dtype=bool)
-    for k, q in enumerate(states):
-        T = _matrix(call, q)
-        good[k] = T is not None and _apart(arm, T, truth[k]) < CLOSE
+    found = [_matrix(call, q) for q in states]
+    apart = np.array([np.inf if T is None else _apart(arm, T, truth[k]) for k, T in enumerate(found)])
+    good = apart < CLOSE
     most = rubric.points("fk")["agrees"]
     text = f"{good.sum()} of {samples} poses agree"
     details = call.said()
     if not good.all() and not details:
         k = int(np.argmin(good))
-        details = (f"first at q = {_listed(states[k])}", *_fk_hint(arm, call, rng))
+        poses = [T for T in found if T is not None]
+        hint = _pose_hint(np.array(poses), float(apart.max())) or _fk_hint(arm, call, rng)
+        details = (f"first at q = {listed(states[k])}", *hint)
     yield Part("agrees", most * good.mean(), most, text, details)
 
 
@@ -109,6 +116,21 @@ def _matrix(call: Caller, q: Array) -> Array | None:
         return call(q)
     except ProgramError:
         return None
+
+
+def _pose_hint(poses: Array, apart: float) -> tuple[str, ...]:
+    """Say what is wrong with poses whatever the arm is, shape (N, 4, 4); ``apart`` is the largest difference."""
+    R = poses[:, :3, :3]
+    if np.ptp(poses, axis=0).max() < CLOSE:
+        return ("it gives the same pose for every q",)
+    if np.abs(poses[:, 3] - [0, 0, 0, 1]).max() > CLOSE:
+        return ("its last row is not 0 0 0 1",)
+    if apart < ROUNDED:
+        return (f"it differs by {apart:.1g} at most: are its numbers rounded? {CLOSE:g} is allowed",)
+    skew = float(np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max())
+    if skew > ROUNDED or np.any(np.linalg.det(R) < 0):
+        return (f"its upper left 3 x 3 part is no rotation: R^T R differs from 1 by {skew:.2g}; look at signs in A_i",)
+    return ()
 
 
 def _fk_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, ...]:
@@ -152,7 +174,8 @@ def _controller(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Gene
     share = share_within(peak, task.bound)
     joint = int(np.argmax(errors.max(axis=0)))
     name = arm.description.joints[joint].name
-    text = f"peak error {peak:.3g} in joint {joint + 1} ({name}); {task.bound:g} rad or m are asked for"
+    unit = "rad" if arm.description.joints[joint].is_revolute else "m"
+    text = f"peak error {peak:.3g} {unit} in joint {joint + 1} ({name}); {task.bound:g} {unit} is asked for"
     yield Part("follows", most * share, most, text, call.said())
 
 
@@ -171,7 +194,3 @@ def _ends(arm: Arm, start: str, goal: str) -> tuple[Array, Array]:
     room = np.where(numbers.upper - first >= first - numbers.lower, numbers.upper - first, numbers.lower - first)
     way = np.where(numbers.prismatic, MOVED * (arm.description.reach or 1.0), MOVED)
     return first, first + np.clip(room / 2, -way, way)
-
-
-def _listed(q: Array) -> str:
-    return "[" + ", ".join(f"{x:.4g}" for x in q) + "]"

@@ -14,7 +14,7 @@ from dhkit.kinematics import classify
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.process import ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
-from dhkit.programs.report import Part, share_within
+from dhkit.programs.report import Part, listed, share_within
 from dhkit.programs.rubric import CheckRubric
 
 __all__ = ["score_inverse"]
@@ -63,6 +63,8 @@ def score_inverse(
     quick = share_within(float(seconds), limit)
     met = float(np.mean([bool(found) for found in regular]))
     said = f"{1e3 * seconds:.3g} ms a pose; {1e3 * limit:g} ms are asked for" if np.isfinite(seconds) else "no answer"
+    if met < 1:
+        said += f"; counts for the {100 * met:.0f} % of the poses that are met"
     yield Part("time", points["time"] * quick * met, points["time"], said)
 
 
@@ -91,30 +93,39 @@ class _Poses:
         self._incomplete = False
         """Whether the last answer had NaN, infinity or enormous numbers."""
         self.wrong: Counter[str] = Counter()
+        self.example = ""
+        """A solution that is wrong, for a person to try."""
         self.none = 0
 
     def reached(self, T: Array) -> Found:
         """Return whether a pose is met by at least one solution, and by every one returned."""
         rows = self._rows(T)
-        if rows is None:
-            return Found(False)
-        incomplete = self._incomplete
-        if not len(rows):
-            self.none += 1
-            return Found(False)
-        errors = [self._error(q, T) for q in rows]
         names: tuple[str, ...] = ()
         missing: tuple[str, ...] = ()
         if self.closed:
             truth = self.arm.ik(T)
             exists = [k for k in range(len(truth.branches)) if truth.valid[k]]
+            missing = tuple(truth.branches[k] for k in exists)
+        if rows is None:
+            return Found(False, names, missing)
+        incomplete = self._incomplete
+        if not len(rows):
+            self.none += 1
+            return Found(False, names, missing)
+        errors = [self._error(q, T) for q in rows]
+        if self.closed:
             near = [[k for k in exists if self._apart(q, truth.q[k]).max() < SAME] for q in rows]
             hit = {k for found in near for k in found}
             names = tuple(truth.branches[k] for k in sorted(hit))
             missing = tuple(truth.branches[k] for k in exists if k not in hit)
         right = all(error < CLOSE for error in errors) and not incomplete
-        if not right:
-            self._diagnose(rows[int(np.argmax(errors))], T)
+        worst = rows[int(np.argmax(errors))]
+        if max(errors) >= CLOSE:
+            self._diagnose(worst, T)
+            if not self.example:
+                q = truth.q[truth.valid][0] if self.closed and truth.valid.any() else None
+                pose = "" if q is None else f"; fk of {listed(q)} is the pose"
+                self.example = f"for example {listed(worst)} was returned{pose}"
         return Found(right, names, missing)
 
     def empty(self, T: Array) -> bool:
@@ -130,7 +141,7 @@ class _Poses:
         """Return how it failed, the most frequent first."""
         none = (f"no solution for {self.none} poses that are in reach",) if self.none else ()
         wrong = tuple(f"{text} ({count} poses)" for text, count in self.wrong.most_common(EXAMPLES))
-        return (*self.call.said(), *wrong, *none)
+        return (*self.call.said(), *wrong, *none, *((self.example,) if self.example else ()))
 
     def _rows(self, T: Array) -> Array | None:
         """Return the solutions of a pose, shape (B, n); None where the function failed."""

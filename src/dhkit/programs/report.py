@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["CheckReport", "Part", "share_within"]
+from dhkit.description import Array
+
+__all__ = ["CheckReport", "Part", "listed", "share_within"]
 
 
 @dataclass(frozen=True)
@@ -88,3 +90,8 @@ class CheckReport:
 def share_within(value: float, bound: float) -> float:
     """Return the share of points for a value that should not exceed a bound: none at ten times the bound."""
     return float(np.clip(1 - np.log10(max(value, 1e-12) / bound), 0.0, 1.0))
+
+
+def listed(q: Array) -> str:
+    """Return joint values as a person reads them, rad and m."""
+    return "[" + ", ".join(f"{x:.4g}" for x in q) + "]"

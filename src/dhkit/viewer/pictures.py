@@ -407,7 +407,7 @@ def _finished(
                 draw.line([tuple(origin), tuple(end)], fill=color, width=2 * FINE)
         names = [(label.text, camera.seen(nodes[label.frame][:3, 3])[:2] / FINE) for label in frame_labels(description)]
     small = drawn.resize((camera.size[0] // FINE, camera.size[1] // FINE), Image.Resampling.LANCZOS)
-    draw, font = ImageDraw.Draw(small), ImageFont.load_default(14)
+    draw, font = ImageDraw.Draw(small), ImageFont.load_default(max(12, small.height // 36))
     for text, (x, y) in names:
         wide = draw.textlength(text, font=font)
         left = x + 7 if x + 7 + wide + 4 < small.width else x - 7 - wide

@@ -30,6 +30,10 @@ DRAWN_BESIDE = (
 """What a page says of things drawn beside the arm, and in which color of its style."""
 
 
+EMPTY = 20
+"""Bytes of a message about nothing: its header and a count."""
+
+
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """An arm in a state, and what is drawn beside it."""
@@ -65,7 +69,7 @@ class Snapshot:
             caption=caption,
             links={_text("links", text): _address(address) for text, address in links.items()},
             ghosts=[(_text("names", text), color) for text, color in self.ghost_names],
-            overlays=[(text, color) for slot, text, color in DRAWN_BESIDE if slot in self.messages],
+            overlays=[(text, color) for slot, text, color in DRAWN_BESIDE if len(self.messages.get(slot, b"")) > EMPTY],
         )
         # The page works out poses and motions itself.
         return offline_page([self.messages[slot] for slot in sorted(self.messages) if slot != Slot.MOTION], title, data)

@@ -1,7 +1,7 @@
 """Readable equations: one collected form, printed as text, LaTeX, sympy objects, Python, C and MATLAB."""
 
 from dhkit.symbolic.equations.c_code import equations_c
-from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_text
+from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_lines, latex_text
 from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
 from dhkit.symbolic.equations.notation import constants_of, generators_of, renamings, symbols_of
@@ -24,6 +24,7 @@ __all__ = [
     "equations_text",
     "generators_of",
     "latex_document",
+    "latex_lines",
     "latex_text",
     "matlab_files",
     "plain_text",

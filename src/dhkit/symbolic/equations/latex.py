@@ -26,7 +26,7 @@ from dhkit.symbolic.equations.quantities import Quantity, check_length
 from dhkit.symbolic.equations.writing import Printer, decimal_text
 from dhkit.symbolic.ring import Element, Generator, Ring
 
-__all__ = ["LatexWriter", "constant_latex", "displays", "equations_latex", "latex_text"]
+__all__ = ["LatexWriter", "constant_latex", "displays", "equations_latex", "latex_lines", "latex_text"]
 
 LINE = 29.5
 """What a line of an article's text holds, in em, of which some is kept for what the estimate of widths misses."""
@@ -110,6 +110,11 @@ def latex_text(element: Element) -> str:
     \tfrac{1}{3} m_{2} l_{2}^{2}
     """
     return _marked(element).replace(BREAK, "")
+
+
+def latex_lines(element: Element, room: float) -> list[str]:
+    """Return an element in LaTeX, in lines of some width, em, that are broken in front of terms."""
+    return _lines(_marked(element), room)
 
 
 def displays(quantities: Sequence[Quantity]) -> list[str]:

@@ -11,12 +11,13 @@ export class DynamicsPanel extends FollowingPanel {
     this.note = h("p", { class: "note", role: "status" });
     this.bars = h("div", { class: "bars" });
     this.heading = h("h2", {}, "Gravity torques");
+    this.inertia = h("h2", {}, "Mass matrix");
     this.torques = null; // of a controller or a motion, by joint; gravity's where there are none
     this.matrix = h("div", { class: "wide" });
     this.ellipsoid = h("button", { type: "button", "aria-pressed": "false", onclick: () => lab.ask("dynamics.ellipsoid", { on: this.ellipsoid.getAttribute("aria-pressed") !== "true" }) }, "Ellipsoid of velocities");
     this.facts = h("p", { class: "facts" });
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
-    root.append(this.note, this.heading, this.bars, h("h2", {}, "Mass matrix"), this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
+    root.append(this.note, this.heading, this.bars, this.inertia, this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
   }
 
   take_arm(arm) {
@@ -61,12 +62,14 @@ export class DynamicsPanel extends FollowingPanel {
     });
     if (M) this.cells.forEach((row, i) => row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))));
     const axes = lengths.filter((x) => x !== null).map((x) => fixed(x, 3)).join(", ");
-    this.facts.textContent = `half axes ${axes}; manipulability ${manipulability.toPrecision(3)}; condition number ${condition === null ? "infinite: singular" : condition.toPrecision(3)}`;
+    this.facts.textContent = `half axes ${axes} m/s for joint rates of norm 1; manipulability ${manipulability.toPrecision(3)}; condition number ${condition === null ? "infinite: singular" : condition.toPrecision(3)}`;
   }
 
   build(bodies) {
     const { arm } = this, ask = (name) => () => this.lab.ask("dynamics.entry", { name });
     this.built = arm;
+    const slides = arm.joints.map((joint) => joint.unit === "m");
+    this.inertia.textContent = `Mass matrix [${slides.every(Boolean) ? "kg" : slides.some(Boolean) ? "kg m², kg m, kg" : "kg m²"}]`;
     this.rows = bodies ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) })) : [];
     this.bars.replaceChildren(...this.rows.map(({ bar, value }, i) => h("div", { class: "bar" }, h("button", { type: "button", class: "quiet", title: `formula of g${i + 1}`, onclick: ask(`g${i + 1}`) }, arm.joints[i].name), h("span", { class: "track" }, bar), value)));
     this.cells = bodies ? arm.joints.map((_, i) => arm.joints.map((_, j) => h("button", { type: "button", class: "quiet", title: `formula of M${i + 1}${j + 1}`, "aria-label": `M${i + 1}${j + 1}`, onclick: ask(`M${i + 1}${j + 1}`) }))) : [];
@@ -76,7 +79,6 @@ export class DynamicsPanel extends FollowingPanel {
   take_entry(entry) {
     if (!entry) return this.entry.replaceChildren();
     if (entry.deriving) return this.entry.replaceChildren(h("p", { class: "hint" }, `deriving ${entry.name} …`));
-    const shown = formula(entry.mathml);
-    this.entry.replaceChildren(shown ?? h("p", { class: "bad" }, entry.error ?? ""));
+    this.entry.replaceChildren(...(entry.error ? [h("p", { class: "bad" }, entry.error)] : entry.lines.map((line) => formula(line) ?? "")));
   }
 }

@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 import { formula } from "./formula.js";
 
 const KINDS = [["lines", "Equations, one a line: M11 = …"], ["latex", "LaTeX"], ["python", "Python (read, not run)"], ["matlab", "MATLAB (read, not run)"], ["sheet", "Answer sheet (TOML)"]];
-const EXAMPLE = "M11 = (m1/3 + m2)*l1^2 + ...\ng2 = m2*g*l2*c12/2";
+const EXAMPLE = "M11 = ...\ng2 = ...";
 
 export class SubmitPanel {
   constructor(lab, root) {
@@ -21,13 +21,14 @@ export class SubmitPanel {
 
   take_arm(arm) {
     const names = arm.parameters ?? [];
+    this.text.placeholder = names.length ? EXAMPLE : "M66 = 0.19\ng1 = 0";
     this.parameters.textContent = `M, C, h, g, tau, K, V, L, A1 …, T, J; joints q1 …, rates qd1 …, c12 for cos(q1 + q2)${names.length ? `; this robot's parameters: ${names.join(", ")}` : "; this robot has numbers, no parameters"}.`;
   }
 
   take_verdict(verdict) {
     this.cancel.hidden = !verdict?.running;
     this.send.disabled = Boolean(verdict?.running);
-    this.note.textContent = !verdict ? "" : verdict.running ? "judging …" : verdict.error ?? `${verdict.verdict}${verdict.missing.length ? `; missing: ${verdict.missing.join(", ")}` : ""}`;
+    this.note.textContent = !verdict ? "" : verdict.running ? "judging …" : verdict.error ?? `${verdict.verdict}${verdict.missing.length ? `; missing: ${verdict.missing.slice(0, 6).join(", ")}${verdict.missing.length > 6 ? ` and ${verdict.missing.length - 6} more` : ""}` : ""}`;
     this.note.classList.toggle("bad", Boolean(verdict && !verdict.running && (verdict.error || verdict.verdict !== "correct")));
     if (!verdict || verdict.running || verdict.error) return this.report.replaceChildren();
     const found = verdict.diagnosis.map(({ place, sentence }) => h("p", { class: "diagnosis" }, h("b", {}, `${place}: `), sentence));

@@ -53,7 +53,7 @@ export class TablePanel {
       if (document.activeElement !== input) input.value = table.rows[i][column];
       input.style.width = `calc(${this.widths[column]}ch + 12px)`;
       input.setAttribute("aria-invalid", String(Boolean(error)));
-      input.title = error ?? `${table.rows[i][column]} = ${this.meaning(i, column)}`;
+      input.title = error ?? (errors.size ? "" : `${table.rows[i][column]} = ${this.meaning(i, column)}`);
     }
     this.undo.disabled = !table.undo;
     this.redo.disabled = !table.redo;

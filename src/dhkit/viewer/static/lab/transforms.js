@@ -18,8 +18,9 @@ export class TransformsPanel {
     this.add = h("button", { type: "button", onclick: () => this.change(() => this.steps.push({ kind: "turn", axis: "x", amount: "90°", about: "current" })) }, "Add a step");
     this.hide = h("input", { type: "checkbox", onchange: () => this.hideArm() });
     this.result = h("div", { class: "step" });
+    this.note = h("p", { class: "note", role: "status" });
     this.name = h("h2", {}, "");
-    root.append(this.name, this.list, h("div", { class: "buttons" }, this.add, this.apply), h("label", { class: "line" }, this.hide, " hide the arm"), this.result, h("p", { class: "hint" }, "Amounts in radians and metres; 30° and 2*inch are fine. Current: about the solid's own axes; fixed: about the world's."));
+    root.append(this.name, this.list, h("div", { class: "buttons" }, this.add, this.apply), h("label", { class: "line" }, this.hide, " hide the arm"), this.note, this.result, h("p", { class: "hint" }, "Amounts in radians and metres; 30° and 2*inch are fine. Current: about the solid's own axes; fixed: about the world's."));
     const container = h("div", { class: "labels", "aria-hidden": "true" });
     document.getElementById("stage").append(container);
     this.labels = new Labels(container);
@@ -107,7 +108,10 @@ export class TransformsPanel {
   // Python says where each step leads; between, the solid goes along the step's own way.
   async run() {
     const found = await this.lab.ask("transforms.apply", { steps: this.steps });
+    this.list.querySelectorAll("input").forEach((input, k) => input.setAttribute("aria-invalid", String(!found && this.lab.message.textContent.startsWith(`step ${k + 1}:`))));
     if (!found) return;
+    this.note.textContent = found.note ?? "";
+    this.lab.message.hidden = true;
     this.stop();
     let stopped = false;
     this.running = () => (stopped = true);

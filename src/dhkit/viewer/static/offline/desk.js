@@ -125,7 +125,10 @@ export class OfflineDesk {
     return { error: errors.find((error) => error.row === row && error.column === column)?.error ?? null };
   }
 
-  take(table) {
+  // Whoever types the first numbers again has the first arm again.
+  take(given) {
+    const { first } = this, same = given.convention === first.convention && given.rows.every((row, i) => COLUMNS.every((name) => row[name] === first.rows[i][name]));
+    const table = same ? { ...given, rows: first.rows } : given;
     this.before = [...this.before.slice(1 - MOST_STEPS), this.now];
     this.after = [];
     this.showTable(table);
@@ -155,9 +158,9 @@ export class OfflineDesk {
   tellTable() {
     const { now, first } = this;
     const rows = now.texts.map((texts, i) => ({ joint: this.data.arm.joints[i].name, kind: now.rows[i].kind, ...Object.fromEntries(COLUMNS.map((name, k) => [name, texts[k]])) }));
-    const changed = JSON.stringify(now.texts) !== JSON.stringify(first.texts) || now.convention !== first.convention;
+    const changed = JSON.stringify(now.texts) !== JSON.stringify(first.texts) || now.convention !== first.convention, edited = now.rows !== first.rows || now.convention !== first.convention;
     const values = now.rows.map((row) => COLUMNS.map((name) => row[name]));
-    this.tell("table", { convention: now.convention, rows, values, errors: now.errors, undo: this.before.length > 0, redo: this.after.length > 0, changed, note: changed ? "drawn from the table; limits are those of the arm as it was written" : null });
+    this.tell("table", { convention: now.convention, rows, values, errors: now.errors, undo: this.before.length > 0, redo: this.after.length > 0, changed, note: edited ? "drawn from the table; limits are those of the arm as it was written" : null });
   }
 
   steps(row) {
