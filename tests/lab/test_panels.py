@@ -355,3 +355,32 @@ def test_the_end_of_a_slide_is_a_boundary():
         assert point == "tool"
     middle = (n.lower[2] + n.upper[2]) / 2
     assert boundary_distance(arm, [0.3, 1.5, middle, 0.0])[0] > 0.05
+
+
+def test_a_sheet_about_another_robot_is_refused_and_no_verdict_stays(open_lab):
+    lab = open_lab("planar2r")
+    judged(lab, "lines", RIGHT)
+    with pytest.raises(ValueError, match="the sheet is about 'puma560'; the arm here is planar2r"):
+        lab.answer("submit.grade", {"kind": "sheet", "text": 'robot = "puma560"\n[answer]\nV = "0"\n'})
+    assert state(lab, "verdict") is None
+    judged(lab, "lines", RIGHT)
+    with pytest.raises(ValueError, match="empty"):
+        lab.answer("submit.grade", {"kind": "lines", "text": "  "})
+    assert state(lab, "verdict") is None
+
+
+def test_the_first_numbers_typed_again_are_the_first_arm_again(open_lab):
+    lab = open_lab("puma560")
+    first = lab.desk.arm.description
+    for text in ("0.8", "0.4318"):
+        lab.answer("table.edit", {"row": 1, "column": "a", "text": text})
+    assert lab.desk.arm.description == first
+    assert any(joint.shapes for joint in lab.desk.arm.description.joints)
+
+
+def test_turns_of_more_than_a_turn_are_asked_about(open_lab):
+    lab = open_lab("planar2r")
+    far = lab.answer("transforms.apply", {"steps": [step("turn", "z", "90", "fixed")]})
+    assert far["note"].startswith("step 1: 90 rad are 5157°")
+    steps = [step("turn", "z", "90°", "fixed"), step("move", "x", "90", "fixed")]
+    assert lab.answer("transforms.apply", {"steps": steps})["note"] is None

@@ -1,6 +1,7 @@
 """Scores of solutions as a teacher would give them, the joint that is wrong first named."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -151,3 +152,36 @@ def test_a_controller_is_scored_on_an_arm_whose_configurations_are_one_state(tmp
         (part,) = check(arm, program, seed=1).functions["controller"]
     assert part.points == 0
     assert "peak error" in part.text
+
+
+def test_branches_are_counted_of_all_poses_and_not_of_those_that_were_tried(tmp_path):
+    right = (Path(__file__).parents[2] / "docs/examples/puma_ik.py").read_text()
+    source = tmp_path / "few.py"
+    source.write_text(
+        right.replace("def ik(T)", "def solved(T)") + "\ndef ik(T): return solved(T) if T[0][3] > 0.5 else []\n"
+    )
+    with Program(source) as program:
+        _, branches, *_ = check(Arm.load("puma560"), program, seed=3, samples=40).functions["ik"]
+    assert "of 320 solutions" in branches.text
+    assert branches.points < 10
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("import numpy as np\ndef fk(q): return np.eye(4)\n", "the same pose for every q"),
+        ("def fk(q): return [[round(x, 4) for x in row] for row in right(q)]\n", "are its numbers rounded"),
+        (
+            "def fk(q): return [[-r[0], *r[1:]] if k < 3 else r for k, r in enumerate(right(q))]\n",
+            "is no rotation",
+        ),
+        ("def fk(q): return [*right(q)[:3], [0, 0, 0, 2]]\n", "last row is not 0 0 0 1"),
+    ],
+)
+def test_what_is_wrong_with_any_pose_is_said_before_an_axis_is_blamed(tmp_path, text, hint):
+    own = (Path(__file__).parents[2] / "docs/examples/puma_ik.py").read_text().replace("def fk(", "def right(")
+    (tmp_path / "fk.py").write_text(own.replace("def ik(", "def solved(") + "\n" + text)
+    with Program(tmp_path / "fk.py") as program:
+        (part,) = check(Arm.load("puma560"), program, seed=1, samples=20).functions["fk"]
+    assert part.points == 0
+    assert hint in " ".join(part.details)

@@ -105,9 +105,10 @@ def _fk(arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, s
 
 
 def _apart(arm: Arm, T: Array, other: Array) -> float:
-    """Return how far two poses are apart: entries of the rotations, and positions in shares of the reach."""
+    """Return how far two poses are apart: entries of rotations and last rows, and positions in shares of the reach."""
     found = np.abs(T - other)
-    return max(float(found[:3, :3].max()), float(found[:3, 3].max()) / (arm.description.reach or 1.0))
+    found[:3, 3] /= arm.description.reach or 1.0
+    return float(found.max())
 
 
 def _matrix(call: Caller, q: Array) -> Array | None:

@@ -130,6 +130,7 @@ class Page {
   takePoints(message) {
     this.takeOverlay(() => this.stage.setPoints(message));
     if (this.lab && message.points.length) this.stage.frameAll();
+    else if (this.lab && !this.stage.touched) this.stage.reframe();
   }
 
   takeOverlay(draw) {

@@ -73,7 +73,7 @@ export class DynamicsPanel extends FollowingPanel {
     this.rows = bodies ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) })) : [];
     this.bars.replaceChildren(...this.rows.map(({ bar, value }, i) => h("div", { class: "bar" }, h("button", { type: "button", class: "quiet", title: `formula of g${i + 1}`, onclick: ask(`g${i + 1}`) }, arm.joints[i].name), h("span", { class: "track" }, bar), value)));
     this.cells = bodies ? arm.joints.map((_, i) => arm.joints.map((_, j) => h("button", { type: "button", class: "quiet", title: `formula of M${i + 1}${j + 1}`, "aria-label": `M${i + 1}${j + 1}`, onclick: ask(`M${i + 1}${j + 1}`) }))) : [];
-    this.matrix.replaceChildren(h("table", { class: "numbers" }, h("tbody", {}, this.cells.map((row) => h("tr", {}, row.map((cell) => h("td", {}, cell)))))));
+    this.matrix.replaceChildren(h("table", { class: "numbers dense" }, h("tbody", {}, this.cells.map((row) => h("tr", {}, row.map((cell) => h("td", {}, cell)))))));
   }
 
   take_entry(entry) {
