@@ -191,3 +191,34 @@ def test_every_panel_fits_and_names_its_controls(open_page, size):
         assert unnamed == []
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
     assert Arm.load("puma560").n == page.evaluate("document.querySelectorAll('#panel-dynamics .bar').length")
+
+
+def test_a_target_out_of_reach_stays_in_the_fields_until_it_is_in_reach(open_page):
+    lab, page = open_page("planar2r")
+    lab.answer("joints.set", {"q": [np.pi / 2, 0.0]})
+    panel(page, "tool")
+    page.click(button("Move the tool by a target"))
+    page.until("dhkit.lab.state.target?.reached")
+    page.click(labelled("x [m]"))
+    page.write("0.5")
+    page.until("dhkit.lab.state.target && !dhkit.lab.state.target.reached")
+    assert page.evaluate(f"[{labelled('x [m]')}.value, {labelled('x [m]')}.getAttribute('aria-invalid')]") == [
+        "0.50000",
+        "true",
+    ]
+    page.click(labelled("y [m]"))
+    page.write("0.3")
+    page.until("dhkit.lab.state.target.reached")
+    assert np.abs(lab.desk.arm.fk(lab.desk.q)[:2, 3] - [0.5, 0.3]).max() < 1e-6
+    page.until(f"{labelled('x [m]')}.getAttribute('aria-invalid') === 'false'")
+
+
+def test_what_is_said_of_a_target_is_not_said_of_another_state(open_page):
+    lab, page = open_page("stanford")
+    panel(page, "tool")
+    page.click(button("Move the tool by a target"))
+    page.until("dhkit.lab.state.target?.reached")
+    lab.answer("joints.named", {"name": "nominal"})
+    note = "document.querySelector('#panel-tool .note').textContent"
+    page.until(f"{note}.startsWith('the tool is not at the target')")
+    assert "singular" not in page.evaluate(note)

@@ -186,8 +186,12 @@ class _Reader:
 
     def _fail(self, expected: str) -> NoReturn:
         if self.index < len(self.tokens):
-            _, found, at = self.tokens[self.index]
-            raise ExpressionError(f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}")
+            kind, found, at = self.tokens[self.index]
+            before = self.tokens[self.index - 1] if self.index else None
+            # Somebody who writes "90 deg" needs a sign between.
+            product = before is not None and before.kind == "number" and kind == "name"
+            hint = f"; write {before.text}*{found}" if product and before is not None else ""
+            raise ExpressionError(f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}{hint}")
         raise ExpressionError(f"{self.shown}: ends where {expected} was expected")
 
     def _peek(self) -> str:

@@ -1,6 +1,7 @@
 // The tool: its pose in numbers, a target that the arm follows, and the branches that reach it.
 
 import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
+import { euler } from "../offline/kinematics.js";
 import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
@@ -94,9 +95,13 @@ export class ToolPanel {
 
   show() {
     if (!this.tool) return;
-    const { T, xyz, euler, order, singular } = this.tool;
-    [...xyz.map((x) => fixed(x, 5)), ...euler.map((x) => fixed(x * DEGREES, 3))].forEach((text, k) => {
+    const { T, order, singular } = this.tool, target = this.lab.state.target;
+    // A target that cannot be reached stays in the fields: whoever types its coordinates one by one goes on from there.
+    const missed = target && !target.reached, pose = missed ? target.T : T;
+    const { xyz, angles } = missed ? { xyz: [pose[3], pose[7], pose[11]], angles: euler(pose, order) } : { xyz: this.tool.xyz, angles: this.tool.euler };
+    [...xyz.map((x) => fixed(x, 5)), ...angles.map((x) => fixed(x * DEGREES, 3))].forEach((text, k) => {
       if (document.activeElement !== this.fields[k]) this.fields[k].value = text;
+      this.fields[k].setAttribute("aria-invalid", String(Boolean(missed)));
     });
     this.order.value = order;
     if (this.matrix.open || !this.matrix.lastChild.firstChild) this.matrix.lastChild.replaceChildren(matrix(T));
@@ -107,7 +112,9 @@ export class ToolPanel {
   remark() {
     const target = this.lab.state.target;
     const { T, unique } = this.tool ?? {}, far = target?.reached && T && [3, 7, 11].some((k) => Math.abs(T[k] - target.T[k]) > AWAY);
-    const words = [far && !target.message ? "the tool is not at the target: move the target, and it follows" : null, unique === false ? "A and C are not unique here" : null, target?.message, target?.message ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
+    const about = far ? null : target?.message; // what is said of the target's state is not said of another
+    for (const button of this.branches.children) button.classList.toggle("away", Boolean(far));
+    const words = [far ? "the tool is not at the target: move the target, and it follows" : null, unique === false ? "A and C are not unique here" : null, about, about ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
     this.note.textContent = words.filter(Boolean).join("; ");
     this.note.classList.toggle("bad", Boolean(target && !target.reached));
   }
@@ -116,6 +123,7 @@ export class ToolPanel {
     this.clear.hidden = !target;
     this.grab.hidden = Boolean(target);
     this.gizmo.set(target?.T ?? null, target ? target.reached : true, this.lab.state.arm?.reach ?? 1);
+    this.show();
     const focused = document.activeElement?.dataset?.branch;
     const branches = target?.branches ?? [], ghosts = branches.filter((branch) => !branch.chosen);
     this.branches.replaceChildren(...branches.map((branch) => this.branch(branch, branch.chosen ? null : ghosts.indexOf(branch))));

@@ -52,7 +52,8 @@ class Parser {
   }
 
   fail() {
-    const found = this.tokens[this.at];
+    const found = this.tokens[this.at], before = this.tokens[this.at - 1];
+    if (typeof before === "number" && /^[A-Za-z_]/.test(found)) throw new Error(`found ${found} behind ${before}; write ${before}*${found}`);
     throw new Error(found === undefined ? "the expression ends too early" : `found ${found}; expected ${typeof found === "number" ? "a sign before it" : "a number or a name"}`);
   }
 
