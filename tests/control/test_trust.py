@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acceptance import only_accepting
 from dhkit import (
     LQR,
     PID,
@@ -174,7 +175,9 @@ def test_the_name_of_a_column_counts_before_its_capitals(tmp_path):
     assert np.allclose(Trajectory.read(path, SMALL.description).q(1.0), [0.1, 0.1])
 
 
-@pytest.mark.parametrize("controller", [ComputedTorque, PDGravity, OperationalSpace])
+@pytest.mark.parametrize(
+    "controller", [ComputedTorque, PDGravity, pytest.param(OperationalSpace, marks=only_accepting)]
+)
 def test_continuous_runs_go_on_after_a_rest(controller):
     step = Step(START, START + 0.1, time=3.0)
     run = ARM.simulate(controller.tuned(ARM), step, duration=4.0, rate=None, restitution=None)

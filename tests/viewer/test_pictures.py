@@ -173,13 +173,13 @@ def test_arms_of_every_size_are_drawn_and_fill_the_picture(length):
 def test_many_large_triangles_behind_each_other_take_no_memory():
     import tracemalloc
 
-    corners = np.tile(np.array([[0, 0, 1.0], [1200, 0, 1.0], [0, 900, 1.0]]), (400, 1, 1))
-    corners[..., 2] += np.linspace(1, 0, 400)[:, None]
-    colors = np.zeros((400, 3))
+    corners = np.tile(np.array([[0, 0, 1.0], [1200, 0, 1.0], [0, 900, 1.0]]), (60, 1, 1))
+    corners[..., 2] += np.linspace(1, 0, 60)[:, None]
+    colors = np.zeros((60, 3))
     colors[-1] = 200
     tracemalloc.start()
     drawn = _rasterized(corners, colors, np.zeros((900, 1200, 3), np.uint8))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert peak < 2e9
+    assert peak < 1e9  # all at once would need 4e9
     assert (drawn[10, 10] == 200).all()  # the last is the nearest
