@@ -542,9 +542,12 @@ def test_memory_stays_where_it_is_while_a_simulation_streams_to_a_slow_page(lab)
     connection = raw_socket(lab)
     lab.answer("control.start", {"reference": "sine"})
     time.sleep(3.0)
-    before = memory()
-    time.sleep(12.0)
-    assert memory() - before < GROWTH / 2
+    sizes = [memory()]
+    for _ in range(2):
+        time.sleep(6.0)
+        sizes.append(memory())
+    # What grows grows all the time; what is made once, such as a compiled kernel, is in one half.
+    assert min(np.diff(sizes)) < GROWTH / 4
     assert states(lab)["control"]["error"] is None
     lab.answer("control.stop", {})
     connection.close()
