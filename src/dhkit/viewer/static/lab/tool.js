@@ -101,8 +101,9 @@ export class ToolPanel {
     const { xyz, angles } = missed ? { xyz: [pose[3], pose[7], pose[11]], angles: euler(pose, order) } : { xyz: this.tool.xyz, angles: this.tool.euler };
     [...xyz.map((x) => fixed(x, 5)), ...angles.map((x) => fixed(x * DEGREES, 3))].forEach((text, k) => {
       if (document.activeElement !== this.fields[k]) this.fields[k].value = text;
-      this.fields[k].setAttribute("aria-invalid", String(Boolean(missed)));
     });
+    if (this.missed !== Boolean(missed)) for (const input of this.fields) input.setAttribute("aria-invalid", String(Boolean(missed)));
+    this.missed = Boolean(missed);
     this.order.value = order;
     if (this.matrix.open || !this.matrix.lastChild.firstChild) this.matrix.lastChild.replaceChildren(matrix(T));
     this.singular = singular;
