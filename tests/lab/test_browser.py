@@ -18,6 +18,7 @@ from PIL import Image
 from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import pose
+from lab.controls import button, labelled, panel
 
 pytestmark = pytest.mark.slow
 
@@ -43,24 +44,6 @@ def visit(open_page):
 def enter(page, lab):
     page.open(lab.url)
     page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints")
-
-
-def panel(page, name):
-    page.click(f"document.getElementById('tab-{name}')")
-    assert page.evaluate(f"document.getElementById('panel-{name}').hidden") is False
-
-
-def labelled(label):
-    """Return the control of this name, as JavaScript."""
-    return f"document.querySelector({json.dumps(f'#lab [aria-label={json.dumps(label)}]')})"
-
-
-def button(text, within="#lab"):
-    """Return the visible button that says this, as JavaScript."""
-    return (
-        f"[...document.querySelectorAll({json.dumps(within + ' button')})]"
-        f".find(b => b.offsetWidth && b.textContent.trim() === {json.dumps(text)})"
-    )
 
 
 def wait_for(what, seconds=20.0):

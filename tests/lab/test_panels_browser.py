@@ -9,6 +9,7 @@ import pytest
 
 from dhkit import Arm
 from dhkit.description import pose
+from lab.controls import button, labelled, panel
 
 pytestmark = pytest.mark.slow
 
@@ -17,22 +18,6 @@ PRINTED = 5.1e-5
 TORQUE = 5.1e-3
 """N m: the same of a torque."""
 HOSTILE = '<img src=x onerror="globalThis.hacked=1">'
-
-
-def panel(page, name):
-    page.click(f"document.getElementById('tab-{name}')")
-    assert page.evaluate(f"document.getElementById('panel-{name}').hidden") is False
-
-
-def labelled(label):
-    return f"document.querySelector({json.dumps(f'#lab [aria-label={json.dumps(label)}]')})"
-
-
-def button(text, within="#lab"):
-    return (
-        f"[...document.querySelectorAll({json.dumps(within + ' button')})]"
-        f".find(b => b.offsetWidth && b.textContent.trim() === {json.dumps(text)})"
-    )
 
 
 def texts(page, selector):

@@ -52,13 +52,13 @@ class SubmitPanel:
     def __init__(self, desk: Desk, lock: AbstractContextManager[Any]) -> None:
         self.desk = desk
         self._jobs = Jobs(self._told, lock)
-        desk.changed.append(self._replaced)
+        desk.changed.append(self._clear)
 
     def grade(self, data: dict[str, Any]) -> dict[str, Any]:
         """Judge an answer in the background; it is read as text, and never run."""
         fields = Fields("submit.grade", data, ["kind", "text"])
         kind, text = fields.choice("kind", SUFFIXES), fields.text("text", LONGEST)
-        self._replaced()  # an answer that cannot be sent leaves no verdict of another
+        self._clear()  # an answer that cannot be sent leaves no verdict of another
         if not text.strip():
             raise ValueError("submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot")
         text = text.encode("utf-8", "replace").decode()  # lone surrogates are no text
@@ -77,8 +77,7 @@ class SubmitPanel:
     def cancel(self, data: dict[str, Any]) -> dict[str, Any]:
         """Judge no longer."""
         Fields("submit.cancel", data, [])
-        self._jobs.cancel()
-        self.desk.view.panel("verdict", None)
+        self._clear()
         return {}
 
     def close(self) -> None:
@@ -89,7 +88,8 @@ class SubmitPanel:
         if state is not None and state.get("error"):
             self.desk.view.panel("verdict", {"running": False, "error": state["error"]})
 
-    def _replaced(self) -> None:
+    def _clear(self) -> None:
+        """Judge no longer, and take the verdict away."""
         self._jobs.cancel()
         self.desk.view.panel("verdict", None)
 

@@ -1,6 +1,7 @@
 // The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
 
 import { h } from "./dom.js";
+
 const SHORT = 6000; // ms that a message stays
 
 export class Lab {

@@ -1,7 +1,7 @@
 // The tool: its pose in numbers, a target that the arm follows, and the branches that reach it.
 
-import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
 import { euler } from "../offline/kinematics.js";
+import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
 import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
@@ -124,13 +124,12 @@ export class ToolPanel {
     this.clear.hidden = !target;
     this.grab.hidden = Boolean(target);
     this.gizmo.set(target?.T ?? null, target ? target.reached : true, this.lab.state.arm?.reach ?? 1);
-    this.show();
     const focused = document.activeElement?.dataset?.branch;
     const branches = target?.branches ?? [], ghosts = branches.filter((branch) => !branch.chosen);
     this.branches.replaceChildren(...branches.map((branch) => this.branch(branch, branch.chosen ? null : ghosts.indexOf(branch))));
     this.name(ghosts);
     if (focused) this.branches.querySelector(`[data-branch="${CSS.escape(focused)}"]`)?.focus();
-    this.remark();
+    this.show();
   }
 
   // While a simulation runs the only ghost is what it follows.

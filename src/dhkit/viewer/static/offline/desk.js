@@ -144,23 +144,27 @@ export class OfflineDesk {
     const same = table.rows === this.now.rows && table.convention === this.now.convention;
     this.now = table;
     if (!same) {
-      const { stage } = this.page, { first } = this;
+      const { stage } = this.page, { edited } = this;
       this.kinematics = new Kinematics(table);
-      const own = table.rows === first.rows && table.convention === first.convention;
-      stage.redraw(own ? null : solids(this.kinematics, stage.size, THREE), own ? this.data.labels : this.kinematics.labels());
+      stage.redraw(edited ? solids(this.kinematics, stage.size, THREE) : null, edited ? this.kinematics.labels() : this.data.labels);
       stage.leaveArm(); // ghosts and paths were those of the table before
-      this.tell("arm", { ...this.data.arm, family: own ? this.data.arm.family : "edited on this page" });
+      this.tell("arm", { ...this.data.arm, family: edited ? "edited on this page" : this.data.arm.family });
       this.show(this.q);
     }
     this.tellTable();
   }
 
+  // Whether the numbers are others than the first.
+  get edited() {
+    return this.now.rows !== this.first.rows || this.now.convention !== this.first.convention;
+  }
+
   tellTable() {
     const { now, first } = this;
     const rows = now.texts.map((texts, i) => ({ joint: this.data.arm.joints[i].name, kind: now.rows[i].kind, ...Object.fromEntries(COLUMNS.map((name, k) => [name, texts[k]])) }));
-    const changed = JSON.stringify(now.texts) !== JSON.stringify(first.texts) || now.convention !== first.convention, edited = now.rows !== first.rows || now.convention !== first.convention;
+    const changed = JSON.stringify(now.texts) !== JSON.stringify(first.texts) || now.convention !== first.convention;
     const values = now.rows.map((row) => COLUMNS.map((name) => row[name]));
-    this.tell("table", { convention: now.convention, rows, values, errors: now.errors, undo: this.before.length > 0, redo: this.after.length > 0, changed, note: edited ? "drawn from the table; limits are those of the arm as it was written" : null });
+    this.tell("table", { convention: now.convention, rows, values, errors: now.errors, undo: this.before.length > 0, redo: this.after.length > 0, changed, note: this.edited ? "drawn from the table; limits are those of the arm as it was written" : null });
   }
 
   steps(row) {

@@ -1,0 +1,22 @@
+"""Controls of the lab's page, found as a person finds them: by name and by text."""
+
+import json
+
+
+def panel(page, name):
+    """Open a panel."""
+    page.click(f"document.getElementById('tab-{name}')")
+    assert page.evaluate(f"document.getElementById('panel-{name}').hidden") is False
+
+
+def labelled(label):
+    """Return the control of this name, as JavaScript."""
+    return f"document.querySelector({json.dumps(f'#lab [aria-label={json.dumps(label)}]')})"
+
+
+def button(text, within="#lab"):
+    """Return the visible button that says this, as JavaScript."""
+    return (
+        f"[...document.querySelectorAll({json.dumps(within + ' button')})]"
+        f".find(b => b.offsetWidth && b.textContent.trim() === {json.dumps(text)})"
+    )
