@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
+    from dhkit.model.urdf_chain import Side
     from dhkit.planning import Constraint, Distances, ObjectiveLike, Planner, Scene
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
@@ -51,19 +52,71 @@ class Arm:
     # Where arms come from
 
     @classmethod
-    def load(cls, name: str | Path) -> Arm:
-        """Return a robot of the library by name, or read a robot file by path (anything that ends in ``.toml``).
+    def load(cls, name: str | Path, *, base: str | None = None, tip: str | None = None) -> Arm:
+        """Return a robot of the library by name, or read a robot file (``.toml``) or a chain of a URDF by path.
+
+        ``example:NAME`` is a robot of the package example-robot-data. After a URDF or an example, ``#TIP`` or
+        ``#BASE..TIP`` may name the links between which the chain lies, as ``base`` and ``tip`` do.
+
+        Parameters
+        ----------
+        name
+            Name or path.
+        base, tip
+            Of a URDF: the chain's first and last link; the root, and the end of the only chain, if not given.
 
         Raises
         ------
         DescriptionError
             No such robot, or a file that describes none.
+        ModelError
+            A URDF that is refused, or has no such chain, or several and no tip was given.
         """
-        if isinstance(name, str) and not name.endswith((".toml", ".urdf")) and "/" not in name:
+        text = str(name)
+        if text.startswith("example:") or text.partition("#")[0].lower().endswith(".urdf"):
+            return cls.from_urdf(name, base=base, tip=tip)
+        if base is not None or tip is not None:
+            raise DescriptionError(
+                f"{name}: base and tip cut a chain out of a URDF; expected a .urdf file or example:NAME"
+            )
+        if isinstance(name, str) and not name.endswith(".toml") and "/" not in name:
             return cls(describe.library_robot(name))
-        if Path(name).suffix == ".urdf":
-            raise DescriptionError(f"{name}: reading URDFs is not built yet; expected a .toml robot file")
         return cls(describe.read_robot(name))
+
+    @classmethod
+    def from_urdf(
+        cls,
+        name: str | Path,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        convention: Literal["standard", "modified"] = "standard",
+        side: Side = "freeze",
+        as_designed: bool = False,
+        package_dirs: Sequence[str | Path] = (),
+    ) -> Arm:
+        """Return a chain of a URDF as an arm; see :func:`dhkit.model.extract_dh`, which also says what was done.
+
+        Examples
+        --------
+        >>> from dhkit.description import asset
+        >>> arm = Arm.from_urdf(asset("urdf/puma560.urdf"))
+        >>> arm.n, float(arm.description.numbers.a[1])
+        (6, 0.4318)
+        """
+        from dhkit.model import extract_dh, urdf_source
+
+        path, own_base, own_tip = urdf_source(str(name))
+        extraction = extract_dh(
+            path,
+            base or own_base,
+            tip or own_tip,
+            convention=convention,
+            side=side,
+            as_designed=as_designed,
+            package_dirs=package_dirs,
+        )
+        return cls(extraction.description)
 
     @classmethod
     def from_dh(

@@ -230,9 +230,9 @@ def test_solids_of_files_have_each_vertex_once(tmp_path):
     [
         ("a.obj", b"", "expected .stl"),
         ("missing.stl", None, "No such file"),
-        ("empty.stl", b"", "no STL|no triangles"),
-        ("short.stl", b"x" * 80 + (100).to_bytes(4, "little") + b"\0" * 50, "no STL|no triangles"),
-        ("words.stl", b"solid of nothing", "no STL|no triangles"),
+        ("empty.stl", b"", "no STL|no triangles|empty file"),
+        ("short.stl", b"x" * 80 + (100).to_bytes(4, "little") + b"\0" * 50, "no STL|no triangles|empty file"),
+        ("words.stl", b"solid of nothing", "no STL|no triangles|empty file"),
         ("large.stl", b"\0" * 5_000_001, "expected a file of at most"),
         (
             "many.stl",

@@ -68,7 +68,7 @@ def sizes(geometry):
             return [float(edge) for edge in size]
         case Cylinder(radius, length) | Capsule(radius, length):
             return [float(radius), float(length)]
-        case Sphere(size) | Mesh(_, size):
+        case Sphere(size) | Mesh(_, (size, _, _)):
             return [float(size)]
 
 
@@ -207,11 +207,11 @@ def test_given_shapes_keep_their_place_color_and_parameters():
 
 def test_a_link_whose_mesh_is_missing_is_drawn_from_the_table(tmp_path: Path):
     arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)])
-    shapes = (Shape(Sphere(exact(0.1))), Shape(Mesh("arm.stl", exact(0.001)), color="#c8102e"))
+    shapes = (Shape(Sphere(exact(0.1))), Shape(Mesh("arm.stl", (exact(0.001),) * 3), color="#c8102e"))
     meshed = replace(arm, joints=(replace(arm.joints[0], shapes=shapes), arm.joints[1]), mesh_folder=tmp_path)
     for one, other in zip(link_parts(meshed), link_parts(arm), strict=True):
         assert one.geometry == other.geometry and one.color == other.color
-    (tmp_path / "arm.stl").write_text("solid arm\nfacet normal 0 0 1\n")
+    (tmp_path / "arm.stl").write_text("solid arm\nfacet normal 0 0 1\nendfacet\nendsolid\n")
     files = [part.file for part in link_parts(meshed) if isinstance(part.geometry, Mesh)]
     assert files == [tmp_path / "arm.stl"]
 

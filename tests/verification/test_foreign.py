@@ -14,8 +14,8 @@ from dhkit import Arm
 from dhkit.cli import main
 from dhkit.description import asset, library_robot
 from dhkit.errors import ModelError
-from dhkit.model.foreign_urdf import read_chain
-from dhkit.model.urdf_checks import MAX_BYTES
+from dhkit.model.urdf_chain import read_chain
+from dhkit.model.urdf_xml import MAX_BYTES
 from dhkit.verification import verify_urdf
 
 
@@ -75,13 +75,13 @@ def test_a_gripper_is_locked_and_a_tip_can_be_chosen(tmp_path):
     )
     file = tmp_path / "gripper.urdf"
     file.write_text(simple(more=branches))
-    with pytest.raises(ModelError, match=r"chains end at f0, f1; choose one \(tip\)"):
+    with pytest.raises(ModelError, match=r"2 chains end at f0 \(2 joints\), f1 \(2 joints\); choose one \(tip\)"):
         read_chain(file)
-    chain = read_chain(file, "b")
-    assert (chain.joints, chain.kinds, chain.locked) == (("j",), "R", ("g0", "g1"))
+    chain = read_chain(file, tip="b")
+    assert (chain.names, chain.kinds, chain.frozen) == (("j",), "R", ("g0", "g1"))
     assert verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, tip="b", samples=5).ok
-    with pytest.raises(ModelError, match="no link 'c'; it has a, b, f0, f1"):
-        read_chain(file, "c")
+    with pytest.raises(ModelError, match="tip: no link 'c'; it has a, b, f0, f1"):
+        read_chain(file, tip="c")
 
 
 BAD = {
@@ -101,18 +101,23 @@ BAD = {
         ),
         "links c, d go round in a circle",
     ),
-    "no such link": (simple().replace('child link="b"', 'child link="x"'), "joint 'j': no link 'x'"),
-    "same names": (simple(more='<link name="b"/>'), "two of one name"),
+    "no such link": (
+        simple().replace('child link="b"', 'child link="x"'),
+        "joint 'j': <child> is 'x', which is no link",
+    ),
+    "same names": (simple(more='<link name="b"/>'), "two links have the name 'b'"),
     "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "link 'b': <mass value>: found 'nan'"),
     "no number": (simple().replace('ixx="1"', 'ixx="one"'), "link 'b': <inertia ixx>: found 'one'"),
     "zero axis": (simple(axis="0 0 0"), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
     "short axis": (simple(axis="0 1"), "joint 'j': <axis xyz> has 2 numbers; expected 3"),
     "negative mass": (simple().replace('mass value="1"', 'mass value="-1"'), "link 'b': mass is -1"),
-    "no limit": (re.sub(r"<limit [^>]*>", "", simple()), "joint 'j' is revolute and has no <limit>"),
-    "mimic": (simple().replace("<limit", '<mimic joint="x"/><limit'), "joint 'j' follows another (mimic)"),
-    "hinge": (simple("hinge"), "joint 'j' is 'hinge'; expected revolute, continuous, prismatic or fixed"),
+    "mimic": (
+        simple().replace("<limit", '<mimic joint="x"/><limit'),
+        "no moving joints below link 'a' that do not follow others (mimic)",
+    ),
+    "hinge": (simple("hinge"), "joint 'j' is 'hinge'; expected one of revolute, continuous, prismatic, fixed"),
     "no mass": (simple().replace('<mass value="1"/>', ""), "link 'b': <inertial> lacks mass"),
-    "two trees": (simple(more='<link name="z"/>'), "2 links without a parent"),
+    "two trees": (simple(more='<link name="z"/>'), "not connected: a, z have no parent"),
     "many joints": (
         "<robot><link name='l0'/>"
         + "".join(
@@ -120,7 +125,7 @@ BAD = {
             for k in range(1, 4000)
         )
         + "</robot>",
-        "3999 joints; expected 500 at most",
+        "4000 links; expected 500 at most",
     ),
     "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
     "sliding": (simple("prismatic"), "joints j are P; expected R as in"),
@@ -161,7 +166,7 @@ def changed(tmp_path, old, new, *, joint=None):
     file = tmp_path / "changed.urdf"
     file.write_text(text[:start] + text[start:].replace(old, new, 1))
     report = verify_urdf(library_robot("stanford"), file, samples=10)
-    return report.ok, " | ".join(report.notes[1:])
+    return report.ok, " | ".join(note for note in report.notes[1:] if not note.startswith("yourdfpy"))
 
 
 def test_differences_are_said_joint_by_joint(tmp_path):
@@ -192,12 +197,24 @@ def test_axes_of_fixed_joints_and_limits_of_continuous_ones_do_not_matter(tmp_pa
     assert changed(tmp_path, 'type="revolute"', 'type="continuous"') == (True, "")
 
 
+def test_a_joint_without_limits_is_unlimited_and_that_is_said(tmp_path):
+    file = tmp_path / "unlimited.urdf"
+    file.write_text(re.sub(r"<limit [^>]*>", "", simple()))
+    report = verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=3)
+    assert report.ok
+    assert "joint 'j': no limits; read as unlimited" in report.notes
+
+
 def test_names_cannot_break_a_report(tmp_path):
     file = tmp_path / "names.urdf"
-    file.write_text(simple().replace('name="j"', 'name="a&#10;b&#155;|&lt;c>"'))
+    file.write_text(simple().replace('name="j"', 'name="a|&lt;c>"'))
     report = verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=3)
-    assert "joints in order: a?b?|<c>" in str(report)
-    assert "a?b?\\|&lt;c>" in report.markdown()
+    assert any(note.startswith("yourdfpy") and "reads the same frames" in note for note in report.notes)
+    assert "joints in order: a|<c>" in str(report)
+    assert "a\\|&lt;c>" in report.markdown()
+    file.write_text(simple().replace('name="j"', 'name="a&#10;b&#155;c"'))
+    with pytest.raises(ModelError, match=r"a joint has the name 'a\\nb\\x9bc'; expected text"):
+        read_chain(file)
 
 
 def test_other_encodings_and_missing_files(tmp_path):

@@ -30,7 +30,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-Robot = Annotated[str, typer.Argument(help="A library name (see `dhkit robots`) or a robot file (.toml).")]
+Robot = Annotated[
+    str, typer.Argument(help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -75,8 +77,18 @@ def common(version: Version = False) -> None:
 
 
 @app.command()
-def robots(json: Json = False) -> None:
+def robots(
+    examples: Annotated[
+        bool, typer.Option("--examples", help="Those of the package example-robot-data instead.")
+    ] = False,
+    json: Json = False,
+) -> None:
     """List the robots of the library."""
+    if examples:
+        from dhkit.cli import extract as extract_command
+
+        extract_command.list_examples(json)
+        return
     from dhkit.cli import info as info_command
 
     info_command.list_robots(json)
@@ -108,6 +120,50 @@ def build(
         print_json({"files": [str(file) for file in files]})
     else:
         say("\n".join(f"wrote {file}" for file in files))
+
+
+@app.command(name="import-cad", cls=gathering({"--at": None}))
+def import_cad(
+    folder: Annotated[
+        Path,
+        typer.Argument(help="Mesh files, one a link, exported in one pose in assembly coordinates; or a .mat file."),
+    ],
+    table: Annotated[str, typer.Option("--table", help="The DH table: a robot file (.toml) or a library name.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The new folder: robot.toml, robot.urdf, meshes.")],
+    density: Annotated[float | None, typer.Option(help="Of all links, kg/m^3; nothing is assumed.")] = None,
+    mass: Annotated[list[str] | None, typer.Option(metavar="LINK=KG", help="Of one link; may be given again.")] = None,
+    report: Annotated[
+        list[Path] | None, typer.Option(help="Mass properties from the CAD program: SolidWorks' text or a .csv.")
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="Of the files: m, cm, mm or in; by size unless given.")] = None,
+    simplify: Annotated[int | None, typer.Option(metavar="N", help="Reduce parts to N triangles.")] = None,
+    mapping: Annotated[
+        list[str] | None,
+        typer.Option("--map", metavar="LINK=FILE", help="Where names do not say it; may be given again."),
+    ] = None,
+    at: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Joint values of the export; ready, else zero, unless given.")
+    ] = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles of --at are in degrees.")] = False,
+    json: Json = False,
+) -> int:
+    """Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF."""
+    from dhkit.cli import import_cad as import_cad_command
+
+    return import_cad_command.run(
+        folder,
+        Arm.load(table),
+        output,
+        density=density,
+        masses=mass or (),
+        reports=report or (),
+        unit=unit,
+        simplify=simplify,
+        mapping=mapping or (),
+        at=at,
+        degrees=degrees,
+        json=json,
+    )
 
 
 @app.command(context_settings={"ignore_unknown_options": True})
@@ -489,7 +545,8 @@ def verify(
     samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     urdf: Annotated[Path | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
-    tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the longest chain's end.")] = None,
+    base: Annotated[str | None, typer.Option(help="Its link that is the world; the root.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the end of the only chain.")] = None,
     tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
     json: Json = False,
@@ -505,8 +562,46 @@ def verify(
         samples,
         seed,
         urdf=urdf,
+        base=base,
         tip=tip,
         tolerance=tolerance,
+        output=output,
+        json=json,
+    )
+
+
+@app.command()
+def extract(
+    urdf: Annotated[str, typer.Argument(metavar="FILE", help="A URDF, or example:NAME of example-robot-data.")],
+    base: Annotated[str | None, typer.Option(help="The chain's first link, which becomes the world; the root.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Its last link; may be left out where there is one chain.")] = None,
+    modified: Annotated[bool, typer.Option("--modified", help="Craig's table instead of the standard one.")] = False,
+    as_designed: Annotated[
+        bool, typer.Option("--as-designed", help="Read 1.5708 as a right angle, and say what that changes.")
+    ] = False,
+    drop: Annotated[
+        bool, typer.Option("--drop-side", help="Leave out links behind joints beside the chain; else they are frozen.")
+    ] = False,
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Folder with packages that package:// names; may be given again.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The robot file to write (.toml).")] = None,
+    json: Json = False,
+) -> int:
+    """Find the Denavit-Hartenberg table of a URDF's chain, with its bodies, limits and meshes.
+
+    Prints how far the table is from the file; exit status 1 where that is more than 1e-9.
+    """
+    from dhkit.cli import extract as extract_command
+
+    return extract_command.run(
+        urdf,
+        base=base,
+        tip=tip,
+        modified=modified,
+        as_designed=as_designed,
+        drop=drop,
+        package_dirs=package_dir or (),
         output=output,
         json=json,
     )

@@ -20,6 +20,7 @@ def run(
     seed: int,
     *,
     urdf: Path | None,
+    base: str | None,
     tip: str | None,
     tolerance: float,
     output: Path | None,
@@ -34,7 +35,10 @@ def run(
     """
     if output is not None and output.suffix not in (".md", ".tex", ".json"):
         raise DescriptionError(f"{output}: expected a report that ends in .md, .tex or .json")
-    report = verify_urdf(arm.description, urdf, tip, samples, seed, tolerance) if urdf else arm.verify(samples, seed)
+    if urdf is None:
+        report = arm.verify(samples, seed)
+    else:
+        report = verify_urdf(arm.description, urdf, tip, samples, seed, tolerance, base=base)
     if output is not None:
         write_atomically(output, _text(report, output.suffix))
     if json:

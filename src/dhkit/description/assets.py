@@ -6,9 +6,9 @@ from pathlib import Path, PurePosixPath
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["MESH_FORMATS", "asset", "inside", "is_readable_mesh"]
+__all__ = ["MESH_FORMATS", "asset", "inside"]
 
-MESH_FORMATS = (".stl", ".obj", ".dae")
+MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CHECKOUT = PACKAGE.parents[1]
@@ -28,21 +28,6 @@ def asset(name: str) -> Path:
             if (root / name).exists():
                 return root / name
     raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")
-
-
-def is_readable_mesh(file: Path) -> bool:
-    """Return whether a file is there and looks like the mesh that its name says, from its first bytes and its size."""
-    try:
-        size = file.stat().st_size
-        with file.open("rb") as stream:
-            head = stream.read(1024)
-    except OSError:
-        return False
-    if file.suffix.lower() != ".stl":
-        return bool(head.strip())
-    facets = int.from_bytes(head[80:84], "little")
-    binary = len(head) >= 84 and facets > 0 and size == 84 + 50 * facets
-    return binary or (head.lstrip().startswith(b"solid") and b"facet" in head)
 
 
 def inside(folder: Path | None, path: str, where: str) -> Path | None:

@@ -194,7 +194,7 @@ class _Reader:
     def shape(self, where: str, form: ShapeForm) -> Shape:
         placement = self.placement(where, form.xyz, form.rpy)
         if form.mesh is not None:
-            return Shape(Mesh(form.mesh, self.number(f"{where}.scale", form.scale)), placement, form.color)
+            return Shape(Mesh(form.mesh, self.vector(f"{where}.scale", form.scale)), placement, form.color)
         if form.box is not None:
             return Shape(Box(self.vector(f"{where}.box", form.box, self.units.metres)), placement, form.color)
         if form.sphere is not None:

@@ -59,6 +59,10 @@ def _one_or_two(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
+def _one_or_three(value: object) -> object:
+    return value if isinstance(value, list) else [value] * 3
+
+
 class _Also:
     """Tells the JSON Schema what a field takes besides its type, before its validator brings it into that."""
 
@@ -152,7 +156,7 @@ class ShapeForm(Form):
     """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame."""
 
     mesh: Text | None = None
-    scale: Number = 1
+    scale: Annotated[Triple, BeforeValidator(_one_or_three), _Also(lambda _: NUMBER)] = [1, 1, 1]
     box: Triple | None = None
     cylinder: RoundForm | None = None
     capsule: RoundForm | None = None

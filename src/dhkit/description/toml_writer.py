@@ -11,7 +11,19 @@ from tomlkit.items import Array, Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.files import write_atomically
 from dhkit.description.robot import Description
-from dhkit.description.values import STANDARD_GRAVITY, Body, Box, Drive, Joint, Mesh, Placement, Shape, Sphere, Units
+from dhkit.description.values import (
+    STANDARD_GRAVITY,
+    UNSCALED,
+    Body,
+    Box,
+    Drive,
+    Joint,
+    Mesh,
+    Placement,
+    Shape,
+    Sphere,
+    Units,
+)
 from dhkit.expressions import Expression, exact
 
 __all__ = ["to_toml", "write_robot"]
@@ -132,7 +144,10 @@ def _shape(shape: Shape, units: Units) -> InlineTable:
     content: dict[str, Any]
     match geometry:
         case Mesh(path, scale):
-            content = {"mesh": path} | ({"scale": _entry(scale)} if scale != ONE else {})
+            equal = scale[0] == scale[1] == scale[2]
+            content = {"mesh": path}
+            if scale != UNSCALED:
+                content["scale"] = _entry(scale[0]) if equal else _entries(scale)
         case Box(size):
             content = {"box": _entries(size, metres)}
         case Sphere(radius):

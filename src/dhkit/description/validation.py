@@ -15,7 +15,7 @@ from dhkit.expressions import Expression, substitute
 
 if TYPE_CHECKING:
     from dhkit.description.robot import Description
-    from dhkit.description.values import Body, Drive, Geometry, Joint, Placement, Shape
+    from dhkit.description.values import Body, Drive, Geometry, Joint, Mesh, Placement, Shape
 
 __all__ = ["MAX_JOINTS", "check", "check_body"]
 
@@ -24,8 +24,6 @@ MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
 MAX_SHAPES = 50
 MAX_BODIES = 16
-MAX_MESH_BYTES = 50_000_000
-"""A million triangles: more than a browser shows well."""
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
 BODY_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\- ]{0,63}", re.ASCII)
 RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
@@ -235,20 +233,12 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
 
 
 def _check_geometry(geometry: Geometry, where: str, value: Value, description: Description) -> Iterator[str]:
-    from dhkit.description.assets import MESH_FORMATS, inside, is_readable_mesh
     from dhkit.description.values import Box, Mesh
 
     if isinstance(geometry, Mesh):
-        sizes = {"scale": geometry.scale}
-        file = inside(description.mesh_folder, geometry.path, where)
-        if file is not None and file.is_file() and file.stat().st_size > MAX_MESH_BYTES:
-            raise DescriptionError(f"{where}.mesh: {geometry.path!r} has more than {MAX_MESH_BYTES / 1e6:g} MB")
-        if not geometry.path.lower().endswith(MESH_FORMATS):
-            raise DescriptionError(f"{where}.mesh is {geometry.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
-        if file is not None and not is_readable_mesh(file):
-            what = "is no mesh that can be read" if file.is_file() else "is not there"
-            yield f"{where}.mesh: {geometry.path!r} {what}; the link is drawn from the table"
-    elif isinstance(geometry, Box):
+        yield from _check_mesh(geometry, where, value, description)
+        return
+    if isinstance(geometry, Box):
         sizes = {f"box[{i}]": edge for i, edge in enumerate(geometry.size)}
     else:
         sizes = dict(vars(geometry))
@@ -256,6 +246,27 @@ def _check_geometry(geometry: Geometry, where: str, value: Value, description: D
         found = value(f"{where}.{key}", size)
         if not found > 0:
             raise DescriptionError(f"{where}.{key} is {found:g}; expected a positive number")
+
+
+def _check_mesh(mesh: Mesh, where: str, value: Value, description: Description) -> Iterator[str]:
+    """Refuse a path or a scale that is none; a file that is none is a warning, for the arm works without it."""
+    from dhkit.description.assets import MESH_FORMATS, inside
+    from dhkit.description.mesh_files import check_mesh_file
+
+    file = inside(description.mesh_folder, mesh.path, where)
+    if not mesh.path.lower().endswith(MESH_FORMATS):
+        raise DescriptionError(f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
+    for i, entry in enumerate(mesh.scale):
+        if value(f"{where}.scale[{i}]", entry) == 0:
+            raise DescriptionError(f"{where}.scale[{i}] is 0; expected a factor to metres, negative to mirror")
+    if file is None:
+        return
+    try:
+        check_mesh_file(file)
+    except DescriptionError as error:
+        cause = str(error).removeprefix(f"{file}: ")
+        what = "is not there" if not file.exists() else f"is no mesh that can be read ({cause})"
+        yield f"{where}.mesh: {mesh.path!r} {what}; the link is drawn from the table"
 
 
 def _check_configurations(description: Description, value: Value) -> None:

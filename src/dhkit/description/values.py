@@ -13,6 +13,7 @@ __all__ = [
     "INERTIA_PLACES",
     "ORIGIN",
     "STANDARD_GRAVITY",
+    "UNSCALED",
     "Base",
     "Body",
     "Box",
@@ -38,6 +39,7 @@ Vector: TypeAlias = tuple[Expression, Expression, Expression]
 
 ORIGIN: Vector = (ZERO, ZERO, ZERO)
 ONE = exact(1)
+UNSCALED: Vector = (ONE, ONE, ONE)
 STANDARD_GRAVITY: Vector = (ZERO, ZERO, exact(-9.81))
 
 
@@ -143,10 +145,11 @@ class Placement:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A mesh file, its path relative to the robot file's folder, times ``scale`` to be in metres."""
+    """A mesh file, its path relative to the robot file's folder; ``scale`` takes its coordinates to metres."""
 
     path: str
-    scale: Expression = ONE
+    scale: Vector = UNSCALED
+    """Factors along the file's x, y and z; negative ones mirror."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from dhkit.grading.reports.mathml import mathml
 from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
 from dhkit.lab.table_panel import moved, turned, typed
+from dhkit.model.mesh_reader import read_mesh
 
 __all__ = ["Solid", "TransformsPanel"]
 
@@ -62,26 +63,15 @@ class Solid:
         ModelError
             No such file, too large, no STL, without triangles, or with numbers that are not finite.
         """
-        import trimesh
-
         if path.suffix.lower() != ".stl":
             raise ModelError(f"{path}: ends in {path.suffix!r}; expected .stl")
         try:
             size = path.stat().st_size
-            if not path.is_file() or size > MOST_BYTES:
-                raise ModelError(f"{path}: {size} bytes; expected a file of at most {MOST_BYTES}")
-            mesh = trimesh.load_mesh(path, process=False)
         except OSError as error:
             raise ModelError(f"{path}: {error.strerror}") from None
-        except ModelError:
-            raise
-        except Exception as error:  # trimesh raises what its parsers raise
-            raise ModelError(f"{path}: no STL: {' '.join(str(error).split())[:100]}") from None
-        corners = np.asarray(mesh.triangles, dtype=float)
-        if not len(corners) or not np.isfinite(corners).all():
-            raise ModelError(f"{path}: {'no triangles' if not len(corners) else 'numbers that are not finite'}")
-        if len(corners) > MOST_TRIANGLES:
-            raise ModelError(f"{path}: {len(corners)} triangles; expected at most {MOST_TRIANGLES}")
+        if size > MOST_BYTES:
+            raise ModelError(f"{path}: {size} bytes; expected a file of at most {MOST_BYTES}")
+        corners = read_mesh(path, max_triangles=MOST_TRIANGLES, max_bytes=MOST_BYTES).corners
         vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         return cls(path.stem, vertices, faces.reshape(-1, 3))
 

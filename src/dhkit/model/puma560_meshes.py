@@ -21,6 +21,7 @@ from manifold3d import Manifold, Mesh64
 from numpy.typing import NDArray
 
 from dhkit.description import write_atomically
+from dhkit.model.stl import binary_stl
 
 Array = NDArray[np.float64]
 Axis = Literal["x", "y", "z"]
@@ -43,8 +44,7 @@ SMALL_SIDES = 12
 DECIMALS = 6
 """Coordinates are whole micrometres: far below what is seen, far above the rounding of sines on any machine."""
 
-STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-STL_TITLE = b"PUMA 560, dhkit, metres, standard DH link frame: "
+STL_TITLE = "PUMA 560, dhkit, metres, standard DH link frame: "
 
 
 def puma560_meshes() -> dict[str, trimesh.Trimesh]:
@@ -93,7 +93,7 @@ def write_puma560_meshes(folder: Path) -> list[Path]:
     paths = []
     for name, mesh in puma560_meshes().items():
         path = folder / f"{name}.stl"
-        write_atomically(path, _binary_stl(name, mesh))
+        write_atomically(path, binary_stl(STL_TITLE + name, np.asarray(mesh.vertices)[mesh.faces]))
         paths.append(path)
     return paths
 
@@ -238,14 +238,3 @@ def _canonical(solid: Manifold) -> trimesh.Trimesh:
     turn = (faces.argmin(axis=-1)[:, None] + np.arange(3)) % 3
     faces = np.take_along_axis(faces, turn, axis=-1)
     return trimesh.Trimesh(vertices, faces[np.lexsort(faces.T[::-1])], process=False)
-
-
-def _binary_stl(name: str, mesh: trimesh.Trimesh) -> bytes:
-    """Write a mesh as binary STL: an 80-byte header, the number of facets, 50 bytes per facet."""
-    corners = np.asarray(mesh.vertices)[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facets = np.zeros(len(corners), dtype=STL_FACET)
-    facets["normal"] = np.round(normal / np.linalg.norm(normal, axis=-1, keepdims=True), DECIMALS) + 0.0
-    facets["corners"] = corners
-    header = (STL_TITLE + name.encode("ascii")).ljust(80, b"\0")
-    return header + len(facets).to_bytes(4, "little") + facets.tobytes()

@@ -16,7 +16,8 @@ from typing import TypeAlias
 import numpy as np
 
 from dhkit.description import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
-from dhkit.description.assets import inside, is_readable_mesh
+from dhkit.description.assets import inside
+from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, substitute
@@ -114,7 +115,7 @@ def _given(description: Description, shapes: Sequence[Shape], link: int, T_link_
         geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
             file = inside(description.mesh_folder, geometry.path, "shape")
-            if file is None or not is_readable_mesh(file):
+            if file is None or not is_mesh_file(file):
                 return []
         T_link_part = T_link_frame @ matrix(shape.placement, values)
         parts.append(Part(link, _known(geometry, values), T_link_part, shape.color or color, file))
@@ -125,7 +126,9 @@ def _known(geometry: Geometry, values: dict[str, Expression]) -> Geometry:
     """Return a geometry with the parameters' values in it."""
     match geometry:
         case Mesh(path, scale):
-            return Mesh(path, substitute(scale, values))
+            return Mesh(
+                path, (substitute(scale[0], values), substitute(scale[1], values), substitute(scale[2], values))
+            )
         case Box((x, y, z)):
             return Box((substitute(x, values), substitute(y, values), substitute(z, values)))
         case Sphere(radius):

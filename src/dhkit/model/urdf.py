@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -52,7 +52,11 @@ class Origin(NamedTuple):
     rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
-def urdf_text(description: Description, mesh_path: Callable[[str], str] | None = None) -> str:
+def urdf_text(
+    description: Description,
+    mesh_path: Callable[[str], str] | None = None,
+    collision_path: Callable[[str], str] | None = None,
+) -> str:
     """Return a description as URDF text, SI and radians, numbers as the shortest decimals that read back equal.
 
     Parameters
@@ -61,8 +65,11 @@ def urdf_text(description: Description, mesh_path: Callable[[str], str] | None =
         The robot. Links without a body have no inertial element.
     mesh_path
         From a mesh's path in the robot file to its path in the URDF; ``meshes/...`` if not given.
+    collision_path
+        The same for collisions, where another mesh of the same scale stands for it; ``mesh_path`` if not given.
     """
     name_mesh = mesh_path or (lambda path: f"{MESHES}/{path}")
+    names = {"visual": name_mesh, "collision": collision_path or name_mesh}
     robot = ElementTree.Element("robot", name=description.name)
     robot.append(ElementTree.Comment(_what_a_urdf_cannot_say(description)))
     parts: dict[int, list[Part]] = {}
@@ -75,13 +82,13 @@ def urdf_text(description: Description, mesh_path: Callable[[str], str] | None =
     if description.base.body is not None:
         _add_base_inertial(base, description)
     for part in parts.get(0, []):
-        _add_part(base, part, np.eye(4), name_mesh)
+        _add_part(base, part, np.eye(4), names)
     for i in range(1, description.n + 1):
         _add_joint(robot, description, i)
         link = ElementTree.SubElement(robot, "link", name=f"link{i}")
         _add_inertial(link, description, i)
         for part in parts.get(i, []):
-            _add_part(link, part, _behind_matrix(description, i), name_mesh)
+            _add_part(link, part, _behind_matrix(description, i), names)
         _fixed(robot, f"link{i}", f"dh{i}", _behind(description, i))
         ElementTree.SubElement(robot, "link", name=f"dh{i}")
     _fixed(robot, f"dh{description.n}", "tool", _origin_of(description.numbers.T_last_tool))
@@ -217,26 +224,29 @@ def _add_mass(element: ElementTree.Element, mass: float, tensor: Array) -> None:
     ElementTree.SubElement(element, "inertia", {name: _text(tensor[place]) for name, place in names.items()})
 
 
-def _add_part(link: ElementTree.Element, part: Part, T_link_frame: Array, name_mesh: Callable[[str], str]) -> None:
+def _add_part(
+    link: ElementTree.Element, part: Part, T_link_frame: Array, names: Mapping[str, Callable[[str], str]]
+) -> None:
     """Add a drawn part as visual and as collision."""
     rgb = [int(part.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    for T, tag, attributes in _solids(part, name_mesh):
-        for purpose in ("visual", "collision"):
+    for T, tag, attributes in _solids(part):
+        for purpose, name_mesh in names.items():
+            named = {key: name_mesh(text) if key == "filename" else text for key, text in attributes.items()}
             element = ElementTree.SubElement(link, purpose)
             origin = _origin_of(T_link_frame @ part.T_link_part @ T)
             _add_origin(element, Origin(np.round(origin.xyz, DRAWN), tuple(np.round(origin.rpy, DRAWN))))
-            ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), tag, attributes)
+            ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), tag, named)
             if purpose == "visual":
                 material = ElementTree.SubElement(element, "material", name=f"color_{part.color[1:].lower()}")
                 ElementTree.SubElement(material, "color", rgba=" ".join(f"{c:.4g}" for c in (*rgb, 1.0)))
 
 
-def _solids(part: Part, name_mesh: Callable[[str], str]) -> list[tuple[Array, str, dict[str, str]]]:
+def _solids(part: Part) -> list[tuple[Array, str, dict[str, str]]]:
     """Return URDF geometries of a part, with where they lie in it; a capsule is a cylinder and two balls."""
     at = np.eye(4)
     match part.geometry:
         case Mesh(path, scale):
-            return [(at, "mesh", {"filename": name_mesh(path), "scale": " ".join([_text(float(scale))] * 3)})]
+            return [(at, "mesh", {"filename": path, "scale": " ".join(_text(float(factor)) for factor in scale)})]
         case Box(size):
             return [(at, "box", {"size": " ".join(_text(float(edge)) for edge in size)})]
         case Sphere(radius):

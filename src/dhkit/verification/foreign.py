@@ -10,12 +10,13 @@ import numpy as np
 from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description, pose_parts
 from dhkit.errors import ModelError
-from dhkit.model.foreign_urdf import Chain, chain_model, read_chain
+from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, read_chain
 from dhkit.verification.comparison import Comparison, largest, worst
 from dhkit.verification.differences import differences
 from dhkit.verification.measure import Floors, relative_error
 from dhkit.verification.reference import Reference
 from dhkit.verification.report import VerificationReport, printable
+from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
 
 __all__ = ["verify_urdf"]
@@ -34,6 +35,8 @@ def verify_urdf(
     samples: int = 1000,
     seed: int = 0,
     tolerance: float = 1e-9,
+    *,
+    base: str | None = None,
 ) -> VerificationReport:
     """Hold somebody's URDF against a table: the same tool, the same mass matrix and torques at the same joint values.
 
@@ -47,11 +50,13 @@ def verify_urdf(
     path
         The URDF.
     tip
-        The link whose frame is the tool; the end of the longest chain if not given.
+        The link whose frame is the tool; the end of the only chain if not given.
     samples, seed
         How many random states inside the table's limits, from which seed.
     tolerance
         The largest error that still counts as agreement; files often carry few digits.
+    base
+        The link that is the world; the root if not given.
 
     Raises
     ------
@@ -62,20 +67,22 @@ def verify_urdf(
     """
     if not 0 < tolerance < np.inf:
         raise ValueError(f"tolerance is {tolerance}; expected a positive, finite number")
-    chain = read_chain(path, tip)
+    chain = read_chain(path, base, tip)
     if chain.kinds != description.kinds:
         raise ModelError(
-            f"{path}: joints {', '.join(chain.joints)} are {chain.kinds}; expected {description.kinds} as in"
+            f"{path}: joints {', '.join(chain.names)} are {chain.kinds}; expected {description.kinds} as in"
             f" {description.name}'s table; another tip may end another chain"
         )
     model = chain_model(chain)
-    model.gravity.linear = np.array(description.numbers.gravity)
+    R_root_base = chain.tree.zero_poses()[chain.base][:3, :3]
+    model.gravity.linear = R_root_base @ description.numbers.gravity
     model.armature = np.array(description.numbers.armature)
     motion = random_motions(description, samples, seed)
     reference = Reference(model, motion)
-    notes = [f"joints in order: {', '.join(chain.joints)}; tool: {chain.tip}", *chain.notes]
+    notes = [f"joints in order: {', '.join(chain.names)}; tool: {chain.tip}", *chain.notes]
     notes += _limits(description, chain)
-    comparisons = list(_tool(description, reference, chain.tip, tolerance, notes))
+    comparisons = list(_tool(description, reference, tolerance, notes))
+    notes += second_opinion(chain, motion.q, _tools(reference))
     if not any(note.startswith(BASE_MOVED) for note in notes):
         notes += differences(description, model, tolerance)
     if all(joint.bodies for joint in description.joints):
@@ -94,11 +101,9 @@ def verify_urdf(
     )
 
 
-def _tool(
-    description: Description, reference: Reference, tip: str, tolerance: float, notes: list[str]
-) -> Iterator[Comparison]:
+def _tool(description: Description, reference: Reference, tolerance: float, notes: list[str]) -> Iterator[Comparison]:
     ours = kinematics.forward_kinematics(description, reference.motion.q)
-    theirs = reference.frames([tip])[:, 0]
+    theirs = _tools(reference)
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
@@ -106,6 +111,12 @@ def _tool(
         notes += _constant_offset(ours, theirs)
     yield Comparison("tool position", position, tolerance)
     yield Comparison("tool rotation", rotation, tolerance)
+
+
+def _tools(reference: Reference) -> Array:
+    """Return the URDF's tip in its base, shape (N, 4, 4)."""
+    frames = reference.frames([BASE_FRAME, TIP_FRAME])
+    return np.asarray(np.linalg.inv(frames[:, 0]) @ frames[:, 1])
 
 
 def _constant_offset(ours: Array, theirs: Array) -> Iterator[str]:
@@ -136,7 +147,7 @@ def _dynamics(description: Description, reference: Reference, tolerance: float) 
 def _limits(description: Description, chain: Chain) -> Iterator[str]:
     """Say which limits are others."""
     numbers = description.numbers
-    for i, (joint, name) in enumerate(zip(description.joints, chain.joints, strict=True)):
+    for i, (joint, name) in enumerate(zip(description.joints, chain.names, strict=True)):
         own = (numbers.lower[i], numbers.upper[i])
         theirs = chain.limits.get(name)
         if joint.limits is not None and theirs is not None and not np.allclose(own, theirs, atol=1e-3):

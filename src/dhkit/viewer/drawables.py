@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from dhkit.description import Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.description.numbers import Array
 from dhkit.errors import ModelError
+from dhkit.model.mesh_reader import mesh_header, read_mesh
+from dhkit.model.stl import binary_stl
 
 if TYPE_CHECKING:
     from dhkit.model.shapes import Part
@@ -48,7 +51,7 @@ def part_object(part: Part, name: str) -> Lowered:
     Raises
     ------
     ModelError
-        A mesh without a readable STL, OBJ or DAE file.
+        A mesh without a readable file.
     """
     meshcat = _meshcat()
     side = DOUBLE if isinstance(part.geometry, Mesh) else FRONT
@@ -63,7 +66,7 @@ def part_transform(part: Part) -> Array:
     """
     T = part.T_link_part.copy()
     if isinstance(part.geometry, Mesh):
-        T[:3, :3] *= float(part.geometry.scale)
+        T[:3, :3] *= [float(factor) for factor in part.geometry.scale]  # mirrors too: both sides of it are drawn
     if isinstance(part.geometry, Cylinder | Capsule):
         T = np.matmul(T, Y_TO_Z)
     return T
@@ -168,24 +171,21 @@ def _geometry(part: Part) -> Any:
 
 
 def _mesh(part: Part, shape: Mesh) -> Any:
-    meshcat = _meshcat()
-    readers = {
-        ".stl": meshcat.StlMeshGeometry,
-        ".obj": meshcat.ObjMeshGeometry,
-        ".dae": meshcat.DaeMeshGeometry,
-    }
+    """Return a binary STL of a mesh in its file's own scale: a page reads no other format.
+
+    So a COLLADA file has its unit and up axis applied, and the page opens nothing that a file names.
+    """
     if part.file is None:
         raise ModelError(f"link {part.link}: mesh {shape.path!r} has no folder; expected a robot read from a file")
-    reader = readers.get(part.file.suffix.lower())
-    if reader is None:
-        raise ModelError(
-            f"link {part.link}: mesh {part.file} ends in {part.file.suffix!r}; expected .stl, .obj or .dae"
-        )
     try:
-        return reader.from_file(part.file)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ModelError(f"link {part.link}: mesh {part.file}: {reason}") from None
+        mesh = read_mesh(part.file)
+        is_binary = mesh_header(part.file).format == "stl"
+        content = part.file.read_bytes() if is_binary else binary_stl("dhkit", mesh.corners)
+    except ModelError as error:
+        raise ModelError(f"link {part.link}: mesh {error}") from None
+    except OSError as error:
+        raise ModelError(f"link {part.link}: mesh {part.file}: {error.strerror or error}") from None
+    return _meshcat().StlMeshGeometry.from_stream(io.BytesIO(content))
 
 
 def _lathe(outline: Array) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Mesh, Sphere
 from dhkit.description.frames import joint_array
+from dhkit.errors import ModelError
+from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.viewer.drawables import grid_step
 from dhkit.viewer.scene import first_configuration, frame_labels, node_transforms, scene_size
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 __all__ = ["Ghost", "picture", "pictures"]
+
+log = logging.getLogger(__name__)
 
 FINE = 2
 """Pixels that are drawn for one of the picture, along each edge: their mean smooths the edges."""
@@ -100,8 +105,10 @@ def picture(
     ------
     ValueError
         Another shape, values that are not finite, or a size that is none.
-    ModelError
-        A mesh that cannot be read.
+
+    Notes
+    -----
+    A mesh that cannot be read is left out with a warning in the log that names file and cause.
     """
     state = first_configuration(description) if q is None else joint_array(description, q)
     if state.ndim != 1 or not np.isfinite(state).all():
@@ -157,7 +164,10 @@ def _solids(description: Description) -> tuple[_Solid, ...]:
     solids = []
     for part in link_parts(description):
         color = np.array([int(part.color[i : i + 2], 16) for i in (1, 3, 5)], dtype=float)
-        solids.append(_Solid(part.link, _triangles(part), color))
+        try:
+            solids.append(_Solid(part.link, _triangles(part), color))
+        except ModelError as error:  # a mesh whose header is in order and whose content is not
+            log.warning("%s; it is left out", error)
     return tuple(solids)
 
 
@@ -165,10 +175,10 @@ def _triangles(part: Part) -> Array:
     """Return a part's triangles in its link's frame, shape (m, 3, 3), m."""
     import trimesh
 
-    shape, scale = part.geometry, 1.0
+    shape = part.geometry
     match shape:
         case Mesh():
-            mesh, scale = trimesh.load_scene(part.file, process=False).to_mesh(), float(shape.scale)
+            return _placed(read_part(part).corners, part)
         case Box():
             edges = np.array([float(edge) for edge in shape.size])
             mesh, scale = trimesh.creation.box(edges / edges.max()), float(edges.max())
@@ -181,9 +191,11 @@ def _triangles(part: Part) -> Array:
             scale = float(shape.radius)
             mesh = trimesh.creation.capsule(float(shape.length) / scale, 1.0, count=[SIDES, SIDES // 2])
             mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
+    return _placed(scale * np.asarray(mesh.triangles, dtype=float), part)
+
+
+def _placed(corners: Array, part: Part) -> Array:
     T = part.T_link_part
-    corners = scale * np.asarray(mesh.triangles, dtype=float)
-    corners = corners[np.isfinite(corners).all(axis=(1, 2))]
     return corners @ T[:3, :3].T + T[:3, 3]
 
 
@@ -283,6 +295,8 @@ def _drawn(
         )
         corners.append(world)
         colors.append(np.clip(light[:, None] * (solid.color if tint is None else tint), 0, 255))
+    if not corners:
+        return image
     return _rasterized(camera.seen(np.concatenate(corners)), np.concatenate(colors), image)
 
 

@@ -6,6 +6,7 @@ triads are children that never move. ``/dhkit/tool`` stands at the tool's frame.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,12 +18,15 @@ from numpy.typing import ArrayLike
 from dhkit.description import Description
 from dhkit.description.frames import world_to_frames
 from dhkit.description.numbers import Array
+from dhkit.errors import ModelError
 from dhkit.viewer.drawables import Lowered, grid_object, part_object, part_transform, triad_object
 
 if TYPE_CHECKING:
     from dhkit.model.shapes import Part
 
 __all__ = ["Label", "Scene", "build_scene", "first_configuration", "frame_labels", "node_transforms", "scene_size"]
+
+log = logging.getLogger(__name__)
 
 ROOT = "/dhkit"
 COINCIDE = 1e-9
@@ -175,7 +179,12 @@ def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
     for part in parts:
         k = count[part.link] = count.get(part.link, -1) + 1
         path = f"{ROOT}/link{part.link}/part{k}"
-        commands.append(_set_object(path, part_object(part, f"link{part.link}/part{k}")))
+        try:
+            drawn = part_object(part, f"link{part.link}/part{k}")
+        except ModelError as error:  # a mesh whose header is in order and whose content is not
+            log.warning("%s; it is left out", error)
+            continue
+        commands.append(_set_object(path, drawn))
         commands.append(_set_transform(path, part_transform(part)))
     return commands
 

@@ -32,7 +32,7 @@ def surface(part):
         case Box(size):
             local = np.sign(u) * [float(edge) / 2 for edge in size]
         case _:
-            local = trimesh.load_mesh(part.file).vertices * float(part.geometry.scale)
+            local = trimesh.load_mesh(part.file).vertices * [float(factor) for factor in part.geometry.scale]
     return local @ part.T_link_part[:3, :3].T + part.T_link_part[:3, 3]
 
 

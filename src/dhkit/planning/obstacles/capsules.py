@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
-from dhkit.errors import ModelError
+from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
 
@@ -139,7 +139,7 @@ def _balls(part: Part) -> Balls:
             corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
             local, radii = corners * [float(edge) for edge in size], 0.0
         case _:
-            local, radii = _hull(part) * float(part.geometry.scale), 0.0
+            local, radii = _hull(part), 0.0
     R, t = part.T_link_part[:3, :3], part.T_link_part[:3, 3]
     return Balls(local @ R.T + t, np.full(len(local), radii))
 
@@ -152,17 +152,10 @@ def _rims(radius: float, length: float) -> Array:
 
 
 def _hull(part: Part) -> Array:
-    """Return the corners of a mesh's convex hull, in the file's units."""
-    import trimesh
+    """Return the corners of a mesh's convex hull, m."""
     from scipy.spatial import ConvexHull, QhullError
 
-    try:
-        vertices = np.asarray(trimesh.load_scene(part.file, process=False).to_mesh().vertices, dtype=float)
-    except Exception as error:  # each format's reader has its own
-        raise ModelError(f"{part.file}: no mesh can be read ({str(error)[:80]})") from None
-    vertices = vertices[np.all(np.isfinite(vertices), axis=1)] if vertices.ndim == 2 else np.zeros((0, 3))
-    if not len(vertices):
-        raise ModelError(f"{part.file}: the mesh has no vertices")
+    vertices = read_part(part).vertices
     try:
         hull: Array = vertices[ConvexHull(vertices).vertices]
     except QhullError:  # flat

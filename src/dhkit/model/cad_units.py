@@ -1,0 +1,99 @@
+"""What coordinates of a CAD export mean: their unit, found by size, and whether each part was moved on export."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.description.frames import carrying
+from dhkit.errors import ModelError
+from dhkit.model.triangle_mesh import TriangleMesh
+
+__all__ = ["UNITS", "check_positions", "unit_of"]
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+SMALLEST, LARGEST = 0.25, 6.0
+"""Diagonal of the box around an arm in its READY pose, as a share of its length, the sum of |a| and |d|."""
+AT_ORIGIN = 1e-5
+"""How near to the origin the corner of a part lies that was moved there, as a share of its size: a text has six digits."""
+NEAR = 0.05
+"""How far the axes of the joints pass the boxes around their links, on average, as a share of the arm's length."""
+CLEARER = 2.0
+"""The second best unit must miss the axes by this factor more."""
+AXIS_POINTS = 401
+
+
+def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
+    """Refuse parts that were each moved into positive space, so that their places in the assembly are lost.
+
+    Raises
+    ------
+    ModelError
+        All parts but one, and two at least, have their own lowest corner at the origin.
+    """
+    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= AT_ORIGIN * part.size]
+    if len(moved) >= max(2, len(parts) - 1):
+        raise ModelError(
+            f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into positive "
+            "space on export, so that their places in the assembly are lost; export again with the box 'Do not translate "
+            "STL output data to positive space' ticked (SolidWorks: Save As, STL, Options)"
+        )
+
+
+def unit_of(description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], where: str) -> str:
+    """Return the unit of an assembly's coordinates: m, cm, mm or in.
+
+    The assembly must be about as large as the arm. Where two units pass, which only cm and in and neighbours of them can,
+    the boxes around the links decide: the axis of each joint passes those of the two links that it joins.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    frames
+        DH frames 0 to n in the world in the pose of the export, shape (n + 1, 4, 4).
+    links
+        Meshes of each link in assembly coordinates.
+    where
+        Folder, for messages.
+
+    Raises
+    ------
+    ModelError
+        No unit fits, or more than one; names the option that states it.
+    """
+    length = description.reach
+    bounds = np.array([mesh.bounds for meshes in links.values() for mesh in meshes])
+    size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    if length == 0:
+        raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
+    fitting = [unit for unit, metres in UNITS.items() if SMALLEST <= size * metres / length <= LARGEST]
+    if len(fitting) == 1:
+        return fitting[0]
+    found = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
+    if not fitting:
+        raise ModelError(f"{where}: {found}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
+    missed = {unit: _missed(description, frames, links, UNITS[unit]) / length for unit in fitting}
+    best, second = sorted(missed, key=missed.__getitem__)[:2]
+    if missed[best] > NEAR or missed[second] < CLEARER * missed[best] + NEAR / 5:
+        raise ModelError(f"{where}: {found}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
+    return best
+
+
+def _missed(
+    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], metres: float
+) -> float:
+    """Return how far the joints' axes pass the boxes around the links that they join, on average, m."""
+    along = np.linspace(-2, 2, AXIS_POINTS) * description.reach
+    missed = []
+    for joint, frame in enumerate(carrying(description.convention, frames), start=1):
+        points = frame[:3, 3] + along[:, None] * frame[:3, 2]
+        for link in (joint - 1, joint):
+            if meshes := links.get(link):
+                low = metres * np.min([mesh.bounds[0] for mesh in meshes], axis=0)
+                high = metres * np.max([mesh.bounds[1] for mesh in meshes], axis=0)
+                outside = np.maximum(np.maximum(low - points, points - high), 0)
+                missed.append(float(np.linalg.norm(outside, axis=1).min()))
+    return float(np.mean(missed)) if missed else np.inf

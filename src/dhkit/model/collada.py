@@ -1,0 +1,222 @@
+"""COLLADA files as triangles in metres with z up: geometry, nodes, units, and each material's diffuse colour.
+
+Exporters of robots write little of COLLADA 1.4.1 (Khronos 2008), and this reads that: triangles, polylists and polygons
+of ``<library_geometries>``, placed by the nodes of the visual scene. Textures and other files are never opened.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array
+from dhkit.errors import ModelError
+from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
+
+__all__ = ["collada_mesh"]
+
+Element = ElementTree.Element
+MOST_PIECES = 5_000
+"""Geometries that the nodes of one file may place: nodes can name each other, so that a small file could place any
+number."""
+MOST_DEPTH = 64
+TO_Z_UP = {
+    "X_UP": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+    "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "Z_UP": np.eye(3),
+}
+"""Rotations from a file's axes to those of Z_UP, x to the right and z up: X_UP has -y, Y_UP x to the right (ibid.)."""
+POLYGONS = ("triangles", "polylist", "polygons")
+
+
+def collada_mesh(content: bytes) -> TriangleMesh:
+    """Return the triangles of a COLLADA file that has passed :func:`dhkit.description.mesh_files.check_mesh_file`, m.
+
+    Raises
+    ------
+    ModelError
+        A reference to nothing, a number that is none, or more pieces than :data:`MOST_PIECES`.
+    """
+    return _Document(content).mesh()
+
+
+class _Document:
+    """A parsed file, its elements found by their identifiers."""
+
+    def __init__(self, content: bytes) -> None:
+        self.root = self._parsed(content)
+        self.by_id = {element.get("id", ""): element for element in self.root.iter() if element.get("id")}
+        self.geometries: dict[str, list[tuple[str, TriangleMesh]]] = {}
+        self.pieces = 0
+
+    @staticmethod
+    def _parsed(content: bytes) -> Element:
+        """Return the root with the namespace taken off every tag."""
+        try:
+            iterator = ElementTree.iterparse(io.BytesIO(content), events=("end",))  # noqa: S314 - no entities, bounded
+            for _, element in iterator:
+                element.tag = element.tag.rpartition("}")[2]
+        except (ElementTree.ParseError, LookupError, ValueError) as error:
+            raise ModelError(f"no XML: {error}") from None
+        root: Element = iterator.root  # type: ignore[attr-defined]
+        return root
+
+    def mesh(self) -> TriangleMesh:
+        instance = self.root.find("scene/instance_visual_scene")
+        scene = self._named(instance) if instance is not None else self.root.find("library_visual_scenes/visual_scene")
+        if scene is not None:
+            pieces = [piece for node in scene.findall("node") for piece in self._node(node, np.eye(4), 0)]
+        else:
+            pieces = [mesh for one in self.root.iter("geometry") for _, mesh in self._geometry(one)]
+        if not pieces:
+            raise ModelError("no triangles")
+        coloured = all(piece.colours is not None for piece in pieces)
+        mesh = joined_meshes(pieces if coloured else [TriangleMesh(piece.vertices, piece.faces) for piece in pieces])
+        metres = self.root.find("asset/unit")
+        scale = _numbers(metres.get("meter", "1"))[0] if metres is not None else 1.0
+        if not (np.isfinite(scale) and scale > 0):
+            raise ModelError(f"<unit meter> is {scale:g}; expected a positive number")
+        up = (self.root.findtext("asset/up_axis") or "Y_UP").strip()
+        if up not in TO_Z_UP:
+            raise ModelError(f"<up_axis> is {up[:20]!r}; expected X_UP, Y_UP or Z_UP")
+        T = np.eye(4)
+        T[:3, :3] = TO_Z_UP[up]
+        return mesh.scaled(scale).moved(T)
+
+    def _named(self, element: Element) -> Element:
+        """Return what an element's url or source names inside this file."""
+        url = element.get("url") or element.get("source") or ""
+        found = self.by_id.get(url.removeprefix("#"))
+        if not url.startswith("#") or found is None:
+            raise ModelError(f"<{element.tag}> names {url[:60]!r}; expected an element of this file")
+        return found
+
+    def _node(self, node: Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
+        if depth > MOST_DEPTH:
+            raise ModelError(f"nodes that name each other more than {MOST_DEPTH} deep")
+        for element in node:
+            T = T @ _transform(element)
+        linear = T[:3, :3]
+        for instance in node.findall("instance_geometry"):
+            colours = self._materials(instance)
+            for symbol, mesh in self._geometry(self._named(instance)):
+                self.pieces += 1
+                if self.pieces > MOST_PIECES:
+                    raise ModelError(f"more than {MOST_PIECES} pieces")
+                placed = mesh.turned() if np.linalg.det(linear) < 0 else mesh
+                colour = colours.get(symbol)
+                tinted = None if colour is None else np.tile(colour, (len(mesh.faces), 1))
+                yield TriangleMesh(placed.vertices @ linear.T + T[:3, 3], placed.faces, tinted)
+        for child in node.findall("node"):
+            yield from self._node(child, T, depth + 1)
+        for other in node.findall("instance_node"):
+            yield from self._node(self._named(other), T, depth + 1)
+
+    def _materials(self, instance: Element) -> dict[str, NDArray[np.uint8]]:
+        """Return the diffuse colour of each symbol that a geometry's triangles are painted with."""
+        colours = {}
+        for bound in instance.iter("instance_material"):
+            material = self.by_id.get((bound.get("target") or "").removeprefix("#"))
+            used = None if material is None else material.find("instance_effect")
+            effect = None if used is None else self.by_id.get((used.get("url") or "").removeprefix("#"))
+            found = None if effect is None else next((e.find("color") for e in effect.iter("diffuse")), None)
+            if found is not None and found.text:
+                rgb = np.clip(_numbers(found.text)[:3], 0, 1)
+                colours[bound.get("symbol", "")] = np.round(255 * rgb).astype(np.uint8)
+        return colours
+
+    def _geometry(self, geometry: Element) -> list[tuple[str, TriangleMesh]]:
+        """Return a geometry's triangles for each material symbol, in its own coordinates."""
+        key = geometry.get("id", "")
+        if key not in self.geometries:
+            mesh = geometry.find("mesh")
+            kinds = [] if mesh is None else [element for element in mesh if element.tag in POLYGONS]
+            self.geometries[key] = [(element.get("material", ""), self._polygons(element)) for element in kinds]
+        return self.geometries[key]
+
+    def _polygons(self, element: Element) -> TriangleMesh:
+        inputs = element.findall("input")
+        places = {one.get("semantic"): one for one in inputs}
+        if "VERTEX" not in places:
+            raise ModelError(f"<{element.tag}> without an input of vertices")
+        offsets = [_whole(one.get("offset", "0")) for one in inputs]
+        stride, offset = max(offsets) + 1, _whole(places["VERTEX"].get("offset", "0"))
+        vertices = self._positions(self._named(places["VERTEX"]))
+        faces = _triangles(element, stride, offset)
+        if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+            raise ModelError(f"a face with vertex {faces.max()}; the file has vertices 0 to {len(vertices) - 1}")
+        return TriangleMesh(vertices, faces)
+
+    def _positions(self, vertices: Element) -> Array:
+        position = next((one for one in vertices.findall("input") if one.get("semantic") == "POSITION"), None)
+        if position is None:
+            raise ModelError("<vertices> without an input of positions")
+        source = self._named(position)
+        accessor, data = source.find("technique_common/accessor"), source.find("float_array")
+        stride = 3 if accessor is None else _whole(accessor.get("stride", "3"))
+        numbers = _numbers("" if data is None else data.text or "")
+        if stride < 3 or len(numbers) % stride:
+            raise ModelError(f"{len(numbers)} coordinates with a stride of {stride}; expected whole points")
+        return numbers.reshape(-1, stride)[:, :3]
+
+
+def _triangles(element: Element, stride: int, offset: int) -> NDArray[np.intp]:
+    """Return an element's polygons as triangles of vertex numbers, shape (m, 3)."""
+    lists = [_numbers(p.text or "").astype(np.intp) for p in element.findall("p")]
+    if any(len(p) % stride for p in lists):
+        raise ModelError(f"<{element.tag}> with an incomplete list of indices")
+    corners = [p.reshape(-1, stride)[:, offset] for p in lists]
+    if element.tag == "polygons":
+        counts = np.array([len(p) for p in corners], dtype=np.intp)
+    elif element.tag == "polylist":
+        counts = _numbers(element.findtext("vcount") or "").astype(np.intp)
+    else:
+        counts = np.full(sum(len(p) for p in corners) // 3, 3, dtype=np.intp)
+    indices = np.concatenate([np.zeros(0, dtype=np.intp), *corners])
+    if len(indices) != counts.sum() or (counts < 0).any():
+        raise ModelError(f"<{element.tag}> with {len(indices)} corners; its counts say {counts.sum()}")
+    starts = np.cumsum(counts) - counts
+    fans = np.maximum(counts - 2, 0)
+    first = np.repeat(starts, fans)
+    step = np.arange(int(fans.sum())) - np.repeat(np.cumsum(fans) - fans, fans)
+    triangles: NDArray[np.intp] = indices[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    return triangles
+
+
+def _transform(element: Element) -> Array:
+    """Return the (4, 4) matrix of a node's transform element, the identity for any other."""
+    T = np.eye(4)
+    if element.tag not in ("matrix", "translate", "rotate", "scale"):
+        return T
+    numbers = _numbers(element.text or "")
+    if len(numbers) != {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}[element.tag]:
+        raise ModelError(f"<{element.tag}> has {len(numbers)} numbers")
+    if element.tag == "matrix":
+        T = numbers.reshape(4, 4)
+    elif element.tag == "translate":
+        T[:3, 3] = numbers
+    elif element.tag == "scale":
+        T[:3, :3] = np.diag(numbers)
+    elif np.any(numbers[:3]):
+        x, y, z = numbers[:3] / np.linalg.norm(numbers[:3])
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = np.radians(numbers[3])
+        T[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return T
+
+
+def _numbers(text: str) -> Array:
+    try:
+        return np.array(text.split(), dtype=np.float64)
+    except ValueError as error:
+        raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
+
+
+def _whole(text: str) -> int:
+    if not (text.isdecimal() and len(text) < 4):
+        raise ModelError(f"found {text[:20]!r}; expected a small whole number")
+    return int(text)

@@ -1,0 +1,144 @@
+"""How far an extracted table is from the URDF that it came from, both computed by Pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.description import Array, Description, world_to_tool
+from dhkit.errors import ModelError
+from dhkit.model.reference import PinocchioModel, pinocchio_model
+from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
+
+__all__ = ["Original", "Residual"]
+
+STATES = 40
+"""Random states that a residual is taken over."""
+STROKE = 1.0
+"""m: range of a prismatic joint without limits."""
+SMALL_GRAVITY = 1e-3
+"""Share of weight times reach: gravity torques are compared with at least this, so that noise is no error."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The largest differences between an extracted table and its URDF over random states.
+
+    Attributes
+    ----------
+    tool
+        Largest difference of an entry of the tool's pose; m, and entries of the rotation.
+    mass_matrix, gravity
+        Of M and g, relative to their largest entry in all states; None where they were not compared.
+    states
+        How many random states.
+    """
+
+    tool: float
+    mass_matrix: float | None
+    gravity: float | None
+    states: int
+
+    @property
+    def largest(self) -> float:
+        """The largest of them."""
+        return max(self.tool, self.mass_matrix or 0.0, self.gravity or 0.0)
+
+    def __str__(self) -> str:
+        parts = [f"tool {self.tool:.1e}"]
+        if self.mass_matrix is not None and self.gravity is not None:
+            parts += [f"M {self.mass_matrix:.1e}", f"g {self.gravity:.1e}"]
+        return f"{', '.join(parts)} over {self.states} random states"
+
+
+class Original:
+    """A chain of a URDF at random states: tool, mass matrix and gravity torque.
+
+    Without Pinocchio (there is no wheel of it for Windows) the tool alone, by a product of the URDF's own transforms.
+    """
+
+    def __init__(self, chain: Chain, states: int = STATES, seed: int = 0) -> None:
+        self.chain = chain
+        self.q = _states(chain, states, seed)
+        try:
+            self.model: PinocchioModel | None = chain_model(chain)
+        except ModelError as error:
+            if "cannot be imported" not in str(error):
+                raise
+            self.model = None
+        self.tool = np.array(list(self._tools()))
+        self.M, self.g = _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
+
+    def residual(self, description: Description) -> Residual:
+        """Return how far a description's tool, M and g are from the URDF's."""
+        tool = float(np.abs(world_to_tool(description, self.q) - self.tool).max())
+        if self.model is None or not all(joint.bodies for joint in description.joints):
+            return Residual(tool, None, None, len(self.q))
+        model = pinocchio_model(description)
+        model.armature = np.zeros(model.nv)
+        M, g = _dynamics(model, self.q)
+        numbers = description.numbers
+        weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))
+        reach = max(description.reach, float(np.abs(self.tool[:, :3, 3]).max()))
+        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), SMALL_GRAVITY * weight * reach)
+        errors = [
+            float(np.abs(difference).max()) / scale if scale else float(np.abs(difference).max())
+            for difference, scale in zip((M - self.M, g - self.g), scales, strict=True)
+        ]
+        return Residual(tool, errors[0], errors[1], len(self.q))
+
+    def _tools(self) -> Iterator[Array]:
+        if self.model is None:
+            yield from (self._product(q) for q in self.q)
+            return
+        import pinocchio as pin
+
+        data = self.model.createData()
+        base, tip = (self.model.getFrameId(name) for name in (BASE_FRAME, TIP_FRAME))
+        for q in self.q:
+            pin.framesForwardKinematics(self.model, data, q)
+            yield (data.oMf[base].inverse() * data.oMf[tip]).homogeneous
+
+    def _product(self, q: Array) -> Array:
+        """Return the tip in the base as a product of the URDF's transforms."""
+        from scipy.spatial.transform import Rotation
+
+        values = dict(zip(self.chain.names, q, strict=True))
+        T = np.eye(4)
+        for joint in self.chain.tree.joints_to(self.chain.tip, self.chain.base) or ():
+            moved = np.eye(4)
+            if (value := values.get(joint.name)) is not None:
+                if joint.kind == "prismatic":
+                    moved[:3, 3] = value * joint.axis
+                else:
+                    moved[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
+            T = T @ joint.T_parent_joint @ moved
+        return T
+
+
+def _states(chain: Chain, count: int, seed: int) -> Array:
+    """Return the zero state and random ones inside the limits, shape (count, n), rad and m."""
+    rng = np.random.default_rng(seed)
+    ends = []
+    for joint in chain.joints:
+        free = STROKE if joint.kind == "prismatic" else np.pi
+        ends.append(np.clip(joint.limits or (-free, free), -2 * free, 2 * free))
+    low, high = np.array(ends).T
+    q = rng.uniform(low, high, (count, len(ends)))
+    q[0] = 0.0
+    return q
+
+
+def _dynamics(model: PinocchioModel, q: Array) -> tuple[Array, Array]:
+    """Return M, shape (N, n, n), and g, shape (N, n)."""
+    import pinocchio as pin
+
+    data, n = model.createData(), model.nv
+    M, g = np.empty((len(q), n, n)), np.empty((len(q), n))
+    for k, state in enumerate(q):
+        upper = np.triu(np.reshape(np.array(pin.crba(model, data, state)), (n, n)))
+        M[k] = upper + np.triu(upper, 1).T
+        g[k] = np.reshape(np.array(pin.computeGeneralizedGravity(model, data, state)), n)
+    return M, g

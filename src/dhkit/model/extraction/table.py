@@ -1,0 +1,170 @@
+"""From the axes of a chain to the numbers of its Denavit-Hartenberg table, base and tool, as doubles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dhkit.description import Array, Convention
+from dhkit.model.extraction.axes import Axes, Normal, Path, nearest_points, tidiest_normals, turn_about
+from dhkit.model.extraction.ends import FirstRow, LastRow, Tip, first_row, frame, last_row, screw
+
+__all__ = ["Table", "chain_axes", "near_parallel", "tidiest_table"]
+
+NEAR = (1e-13, 1e-5)
+"""Sine of the angle between two neighbouring axes: below, they are parallel; in between both tables are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of n joints with base and tool.
+
+    Attributes
+    ----------
+    rows
+        theta, d, a, alpha of each row of the convention, shape (n, 4), rad and m.
+    T_base_first
+        Frame 0 in the base, shape (4, 4).
+    T_last_tip
+        The tip in frame n, shape (4, 4).
+    """
+
+    convention: Convention
+    rows: Array
+    T_base_first: Array
+    T_last_tip: Array
+
+    def frames(self) -> Array:
+        """Return frames 0 to n in the base with every joint at zero, shape (n+1, 4, 4)."""
+        frames = [self.T_base_first]
+        for theta, d, a, alpha in self.rows:
+            about_z, about_x = screw(2, theta, d), screw(0, alpha, a)
+            order = (about_z, about_x) if self.convention is Convention.STANDARD else (about_x, about_z)
+            frames.append(frames[-1] @ order[0] @ order[1])
+        return np.array(frames)
+
+
+def chain_axes(
+    poses: Array, directions: Array, prismatic: list[bool], T_base_tip: Array, *, parallel_below: float = 1e-10
+) -> Axes:
+    """Return the axes of joints in the base, with the points and directions that the URDF names.
+
+    Parameters
+    ----------
+    poses
+        The joints' frames in the base at zero, shape (n, 4, 4).
+    directions
+        Their axes in the base, unit vectors, shape (n, 3).
+    prismatic
+        Whether each joint is.
+    T_base_tip
+        The tip at zero, shape (4, 4).
+    parallel_below
+        Sine of the largest angle between axes that are treated as parallel.
+    """
+    origins = poses[:, :3, 3]
+    axes = Axes(
+        points=origins,
+        directions=directions,
+        prismatic=prismatic,
+        T_base_tip=T_base_tip,
+        named_points=np.vstack([np.zeros((1, 3)), origins, T_base_tip[None, :3, 3]]),
+        named_directions=np.vstack([np.eye(3), *(pose[:3, :3].T for pose in poses), T_base_tip[:3, :3].T, directions]),
+        parallel_below=parallel_below,
+    )
+    feet: list[Array] = []
+    normals: list[Array] = []
+    for i in range(axes.n - 1):
+        cross = np.cross(directions[i], directions[i + 1])
+        sine = float(np.linalg.norm(cross))
+        if sine <= 1e-6:
+            continue
+        feet += nearest_points(origins[i], directions[i], origins[i + 1], directions[i + 1])
+        normals.append(cross / sine)
+    near = [foot for foot in feet if np.abs(foot).max() < 1e3]
+    points = np.vstack([axes.named_points, *near]) if near else axes.named_points
+    turned = np.vstack([axes.named_directions, *normals]) if normals else axes.named_directions
+    return replace(axes, named_points=_first_of_each(points), named_directions=_first_of_each(_half(turned)))
+
+
+def near_parallel(axes: Axes) -> list[tuple[int, float]]:
+    """Return the neighbouring axes that are nearly parallel: the first one's joint, from 1, and the sine between."""
+    sines = np.linalg.norm(np.cross(axes.directions[:-1], axes.directions[1:]), axis=1)
+    return [(i, float(sine)) for i, sine in enumerate(sines, start=1) if NEAR[0] < sine < NEAR[1]]
+
+
+def tidiest_table(axes: Axes, convention: Convention) -> Table:
+    """Return the table with the fewest nonzero entries through these axes."""
+    z = axes.directions
+    if axes.n == 1:
+        path, start, end = _single(axes, convention)
+    else:
+        path, end = tidiest_normals(
+            axes,
+            lambda normal: first_row(convention, normal, z[0]),
+            lambda normal: last_row(convention, normal, z[-1], Tip(axes.T_base_tip)),
+        )
+        start = path.start
+    rows = _rows(axes, convention, path.normals, start, end)
+    first = path.normals[0]
+    T = frame(first.x, z[0], first.start) @ np.linalg.inv(screw(2, start.theta, start.d))
+    if convention is Convention.MODIFIED:
+        T = T @ np.linalg.inv(screw(0, start.alpha, start.a))
+    table = Table(convention, rows, T, np.eye(4))
+    return replace(table, T_last_tip=np.linalg.inv(table.frames()[-1]) @ axes.T_base_tip)
+
+
+def _rows(axes: Axes, convention: Convention, normals: tuple[Normal, ...], start: FirstRow, end: LastRow) -> Array:
+    """Return theta, d, a, alpha of each row of the convention, shape (n, 4)."""
+    z, n = axes.directions, axes.n
+    along, across = np.zeros((n, 2)), np.zeros((n + 1, 2))
+    along[-1] = end.theta, end.d
+    along[0] = start.theta, start.d
+    across[0], across[n] = (start.a, start.alpha), (end.a, end.alpha)
+    inner = normals if n > 1 else ()
+    for i, normal in enumerate(inner, start=1):
+        a = float((normal.end - normal.start) @ normal.x)
+        across[i] = a, float(turn_about(normal.x, z[i - 1], z[i]))
+        if i > 1:
+            before = normals[i - 2]
+            along[i - 1] = (
+                float(turn_about(z[i - 1], before.x, normal.x)),
+                float((normal.start - before.end) @ z[i - 1]),
+            )
+    beside = across[1:] if convention is Convention.STANDARD else across[:-1]
+    return np.hstack([along, beside])
+
+
+def _single(axes: Axes, convention: Convention) -> tuple[Path, FirstRow, LastRow]:
+    """Return the cheapest table of one joint: a normal of length zero at a named height in a named direction."""
+    z = axes.directions[0]
+    best: tuple[float, Path, FirstRow, LastRow] | None = None
+    flat = axes.named_directions - (axes.named_directions @ z)[:, None] * z
+    lengths = np.linalg.norm(flat, axis=1)
+    directions = flat[lengths > 1e-3] / lengths[lengths > 1e-3, None]
+    for x in (*directions, *-directions):
+        for point in axes.named_points:
+            at = point if axes.prismatic[0] else axes.points[0] + ((point - axes.points[0]) @ z) * z
+            normal = Normal(x, at, at)
+            begun, start = first_row(convention, normal, z)
+            ended, end = last_row(convention, normal, z, Tip(axes.T_base_tip, with_theta=False))
+            if best is None or begun + ended < best[0]:
+                best = begun + ended, Path((normal,), begun + ended), start, end
+    if best is None:
+        raise AssertionError("no table of one joint")
+    _, path, start, end = best
+    return path, start, replace(end, theta=start.theta, d=start.d)
+
+
+def _half(directions: Array) -> Array:
+    """Return unit vectors with the sign that makes their first nonzero coordinate positive: both signs are tried."""
+    rounded = np.round(directions, 9)
+    first = np.argmax(rounded != 0, axis=1)
+    signs = np.where(rounded[np.arange(len(rounded)), first] < 0, -1.0, 1.0)
+    return np.asarray(directions * signs[:, None])
+
+
+def _first_of_each(rows: Array) -> Array:
+    _, places = np.unique(np.round(rows, 9) + 0.0, axis=0, return_index=True)
+    return np.asarray(rows[np.sort(places)])

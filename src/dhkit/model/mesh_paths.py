@@ -1,0 +1,114 @@
+"""Where the meshes that a URDF names lie, and whether they lie in the robot's own folders."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree
+
+from dhkit.errors import ModelError
+
+__all__ = ["MeshFinder"]
+
+MAX_PARENTS = 20
+"""Folders above a URDF that are looked at for a package.xml."""
+MAX_PACKAGE_BYTES = 100_000
+SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
+
+
+class MeshFinder:
+    """Finds the files that a URDF's mesh elements name.
+
+    A file must lie in the robot's root or below one of the package folders, links followed. The root is the nearest
+    folder above the URDF with a package.xml, else the URDF's own folder. Nothing is fetched: of URIs only
+    ``package://NAME/...`` is read, with NAME a folder in ``package_dirs``, or the package that the URDF lies in.
+
+    Parameters
+    ----------
+    urdf
+        The file.
+    package_dirs
+        Folders with packages in them.
+    """
+
+    def __init__(self, urdf: Path, package_dirs: Sequence[str | Path] = ()) -> None:
+        self.folder = urdf.resolve().parent
+        self.packages = _packages_above(self.folder)
+        self.root = self.packages[0][0] if self.packages else self.folder
+        self.package_dirs = [Path(folder).resolve() for folder in package_dirs]
+        for folder in self.package_dirs:
+            if not folder.is_dir():
+                raise ModelError(f"package_dirs: {folder} is no folder")
+
+    @property
+    def mesh_folder(self) -> Path:
+        """The folder that all meshes' paths are relative to."""
+        return Path(os.path.commonpath([self.root, *self.package_dirs])) if self.package_dirs else self.root
+
+    def path(self, uri: str) -> str:
+        """Return a mesh's path relative to :attr:`mesh_folder`.
+
+        Raises
+        ------
+        ModelError
+            Another scheme, a package that is not known, no such file, or one outside the robot's folders.
+        """
+        if not uri.isprintable():
+            raise ModelError(f"mesh {uri[:80]!r}: not a file name")
+        file = self._file(uri).resolve()
+        roots = [self.root, *self.package_dirs]
+        if not any(file.is_relative_to(root) for root in roots):
+            raise ModelError(f"mesh {uri[:120]!r} lies outside the robot's folder {self.root}")
+        if not file.is_file():
+            raise ModelError(f"mesh {uri[:120]!r} is not there")
+        return file.relative_to(self.mesh_folder).as_posix()
+
+    def _file(self, uri: str) -> Path:
+        name = uri.replace("\\", "/")
+        if name.startswith("package://"):
+            package, _, rest = name.removeprefix("package://").partition("/")
+            inner = PurePosixPath(rest)
+            if not package or package in (".", "..") or inner.is_absolute():
+                raise ModelError(f"mesh {uri[:120]!r}: expected package://NAME/path")
+            for folder in self.package_dirs:
+                if (folder / package).is_dir():
+                    return folder / package / inner
+            for folder, own in self.packages:
+                if package in (own, folder.name):
+                    return folder / inner
+            if package == self.root.name:
+                return self.root / inner
+            raise ModelError(f"mesh {uri[:120]!r}: no package {package!r}; package_dirs names the folder it lies in")
+        if SCHEME.match(name):
+            raise ModelError(f"mesh {uri[:120]!r}: expected package:// or a path relative to the URDF")
+        if PurePosixPath(name).is_absolute():
+            raise ModelError(f"mesh {uri[:120]!r} is an absolute path; expected one relative to the URDF")
+        return self.folder / PurePosixPath(name)
+
+
+def _packages_above(folder: Path) -> list[tuple[Path, str]]:
+    """Return the folders at and above a folder that are packages, with their names, the nearest first."""
+    found = []
+    for above in (folder, *folder.parents)[:MAX_PARENTS]:
+        manifest = above / "package.xml"
+        try:
+            if not manifest.is_file() or manifest.stat().st_size > MAX_PACKAGE_BYTES:
+                continue
+            text = manifest.read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            continue
+        found.append((above, _package_name(text)))
+    return found
+
+
+def _package_name(manifest: str) -> str:
+    """Return the name that a package.xml states; empty where it cannot be read safely."""
+    if "<!DOCTYPE" in manifest or "<!ENTITY" in manifest:
+        return ""
+    try:
+        name = ElementTree.fromstring(manifest).findtext("name")  # noqa: S314 - no entities, bounded
+    except (ElementTree.ParseError, ValueError):
+        return ""
+    return (name or "").strip()

@@ -1,0 +1,170 @@
+"""Mass, centre of mass and inertia of a link from its shape, and a density or a mass that the user states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import INERTIA_PLACES, Array, Body, Inertia
+from dhkit.errors import ModelError
+from dhkit.expressions import exact
+from dhkit.model.closed_surface import closed_surface
+from dhkit.model.triangle_mesh import TriangleMesh
+
+__all__ = ["InertiaMethod", "MassProperties", "ShapeInertia", "convex_hull", "shape_inertia"]
+
+FLAT = 1e-13
+"""Volume below which a mesh encloses nothing, as a share of its size cubed: a wire of 1 m and 1 um has 1e-12."""
+
+
+class InertiaMethod(Enum):
+    """What the volume of a link was taken from."""
+
+    CLOSED = "the closed mesh"
+    FILLED = "the mesh with its holes capped"
+    HULL = "the convex hull of an open mesh"
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Mass, centre of mass and inertia of a rigid body, in one frame."""
+
+    mass: float
+    """kg."""
+    com: Array
+    """Shape (3,), m."""
+    inertia: Array
+    """Shape (3, 3), kg m^2, about the centre of mass; products with the tensor's sign, xy = -integral of x y dm."""
+
+    def moved(self, T: ArrayLike) -> MassProperties:
+        """Return them in the frame that T, shape (4, 4), a rigid transform, maps their own to."""
+        matrix = np.asarray(T, dtype=float)
+        R = matrix[:3, :3]
+        tensor = R @ self.inertia @ R.T
+        return MassProperties(self.mass, R @ self.com + matrix[:3, 3], (tensor + tensor.T) / 2)
+
+    def body(self, name: str = "") -> Body:
+        """Return them as a body of a description, in the same frame."""
+        x, y, z = (exact(float(entry)) for entry in self.com)
+        moments = {key: exact(float(self.inertia[place])) for key, place in INERTIA_PLACES.items()}
+        return Body(exact(float(self.mass)), (x, y, z), Inertia(**moments), name=name)
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeInertia(MassProperties):
+    """Mass properties of a homogeneous body from its shape, with what they rest on."""
+
+    volume: float
+    """m^3."""
+    method: InertiaMethod
+    notes: tuple[str, ...]
+    """What was changed on the mesh, in words."""
+
+
+def shape_inertia(mesh: TriangleMesh, *, density: float | None = None, mass: float | None = None) -> ShapeInertia:
+    """Return mass, centre of mass and inertia of a homogeneous body of a mesh's shape.
+
+    Integrals over a closed mesh are exact: the body is a sum of signed tetrahedra between its triangles and its middle,
+    whose second moments are Tonon's (2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", section 2):
+    with corners 0, a, b, c and volume v, integral of x x^T = v / 20 (a a^T + b b^T + c c^T + s s^T), s = a + b + c.
+
+    Parameters
+    ----------
+    mesh
+        In the frame that is asked about, m. Where it is open, its holes are capped if that adds little area, and
+        else its convex hull is taken; ``method`` and ``notes`` say so.
+    density, mass
+        kg/m^3, or kg; exactly one of them.
+
+    Raises
+    ------
+    ModelError
+        Neither or both of density and mass, one that is not positive, or a mesh that encloses no volume.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> box = TriangleMesh(
+    ...     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    ...     np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
+    ... )
+    >>> body = shape_inertia(box, density=6.0)
+    >>> round(body.mass, 12), body.com.round(12).tolist()
+    (1.0, [0.25, 0.25, 0.25])
+    """
+    stated = [(name, value) for name, value in (("density", density), ("mass", mass)) if value is not None]
+    if len(stated) != 1:
+        raise ModelError(
+            f"{'both' if stated else 'neither'} of density and mass; expected exactly one, nothing is assumed"
+        )
+    name, value = stated[0]
+    if not (np.isfinite(value) and value > 0):
+        raise ModelError(
+            f"{name} is {value:g}; expected a positive number of {'kg/m^3' if name == 'density' else 'kg'}"
+        )
+    if not np.isfinite(mesh.vertices).all():
+        raise ModelError("vertices that are not finite; expected numbers")
+    surface = closed_surface(mesh)
+    closed, notes = surface.mesh, surface.notes
+    method = InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED
+    if not surface.is_closed:
+        closed, method = convex_hull(mesh), InertiaMethod.HULL
+        notes = ("open: judged by its convex hull, which is no lighter than the link",)
+    volume, com, covariance = _moments(closed)
+    if volume <= FLAT * mesh.size**3:
+        raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
+    rho = value if name == "density" else value / volume
+    inertia = rho * (np.trace(covariance) * np.eye(3) - covariance)
+    return ShapeInertia(rho * volume, com, inertia, volume, method, notes)
+
+
+def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the convex hull of a mesh's vertices, its triangles seen counterclockwise from outside.
+
+    Raises
+    ------
+    ModelError
+        The vertices lie in a plane.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(mesh.vertices)
+    except QhullError:
+        raise ModelError("the mesh encloses no volume: its vertices lie in a plane or on a line") from None
+    faces = np.asarray(hull.simplices, dtype=np.intp)
+    a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    return TriangleMesh(mesh.vertices, np.where(inwards[:, None], faces[:, ::-1], faces)).merged()
+
+
+def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
+    """Return volume, centre and the integral of r r^T about the centre, of a closed mesh.
+
+    Coordinates are taken about the mesh's middle and in shares of its size: about a far origin the differences of large
+    moments would leave few digits, and a mesh of nanometres would underflow.
+    """
+    size = mesh.size or 1.0
+    middle = mesh.bounds.mean(axis=0)
+    corners = (mesh.corners - middle) / size
+    volume, first, _ = _sums(corners)
+    if volume <= FLAT:
+        return volume * size**3, middle, np.zeros((3, 3))
+    centre = first / volume
+    volume, first, second = _sums(corners - centre)
+    rest = first / volume  # rounding alone
+    covariance = second - volume * np.outer(rest, rest)
+    return volume * size**3, middle + size * (centre + rest), covariance * size**5
+
+
+def _sums(corners: Array) -> tuple[float, Array, Array]:
+    """Return the integrals of 1, r and r r^T over the signed tetrahedra between triangles and the origin."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    v = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    s = a + b + c
+    first = v @ s / 4
+    second = sum((x * v[:, None]).T @ x for x in (a, b, c, s)) / 20
+    return float(v.sum()), first, np.asarray((second + second.T) / 2)

@@ -1,0 +1,76 @@
+"""A URDF in a second reader: what yourdfpy makes of the frames and inertials that Pinocchio and dhkit read."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_text
+
+__all__ = ["second_opinion"]
+
+AGREED = 1e-9
+"""Largest difference of a frame's entries, and of masses, centres and moments of inertia, that counts as agreement."""
+STATES = 10
+
+
+def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
+    """Say whether yourdfpy reads the same frames and inertials; its own rules differ on incomplete files.
+
+    Parameters
+    ----------
+    chain
+        A chain of a URDF that passed the gate.
+    q
+        Joint values, shape (N, n), rad and m; the first ten are compared.
+    tools
+        The tip in the base at those values by Pinocchio, shape (N, 4, 4).
+    """
+    try:
+        import yourdfpy
+    except ImportError:
+        return
+    # it reports what it does not like through logging, and so do we through what differs
+    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
+    try:
+        robot = yourdfpy.URDF.load(io.BytesIO(chain_text(chain).encode()), load_meshes=False, build_scene_graph=True)
+        frames = max(_tool_difference(robot, chain, *state) for state in zip(q[:STATES], tools, strict=False))
+    except Exception as error:  # a second reader that fails says nothing about the file
+        yield f"yourdfpy does not read it: {' '.join(str(error).split())[:120] or type(error).__name__}"
+        return
+    different = [name for name in _links(chain) if not _same_inertial(robot, chain, name)]
+    version = getattr(yourdfpy, "__version__", "")
+    if frames <= AGREED and not different:
+        yield f"yourdfpy {version} reads the same frames (within {frames:.1e}) and inertials"
+    if frames > AGREED:
+        yield f"yourdfpy {version} puts the tool {frames:.1e} away from where Pinocchio has it"
+    if different:
+        yield f"yourdfpy {version} reads other inertials of links {', '.join(different)[:200]}"
+
+
+def _tool_difference(robot: object, chain: Chain, q: Array, tool: Array) -> float:
+    robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)))  # type: ignore[attr-defined]
+    T = robot.get_transform(TIP_FRAME, BASE_FRAME)  # type: ignore[attr-defined]
+    return float(np.abs(T - tool).max())
+
+
+def _links(chain: Chain) -> tuple[str, ...]:
+    return tuple(link for group in chain.groups for link in group)
+
+
+def _same_inertial(robot: object, chain: Chain, name: str) -> bool:
+    ours, theirs = chain.tree.links[name].inertial, robot.link_map[name].inertial  # type: ignore[attr-defined]
+    if ours is None or theirs is None:
+        return ours is None and theirs is None
+    T = np.eye(4) if theirs.origin is None else np.asarray(theirs.origin, dtype=float)
+    inertia = T[:3, :3] @ np.asarray(theirs.inertia, dtype=float) @ T[:3, :3].T
+    size = max(1.0, float(np.abs(ours.inertia).max()))
+    return bool(
+        abs(theirs.mass - ours.mass) <= AGREED * max(1.0, ours.mass)
+        and np.abs(T[:3, 3] - ours.com).max() <= AGREED
+        and np.abs(inertia - ours.inertia).max() <= AGREED * size
+    )
