@@ -76,7 +76,8 @@ def dae(points="0 0 0 1 0 0 0 1 0", indices="0 1 2", *, unit="1", up="Z_UP", bef
 <triangles count="1" material="paint"><input semantic="VERTEX" source="#v" offset="0"/><p>{indices}</p></triangles>
 </mesh></geometry></library_geometries>
 <library_visual_scenes><visual_scene id="s"><node>{node}<instance_geometry url="#g"><bind_material><technique_common>
-<instance_material symbol="paint" target="#m"/></technique_common></bind_material></instance_geometry></node></visual_scene>
+<instance_material symbol="paint" target="#m"/></technique_common></bind_material>
+</instance_geometry></node></visual_scene>
 </library_visual_scenes><scene><instance_visual_scene url="#s"/></scene>{tail}"""
 
 

@@ -1,4 +1,4 @@
-"""`dhkit import-cad`: from the parts of the documentation's example to a robot that simulates, and one line otherwise."""
+"""`dhkit import-cad`: from the parts of docs/cad.md to a robot that simulates, and one line otherwise."""
 
 import json
 import runpy

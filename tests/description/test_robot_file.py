@@ -8,6 +8,7 @@ from hypothesis import given
 
 from dhkit.description import DHTable, Units, from_toml, library_robot, read_robot, robots, to_toml, write_robot
 from dhkit.expressions import PI, exact
+from bad_robot_files import GOOD
 from random_arms import arms
 
 INCHES_AND_DEGREES = """
@@ -105,6 +106,24 @@ def test_any_arm_survives_writing_and_reading_in_any_units(law, arm):
         changed = replace(arm, units=units)
         again = from_toml(to_toml(changed))
         law.holds("changed by writing and reading", again != arm or again.units != units, 0)
+
+
+@pytest.mark.parametrize(
+    ("written", "factors", "again"),
+    [
+        ("", (1, 1, 1), '{mesh = "a.stl"}'),
+        (", scale = 1", (1, 1, 1), '{mesh = "a.stl"}'),
+        (", scale = 0.001", (0.001, 0.001, 0.001), "scale = 0.001}"),
+        (', scale = "mm"', (0.001, 0.001, 0.001), 'scale = "mm"}'),
+        (", scale = [1, -1, 1]", (1, -1, 1), "scale = [1, -1, 1]}"),
+        (', scale = [0.5, "2*mm", -3]', (0.5, 0.002, -3), 'scale = [0.5, "2*mm", -3]}'),
+    ],
+)
+def test_a_mesh_has_one_factor_or_three(written, factors, again):
+    arm = from_toml(GOOD + f'shape = {{ mesh = "a.stl"{written} }}\n')
+    assert [float(factor) for factor in arm.joints[0].shapes[0].geometry.scale] == list(factors)
+    assert again in to_toml(arm)
+    assert from_toml(to_toml(arm)) == arm
 
 
 def test_units_do_not_matter():

@@ -77,7 +77,8 @@ REFUSED = {
         "links a, b go round in a circle",
     ),
     "own parent": (
-        '<robot name="r"><link name="a"/><joint name="i" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
+        '<robot name="r"><link name="a"/><joint name="i" type="fixed"><parent link="a"/>'
+        '<child link="a"/></joint></robot>',
         "links a go round in a circle",
     ),
     "not connected": (arm(more='<link name="z"/>'), "not connected: a, z have no parent; expected one root"),
@@ -92,7 +93,10 @@ REFUSED = {
     ),
     "a link without a name": (arm(more="<link/>"), "a link has the name ''; expected text"),
     "a name with a line break": (arm(more='<link name="a&#10;b"/>'), "a link has the name 'a\\nb'; expected text"),
-    "no such parent": (arm().replace('parent link="b"', 'parent link="x"'), "joint 'j': <parent> is 'x', which is no link"),
+    "no such parent": (
+        arm().replace('parent link="b"', 'parent link="x"'),
+        "joint 'j': <parent> is 'x', which is no link",
+    ),
     "no child": (arm().replace('<child link="c"/>', ""), "joint 'j': <child> is '', which is no link"),
     "unknown type": (arm(kind="hinge"), "joint 'j' is 'hinge'; expected one of revolute"),
     "zero axis": (arm(axis='<axis xyz="0 0 0"/>'), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
@@ -107,7 +111,10 @@ REFUSED = {
     "negative effort": (arm(limit='<limit lower="-1" upper="1" effort="-5"/>'), "joint 'j': effort is -5"),
     "NaN mass": (arm(body=BODY.replace('value="1"', 'value="nan"')), "link 'c': <mass value>: found 'nan'"),
     "missing mass": (arm(body=f"<inertial>{INERTIA}</inertial>"), "link 'c': <inertial> lacks mass or inertia"),
-    "missing inertia": (arm(body='<inertial><mass value="1"/></inertial>'), "link 'c': <inertial> lacks mass or inertia"),
+    "missing inertia": (
+        arm(body='<inertial><mass value="1"/></inertial>'),
+        "link 'c': <inertial> lacks mass or inertia",
+    ),
     "missing izz": (arm(body=BODY.replace(' izz="1"', "")), "link 'c': <inertial> lacks mass or inertia"),
     "negative mass": (arm(body=BODY.replace('value="1"', 'value="-1"')), "link 'c': mass is -1; expected none below 0"),
     "inertia in words": (arm(body=BODY.replace('ixx="1"', 'ixx="one"')), "link 'c': <inertia ixx>: found 'one'"),
@@ -144,7 +151,10 @@ def test_what_is_no_file_is_not_read(path, tmp_path):
 
 READ = {
     "no limits": (arm(limit=""), "joint 'j': no limits; read as unlimited"),
-    "an empty range": (arm(limit='<limit lower="0" upper="0" effort="1" velocity="1"/>'), "limits [0, 0]; read as unlimited"),
+    "an empty range": (
+        arm(limit='<limit lower="0" upper="0" effort="1" velocity="1"/>'),
+        "limits [0, 0]; read as unlimited",
+    ),
     "limit without range": (arm(limit='<limit effort="1" velocity="1"/>'), "joint 'j': no limits; read as unlimited"),
     "effort 0": (arm(limit='<limit lower="-1" upper="1" effort="0" velocity="1"/>'), "effort 0; read as unlimited"),
     "non-unit axis": (arm(axis='<axis xyz="0 0 2"/>'), "joint 'j': axis has length 2; read as a direction"),
@@ -248,7 +258,9 @@ def test_meshes_outside_the_folder_are_left_out_and_said(uri, tmp_path):
     assert not extraction.description.joints[1].shapes
 
 
-TRIANGLE = b"\0" * 80 + (1).to_bytes(4, "little") + np.array([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes() + b"\0\0"
+TRIANGLE = (
+    b"\0" * 80 + (1).to_bytes(4, "little") + np.array([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes() + b"\0\0"
+)
 
 
 @pytest.mark.parametrize(

@@ -224,7 +224,9 @@ def test_parts_moved_into_positive_space_are_recognised(tmp_path):
         own = mesh.scaled(1000)
         corners = TriangleMesh(own.vertices - own.bounds[0], own.faces).corners
         (folder / f"link{i}.stl").write_bytes(binary_stl("x", corners))
-    with pytest.raises(ModelError, match=r"4 of 4 parts .* 'Do not translate STL output data to positive space' ticked"):
+    with pytest.raises(
+        ModelError, match=r"4 of 4 parts .* 'Do not translate STL output data to positive space' ticked"
+    ):
         import_cad(folder, arm)
 
 

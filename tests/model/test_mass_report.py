@@ -128,6 +128,23 @@ def test_the_sign_of_products_is_found_by_either_block_with_rounded_numbers(tmp_
     assert "Lxx" in report.notes[0] and report.part == "Part2"
 
 
+@pytest.mark.parametrize("sign", SIGNS)
+def test_two_decimal_places_as_solidworks_prints_them(tmp_path, sign):
+    found = body()
+    text = re.sub(r"(= )(-?\d+\.?\d*(?:e-?\d+)?)", lambda m: f"{m[1]}{float(m[2]):.2f}", solidworks_text(found, sign))
+    report = read(tmp_path, text)
+    assert difference(report.properties, found) < 1e-4
+    assert ("+integral" if sign == 1 else "entries of the tensor") in report.notes[1]
+    small = shape_inertia(box((0.1, 0.25, 0.4), (0.03, -0.02, 0.05)), density=50.0)
+    coarse = re.sub(
+        r"(= )(-?\d+\.?\d*(?:e-?\d+)?)",
+        lambda m: f"{m[1]}{float(m[2]):.2f}",
+        solidworks_text(small, sign, units=("kilograms", "meters")),
+    )
+    with pytest.raises(ModelError, match="too few digits"):
+        read(tmp_path, coarse)
+
+
 def test_without_other_blocks_the_stated_notation_or_the_default_counts(tmp_path):
     found = body()
     default = read(tmp_path, solidworks_text(found, 1, principal=False, origin=False))

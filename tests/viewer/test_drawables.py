@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from dhkit.description import Capsule, Mesh, Sphere, library_robot
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
+from dhkit.model.mesh_reader import read_mesh
 from dhkit.model.shapes import Part, link_parts
+from dhkit.model.stl import binary_stl
 from dhkit.viewer.drawables import grid_object, grid_step, part_object, part_transform, triad_object
 
 FLOAT32 = 1e-6
@@ -65,6 +67,16 @@ def test_a_mesh_is_its_file_and_keeps_its_scale():
     assert lowered["data"].data == part.file.read_bytes()
     in_mm = replace(part, geometry=Mesh(part.geometry.path, (exact(0.001),) * 3))
     assert np.array_equal(part_transform(in_mm)[:3, :3], 0.001 * part.T_link_part[:3, :3])
+
+
+def test_a_mirrored_mesh_is_drawn_mirrored_and_other_formats_as_stl(tmp_path):
+    (tmp_path / "a.obj").write_text("v 1 2 3\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    scale = (exact(1), exact(-2), exact(0.5))
+    part = Part(1, Mesh("a.obj", scale), np.eye(4), "#123456", tmp_path / "a.obj")
+    assert np.array_equal(part_transform(part), np.diag([1, -2, 0.5, 1]))
+    lowered = part_object(part, "x")["geometries"][0]
+    assert lowered["format"] == "stl"
+    assert lowered["data"].data == binary_stl("dhkit", read_mesh(tmp_path / "a.obj").corners)
 
 
 @pytest.mark.parametrize(

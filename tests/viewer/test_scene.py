@@ -34,7 +34,7 @@ def landmarks(part, drawn):
         top = max(point["y"] for point in geometry["points"])
         tip = float(part.geometry.length) / 2 + float(part.geometry.radius)
         return [[0, top, 0], [0, -top, 0]], [[0, 0, tip], [0, 0, -tip]]
-    scale = float(part.geometry.scale) if isinstance(part.geometry, Mesh) else 1.0
+    scale = [float(x) for x in part.geometry.scale] if isinstance(part.geometry, Mesh) else 1.0
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     return corners, scale * corners
 

@@ -66,7 +66,12 @@ def list_examples(json: bool) -> None:
     """Print the chains of example-robot-data that load by name."""
     chains = list(example_chains())
     if json:
-        print_json([{"name": chain.name, "joints": list(chain.joints), "tip": chain.tip} for chain in chains])
+        print_json(
+            [
+                {"name": chain.name, "joints": list(chain.joints), "base": chain.base, "tip": chain.tip}
+                for chain in chains
+            ]
+        )
         return
     print_table(("name", "joints", "tip"), [(chain.name, str(len(chain.joints)), chain.tip) for chain in chains])
 

@@ -135,7 +135,8 @@ def _stl(path: Path, size: int) -> MeshHeader:
     if len(head) < STL_HEADER or b"\0" not in head:
         raise _NoMeshError("no STL: neither a text that begins with 'solid' nor a binary header")
     raise _NoMeshError(
-        f"no STL: {size} bytes; its header counts {count} triangles, which need {expected} (truncated, or a lying count)"
+        f"no STL: {size} bytes; its header counts {count} triangles, which need {expected} "
+        "(truncated, or a lying count)"
     )
 
 
@@ -169,8 +170,8 @@ def _ply(path: Path, size: int) -> MeshHeader:
         raise _NoMeshError("no triangles: its header counts no vertices or no faces")
     if size < len(header) + len(ending) + 1 + least:
         raise _NoMeshError(
-            f"no PLY: {size} bytes; its header counts {counts['vertex']} vertices and {counts['face']} faces, which need "
-            f"{len(header) + len(ending) + 1 + least} or more (truncated, or a lying count)"
+            f"no PLY: {size} bytes; its header counts {counts['vertex']} vertices and {counts['face']} faces, which "
+            f"need {len(header) + len(ending) + 1 + least} or more (truncated, or a lying count)"
         )
     return MeshHeader("ply", counts["face"])
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -156,14 +156,15 @@ def import_cad(
     unit
         Of the files' coordinates: m, cm, mm or in; found by the size of the assembly unless given.
     q
-        Joint values in the pose of the export, shape (n,), rad and m; the configuration ``ready`` unless given, and zero
-        where the table has none.
+        Joint values in the pose of the export, shape (n,), rad and m; the configuration ``ready`` unless given, and
+        zero where the table has none.
     density
         kg/m^3, of all links about which nothing else is stated. Without density, masses and reports no body is made.
     mass
         kg, by link.
     reports
-        Mass properties from the CAD program, in assembly coordinates; see :func:`dhkit.model.mass_report.read_mass_report`.
+        Mass properties from the CAD program, in assembly coordinates; see
+        :func:`dhkit.model.mass_report.read_mass_report`.
     simplify
         Triangles that a part keeps at most; masses are those of the whole part.
     files
@@ -274,4 +275,12 @@ def _with_parts(
     old = description.base
     base = Base(old.placement, shapes.get(0, old.shapes), made.get(0, old.body))
     joints = tuple(changed(i, joint) for i, joint in enumerate(description.joints, start=1))
-    return replace(description, joints=joints, base=base)
+    said = f"Shapes of links {_listed(shapes)}"
+    if made:
+        said += f" and bodies of links {_listed(made)}"
+    notes = "\n".join(text for text in (description.notes, f"{said} are from CAD parts (dhkit import-cad).") if text)
+    return replace(description, joints=joints, base=base, notes=notes)
+
+
+def _listed(links: Iterable[int]) -> str:
+    return ", ".join(map(str, sorted(links)))

@@ -92,8 +92,8 @@ def assigned(
 ) -> Assignment:
     """Return the parts of each link, 0 to ``links``.
 
-    Numbers are those of the table, 0 or "base" for the part that stands still. Where there is none, n + 1 parts that are
-    numbered 1 to n + 1 are taken as the course does: part 1 is the base.
+    Numbers are those of the table, 0 or "base" for the part that stands still. Where there is none, n + 1 parts that
+    are numbered 1 to n + 1 are taken as the course does: part 1 is the base.
 
     Parameters
     ----------

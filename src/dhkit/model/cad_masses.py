@@ -126,8 +126,8 @@ class StatedMasses:
             beyond = np.maximum(np.maximum(low - properties.com, properties.com - high), 0)
             if np.linalg.norm(beyond) > OUTSIDE * np.linalg.norm(high - low):
                 notes.append(
-                    f"warning: its centre of mass lies {np.linalg.norm(beyond):.3g} m outside the link; was the report made in "
-                    "the coordinates of the assembly?"
+                    f"warning: its centre of mass lies {np.linalg.norm(beyond):.3g} m outside the link; was the report "
+                    "made in the coordinates of the assembly?"
                 )
         return LinkBody(properties, tuple(notes))
 

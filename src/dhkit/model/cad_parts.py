@@ -100,8 +100,8 @@ def _mat_file(folder: Path) -> Path | None:
 def _check_budget(where: str, count: int, simplify: int | None) -> None:
     if simplify is None and count > MAX_CAD_TRIANGLES:
         raise ModelError(
-            f"{where}: {count} triangles; expected at most {MAX_CAD_TRIANGLES}; export it more coarsely, or reduce it with "
-            "--simplify 20000"
+            f"{where}: {count} triangles; expected at most {MAX_CAD_TRIANGLES}; export it more coarsely, or reduce "
+            "it with --simplify 20000"
         )
     if count > MAX_READ_TRIANGLES:
         raise ModelError(f"{where}: {count} triangles; expected at most {MAX_READ_TRIANGLES}, even to simplify")

@@ -17,11 +17,13 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 SMALLEST, LARGEST = 0.25, 6.0
 """Diagonal of the box around an arm in its READY pose, as a share of its length, the sum of |a| and |d|."""
 AT_ORIGIN = 1e-5
-"""How near to the origin the corner of a part lies that was moved there, as a share of its size: a text has six digits."""
+"""Distance from the origin to the corner of a part that was moved there, share of its size: texts have six digits."""
 NEAR = 0.05
 """How far the axes of the joints pass the boxes around their links, on average, as a share of the arm's length."""
 CLEARER = 2.0
 """The second best unit must miss the axes by this factor more."""
+FEWEST_AXES = 2
+"""Joints from which on axes decide: one axis through the origin passes a part of any size."""
 AXIS_POINTS = 401
 
 
@@ -36,17 +38,17 @@ def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
     moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= AT_ORIGIN * part.size]
     if len(moved) >= max(2, len(parts) - 1):
         raise ModelError(
-            f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into positive "
-            "space on export, so that their places in the assembly are lost; export again with the box 'Do not translate "
-            "STL output data to positive space' ticked (SolidWorks: Save As, STL, Options)"
+            f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into "
+            "positive space on export, so that their places in the assembly are lost; export again with the box 'Do "
+            "not translate STL output data to positive space' ticked (SolidWorks: Save As, STL, Options)"
         )
 
 
 def unit_of(description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], where: str) -> str:
     """Return the unit of an assembly's coordinates: m, cm, mm or in.
 
-    The assembly must be about as large as the arm. Where two units pass, which only cm and in and neighbours of them can,
-    the boxes around the links decide: the axis of each joint passes those of the two links that it joins.
+    The assembly must be about as large as the arm. Where two units pass, which only cm and in and their neighbours
+    can, the boxes around the links decide: the axis of each joint passes those of the two links that it joins.
 
     Parameters
     ----------
@@ -64,7 +66,8 @@ def unit_of(description: Description, frames: Array, links: Mapping[int, Sequenc
     ModelError
         No unit fits, or more than one; names the option that states it.
     """
-    length = description.reach
+    # A sliding joint without limits is not in the reach, and may stand far out.
+    length = max(description.reach, float(np.linalg.norm(np.diff(frames[:, :3, 3], axis=0), axis=1).sum()))
     bounds = np.array([mesh.bounds for meshes in links.values() for mesh in meshes])
     size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
     if length == 0:
@@ -77,7 +80,7 @@ def unit_of(description: Description, frames: Array, links: Mapping[int, Sequenc
         raise ModelError(f"{where}: {found}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
     missed = {unit: _missed(description, frames, links, UNITS[unit]) / length for unit in fitting}
     best, second = sorted(missed, key=missed.__getitem__)[:2]
-    if missed[best] > NEAR or missed[second] < CLEARER * missed[best] + NEAR / 5:
+    if description.n < FEWEST_AXES or missed[best] > NEAR or missed[second] < CLEARER * missed[best] + NEAR / 5:
         raise ModelError(f"{where}: {found}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
     return best
 

@@ -1,4 +1,4 @@
-"""Surfaces made fit to enclose a volume: triangles turned the same way round, outside in or out recognised, holes capped.
+"""Surfaces made fit to enclose a volume: triangles turned the same way round, shells turned outwards, holes capped.
 
 A surface is closed where every edge is passed as often in one direction as in the other. Then its triangles are the
 boundary of a region, counted with signs, and integrals over that region are exact sums over the triangles; it does not
@@ -19,7 +19,7 @@ from dhkit.model.triangle_mesh import TriangleMesh
 __all__ = ["Surface", "closed_surface", "is_closed", "signed_volume"]
 
 NEAR = 1e-6
-"""Vertices nearer than this share of a mesh's size are joined where the mesh is open: files round each corner by itself."""
+"""Vertices nearer than this share of a mesh's size are joined where the mesh is open: files round each corner alone."""
 LARGEST_CAP = 0.02
 """Area of the caps over all holes, at most, as a share of the whole area: beyond it the shape is not known."""
 MOST_SHELLS = 400
@@ -81,7 +81,7 @@ def _repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, bool | None, list[str]]
 
 
 def is_closed(mesh: TriangleMesh) -> bool:
-    """Return whether every edge of a mesh, between vertices of equal number, is passed as often one way as the other."""
+    """Return whether every edge, between vertices of equal number, is passed as often one way as the other."""
     if not len(mesh.faces):
         return False
     edges, count = _edges(mesh.faces), len(mesh.vertices)
@@ -126,9 +126,9 @@ def _shift(offset: Array) -> Array:
 def _consistent(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh whose neighbours go round alike, and how many triangles were turned.
 
-    Each triangle is two nodes of a graph, as it is and turned; triangles that share an edge join the nodes in which they
-    pass it in opposite directions. A piece of the surface that can be oriented is then two components, and the one with
-    more area as it was is kept: so the inner shell of a hollow link stays the inner one.
+    Each triangle is two nodes of a graph, as it is and turned; triangles that share an edge join the nodes in which
+    they pass it in opposite directions. A piece of the surface that can be oriented is then two components, and the one
+    with more area as it was is kept: so the inner shell of a hollow link stays the inner one.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -198,7 +198,7 @@ def _outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
         return mesh, (*notes, f"{count} shells: which of them lie in others was not looked at")
     volume = np.bincount(shells, _volumes(mesh), minlength=count)
     inside = np.array([_winding(mesh, shells != k, _inner_points(mesh, shells == k)[0]) for k in range(count)])
-    # A cavity lies where the shells around it count 1; an inverted shell elsewhere has its triangles the wrong way round.
+    # A cavity lies where the shells around it count 1; a shell elsewhere has its triangles the wrong way round.
     wrong = (volume < 0) & (inside < INSIDE)
     if wrong.any():
         faces = np.where(wrong[shells][:, None], mesh.faces[:, ::-1], mesh.faces)
@@ -221,7 +221,7 @@ def _overlaps(mesh: TriangleMesh, shells: NDArray[np.intp], k: int) -> bool:
 
 
 def _inner_points(mesh: TriangleMesh, chosen: NDArray[np.bool_]) -> Array:
-    """Return points just behind the middles of triangles: on a face that two shells share a winding number is undecided."""
+    """Return points just behind triangles' middles: on a face that two shells share the winding number is undecided."""
     corners = mesh.corners[chosen]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -243,7 +243,7 @@ def _shells(mesh: TriangleMesh) -> NDArray[np.intp]:
 
 
 def _winding(mesh: TriangleMesh, chosen: NDArray[np.bool_], point: Array) -> float:
-    """Return how often triangles go round a point: the sum of their solid angles over 4 pi (Van Oosterom, Strackee 1983)."""
+    """Return how often triangles go round a point: the solid angles over 4 pi (Van Oosterom, Strackee 1983)."""
     a, b, c = np.moveaxis(mesh.corners[chosen] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     triple = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -10,12 +10,14 @@ from pathlib import Path
 
 from dhkit.errors import ModelError
 from dhkit.model.urdf_chain import chain_tips, only_tip, tool_frame
-from dhkit.model.urdf_tree import read_urdf
+from dhkit.model.urdf_tree import UrdfJoint, UrdfTree, read_urdf
 
 __all__ = ["ExampleChain", "example_chains", "example_robots", "example_urdf", "urdf_source"]
 
 PACKAGE = "example-robot-data"
 PREFIX = "example:"
+LONG = 7
+"""Joints of an arm; chains with more go through a trunk."""
 ENDINGS = ("_robot", "_description", "_data")
 """What names of files and folders have that names of robots do not."""
 
@@ -28,14 +30,15 @@ class ExampleChain:
     ----------
     name
         What ``Arm.load`` takes: ``example:ur5``, or ``example:allegro_left_hand#link_3_tip`` where there are several.
-    path, tip
-        The URDF and the chain's last link.
+    path, base, tip
+        The URDF, and the chain's first and last link; the root if ``base`` is None.
     joints
         Names of the moving joints.
     """
 
     name: str
     path: Path
+    base: str | None
     tip: str
     joints: tuple[str, ...]
 
@@ -98,7 +101,8 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
 def example_chains() -> Iterator[ExampleChain]:
     """Return the chains from root to leaf of every example robot: arms, legs, fingers.
 
-    Chains with joints that follow others are left out. Of frames behind the same joint the tool's
+    Where they have more than seven joints, the limb from the last branching on is listed too. Chains with joints that
+    follow others are left out. Of frames behind the same joint the tool's
     is taken, else the first.
     """
     for name, path in example_robots().items():
@@ -107,7 +111,29 @@ def example_chains() -> Iterator[ExampleChain]:
         for joints, leaves in tips.items():
             tip = tool_frame(leaves) or leaves[0]
             ending = "" if tip == only_tip(tree, tree.root) else f"#{tip}"
-            yield ExampleChain(f"{PREFIX}{name}{ending}", path, tip, joints)
+            yield ExampleChain(f"{PREFIX}{name}{ending}", path, None, tip, joints)
+            limb = _limb(tree, tip) if len(joints) > LONG else ()
+            if 0 < len(limb) < len(joints):
+                base = limb[0].parent
+                limb_joints = tuple(joint.name for joint in limb)
+                yield ExampleChain(f"{PREFIX}{name}#{base}..{tip}", path, base, tip, limb_joints)
+
+
+def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
+    """Return the moving joints behind the last link on the way to a tip from which several joints go on."""
+
+    def carrier(link: str) -> str:
+        """Return the first of the links that a link is fixed to."""
+        while (joint := tree.parent_joint.get(link)) is not None and joint.kind == "fixed":
+            link = joint.parent
+        return link
+
+    moving = [joint for joint in tree.joints.values() if joint.kind != "fixed"]
+    way = [joint for joint in tree.joints_to(tip) or () if joint.kind != "fixed"]
+    for k in range(len(way) - 1, -1, -1):
+        if sum(carrier(joint.parent) == carrier(way[k].parent) for joint in moving) > 1:
+            return tuple(way[k:])
+    return tuple(way)
 
 
 def _without_ending(name: str) -> str:

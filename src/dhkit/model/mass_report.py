@@ -1,4 +1,4 @@
-"""Mass properties that a CAD program reports, as a CSV table or as SolidWorks' text, in the coordinates of the assembly."""
+"""Mass properties that a CAD program reports, as a CSV table or as SolidWorks' text, in assembly coordinates."""
 
 from __future__ import annotations
 
@@ -121,7 +121,8 @@ class _Table:
             known = {text: MASSES[mass] * LENGTHS[length] ** 2 for text, (mass, length) in MOMENTS.items()}
         if unit not in known:
             raise ModelError(
-                f"{self.path}, line {line}: {name} has the unit {unit[:30]!r}; expected one of {', '.join(known)} in brackets"
+                f"{self.path}, line {line}: {name} has the unit {unit[:30]!r}; expected one of "
+                f"{', '.join(known)} in brackets"
             )
         return known[unit]
 

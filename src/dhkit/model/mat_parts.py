@@ -1,7 +1,7 @@
 """Parts of an assembly from a MAT file of faces, vertices and colours, as the course's Robot_CAD2MAT stores them.
 
-A struct a part, ``s1`` with fields F1, V1, C1, or one struct ``s`` with fields F1, V1, C1, F2 ..., or an array of structs
-``s`` with fields F, V, C. Vertices are (k, 3), or (k, 4) with a column of ones; faces count vertices from 1.
+A struct a part, ``s1`` with fields F1, V1, C1, or one struct ``s`` with fields F1, V1, C1, F2 ..., or an array of
+structs ``s`` with fields F, V, C. Vertices are (k, 3), or (k, 4) with a column of ones; faces count vertices from 1.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def _mesh(part: str, faces: Any, vertices: Any, colours: Any) -> TriangleMesh:
 
 
 def _colours(colours: Any, count: int) -> np.ndarray[Any, np.dtype[np.uint8]] | None:
-    """Return one colour for all triangles: the mean of those that a patch is given, 0 to 1; None where there is none."""
+    """Return one colour for all triangles: the mean of those that a patch has, 0 to 1; None where it has none."""
     if not isinstance(colours, np.ndarray) or colours.ndim != 2 or colours.dtype.kind not in "fiu":
         return None
     if colours.shape[1] != 3 or not colours.size or not np.isfinite(colours).all():

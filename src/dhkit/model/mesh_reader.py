@@ -1,7 +1,7 @@
 """The one reader of mesh files: through the gate, and then as triangles that are checked.
 
-STL, OBJ and COLLADA are read by dhkit itself, PLY by trimesh. trimesh ignores COLLADA's unit and up axis, drops vertices
-that are not numbers, and takes truncated STL files for empty scenes.
+STL, OBJ and COLLADA are read by dhkit itself, PLY by trimesh. trimesh ignores COLLADA's unit and up axis, drops
+vertices that are not numbers, and takes truncated STL files for empty scenes.
 """
 
 from __future__ import annotations

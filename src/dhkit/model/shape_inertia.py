@@ -68,8 +68,8 @@ def shape_inertia(mesh: TriangleMesh, *, density: float | None = None, mass: flo
     """Return mass, centre of mass and inertia of a homogeneous body of a mesh's shape.
 
     Integrals over a closed mesh are exact: the body is a sum of signed tetrahedra between its triangles and its middle,
-    whose second moments are Tonon's (2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", section 2):
-    with corners 0, a, b, c and volume v, integral of x x^T = v / 20 (a a^T + b b^T + c c^T + s s^T), s = a + b + c.
+    whose second moments are Tonon's (2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", section
+    2): with corners 0, a, b, c and volume v, integral of x x^T = v / 20 (a a^T + b b^T + c c^T + s s^T), s = a + b + c.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""The text of SolidWorks' "Mass Properties": units as it states them, and the sign of its products found by cross-checks.
+"""The text of SolidWorks' "Mass Properties": its own units, and the sign of its products found by cross-checks.
 
 The block that is read is "Moments of inertia: Taken at the center of mass and aligned with the output coordinate
-system", Lxx ... Lzz. Its products are +integral of x y dm ("positive tensor notation", SolidWorks' default), so that the
-tensor has -Lxy; newer versions can write them the other way round. The other two blocks decide: the principal moments
-and axes are those of one of the two tensors, and Ixx ... Izz at the output coordinate system differ from Lxx ... Lzz by
-Steiner's terms, whose products have the same sign.
+system", Lxx ... Lzz. Its products are +integral of x y dm ("positive tensor notation", SolidWorks' default), so that
+the tensor has -Lxy; newer versions can write them the other way round. The other two blocks decide: the principal
+moments and axes are those of one of the two tensors, and Ixx ... Izz at the output coordinate system differ from
+Lxx ... Lzz by Steiner's terms, whose products have the same sign.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches
 NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
 CLEARER = 0.2
 """The sign is decided where one tensor misses the other blocks by less than this share of what the other one does."""
+ROUGH, COARSEST = 1e-3, 0.05
+"""Half a unit of the last decimal of moments, as a share of the largest: warned of, and refused."""
 ROUNDED = 4.0
 """Half units of the last decimals that blocks may differ by: several rounded numbers enter each comparison."""
 
@@ -46,6 +48,17 @@ class _Number:
 
     value: float
     half: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Centre:
+    """Mass and centre of mass, SI, with half units of their last places."""
+
+    mass: float
+    mass_share: float
+    """As a share of the mass."""
+    com: Array
+    com_half: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,22 +95,34 @@ class _Reader:
     def report(self) -> SolidWorksReport:
         title = REPORT.search(self.text)
         mass_at = self._found(MASS, "a line 'Mass = ... grams'")
-        mass = self._number(mass_at[1], mass_at).value * self._unit(mass_at[2], MASS_UNITS, mass_at)
+        written = self._number(mass_at[1], mass_at)
+        mass = written.value * self._unit(mass_at[2], MASS_UNITS, mass_at)
         if not mass > 0:
             raise self._error(f"mass is {mass_at[1]}; expected a positive number", mass_at)
         com, com_half = self._centre()
         blocks = {self._kind(match): match for match in BLOCK.finditer(self.text)}
         if "centre" not in blocks:
             raise ModelError(
-                f"{self.path}, line {self.first}: no block 'Moments of inertia: Taken at the center of mass and aligned "
-                "with the output coordinate system'; expected the text of SolidWorks' Mass Properties, in English"
+                f"{self.path}, line {self.first}: no block 'Moments of inertia: Taken at the center of mass and "
+                "aligned with the output coordinate system'; expected SolidWorks' text of Mass Properties, in English"
             )
         listed, half = self._tensor(blocks["centre"], "L")
-        sign, said = self._sign(listed, half, mass, com, com_half, blocks)
+        coarse = float(half.max() / max(np.abs(listed).max(), np.finfo(float).tiny))
+        if coarse > COARSEST:
+            raise self._error(
+                f"its moments have too few digits, {100 * min(coarse, 1.0):.0f} % of the largest; choose smaller units "
+                "or more decimal places in the options of Mass Properties",
+                blocks["centre"],
+            )
+        centre = _Centre(mass, written.half / written.value, com, com_half)
+        sign, said = self._sign(listed, half, centre, blocks)
         tensor = np.where(np.eye(3, dtype=bool), listed, -sign * listed)
         block = "block read: moments about the centre of mass, axes of the output coordinate system (Lxx ... Lzz)"
         part = title[1].strip() if title else ""
-        return SolidWorksReport(part, MassProperties(mass, com, tensor), (block, said))
+        rounded = (
+            () if coarse < ROUGH else (f"warning: its moments are rounded to {100 * coarse:.1g} % of the largest",)
+        )
+        return SolidWorksReport(part, MassProperties(mass, com, tensor), (block, said, *rounded))
 
     def _centre(self) -> tuple[Array, float]:
         at = self._found(CENTRE, "a line 'Center of mass: ( millimeters )'")
@@ -139,10 +164,8 @@ class _Reader:
             )
         return self._unit(words[0], MASS_UNITS, block) * self._unit(words[2], LENGTH_UNITS, block) ** 2
 
-    def _sign(
-        self, listed: Array, half: Array, mass: float, com: Array, com_half: float, blocks: dict[str, re.Match[str]]
-    ) -> tuple[float, str]:
-        """Return +1 where products are listed as +integral, -1 where as the tensor's entries, and how that was found."""
+    def _sign(self, listed: Array, half: Array, centre: _Centre, blocks: dict[str, re.Match[str]]) -> tuple[float, str]:
+        """Return +1 where products are listed as +integral, -1 where as the tensor's entries, and how it was found."""
         products = listed[np.triu_indices(3, 1)]
         checks = []
         if "principal" in blocks:
@@ -150,7 +173,7 @@ class _Reader:
                 ("the principal moments and axes", *self._principal_misses(listed, half, blocks["principal"]))
             )
         if "origin" in blocks:
-            misses = self._steiner_misses(listed, half, mass, com, com_half, blocks["origin"])
+            misses = self._steiner_misses(listed, half, centre, blocks["origin"])
             checks.append(("Steiner's terms of the block at the output coordinate system", *misses))
         for what, plus, minus, allowed in checks:
             if min(plus, minus) > allowed:
@@ -199,19 +222,18 @@ class _Reader:
         return misses[0], misses[1], allowed
 
     def _steiner_misses(
-        self, listed: Array, half: Array, mass: float, com: Array, com_half: float, block: re.Match[str]
+        self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]
     ) -> tuple[float, float, float]:
         """Return by how much both signs miss the block at the origin, kg m^2, and what rounding explains."""
         origin, origin_half = self._tensor(block, "I")
-        diagonal = np.eye(3, dtype=bool)
+        diagonal, mass, com, com_half = np.eye(3, dtype=bool), centre.mass, centre.com, centre.com_half
         steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
         reach = float(np.abs(com).max()) + com_half
         allowed = (
             ROUNDED * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
             + 1e-9 * np.abs(origin).max()
         )
-        # A mass of few digits moves Steiner's terms; they are known to as many.
-        allowed += 1e-4 * float(np.abs(steiner).max())
+        allowed += ROUNDED * centre.mass_share * float(np.abs(steiner).max())
         difference = origin - listed
         expected = [np.where(diagonal, steiner, -sign * steiner) for sign in (1.0, -1.0)]
         plus, minus = (float(np.abs(difference - one).max()) for one in expected)

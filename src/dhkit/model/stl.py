@@ -20,7 +20,7 @@ FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 
 
 def binary_corners(content: bytes) -> Array:
-    """Return the corners of a binary STL's triangles, shape (m, 3, 3), in the file's units; its header is not looked at.
+    """Return the corners of a binary STL's triangles, shape (m, 3, 3), in the file's units, whatever its header.
 
     Raises
     ------

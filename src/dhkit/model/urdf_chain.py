@@ -300,7 +300,10 @@ def _notes(
     beside = [
         joint.name
         for joint in tree.joints.values()
-        if joint.kind != "fixed" and joint.name not in concerned and (joint.child in kept or joint.child in dropped)
+        if joint.kind != "fixed"
+        and joint.name not in concerned
+        and joint.child != base
+        and (joint.child in kept or joint.child in dropped)
     ]
     if beside and side == "freeze":
         notes.append(f"joints off the chain stand at zero, their links carried along: {_listed(beside, 300)}")
