@@ -115,7 +115,8 @@ def test_a_report_is_the_body_integrated(tmp_path, law):
                 law.holds("SolidWorks, relative", difference(report.properties, found), AGREES)
                 assert "found by" in report.notes[1]
         T = pose(np.random.default_rng(seed))
-        law.holds("moved, relative", difference(report.properties.moved(T), found.moved(T)), AGREES)
+        seen = read(tmp_path, solidworks_text(found.moved(T)))
+        law.holds("moved into its frame, relative", difference(seen.properties.moved(np.linalg.inv(T)), found), AGREES)
 
 
 @pytest.mark.parametrize("sign", SIGNS)

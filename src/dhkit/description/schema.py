@@ -179,7 +179,7 @@ class ShapeForm(Form):
 Shapes = Annotated[
     list[ShapeForm],
     BeforeValidator(_one_or_several),
-    Field(max_length=50, default=[]),
+    Field(max_length=200, default=[]),
     _Also(lambda several: several["items"]),
 ]
 

@@ -22,7 +22,8 @@ __all__ = ["MAX_JOINTS", "check", "check_body"]
 MAX_JOINTS = 32
 MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
-MAX_SHAPES = 50
+MAX_SHAPES = 200
+"""A humanoid's trunk with both arms frozen has 110."""
 MAX_BODIES = 16
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
 BODY_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\- ]{0,63}", re.ASCII)

@@ -68,7 +68,7 @@ class MeshFinder:
     def _file(self, uri: str) -> Path:
         name = uri.replace("\\", "/")
         if name.startswith("package://"):
-            package, _, rest = name.removeprefix("package://").partition("/")
+            package, _, rest = name.removeprefix("package://").lstrip("/").partition("/")
             inner = PurePosixPath(rest)
             if not package or package in (".", "..") or inner.is_absolute():
                 raise ModelError(f"mesh {uri[:120]!r}: expected package://NAME/path")

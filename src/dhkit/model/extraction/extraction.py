@@ -46,8 +46,12 @@ AGREED = 5e-10
 AGREED_TOOL = 5e-11
 """The same for the tool's pose, m and rotation entries."""
 GRAVITY = np.array([0.0, 0.0, -9.81])
-MAX_SHAPES = 50
+GRAVITY_DECIMALS = 14
+"""Decimals of gravity: torques about axes that are nearly vertical are small, and are to be right all the same."""
+MAX_SHAPES = 200
 """Shapes of a link that a description holds."""
+LISTED = 5
+"""Meshes that are left out are named one by one up to this many."""
 MAX_NAME = 64
 SHOWN = 12
 """Decimals of where shapes stand, m and rad: they are only seen."""
@@ -200,7 +204,7 @@ class _Draft:
                 _joint(name, joint, row, decimals)
                 for name, joint, row in zip(names, chain.joints, table.rows, strict=True)
             ),
-            gravity=numbers.vector(np.where(np.abs(gravity) < 1e-15, 0.0, gravity), decimals),
+            gravity=numbers.vector(gravity, None if decimals is None else GRAVITY_DECIMALS),
             base=Base(numbers.placement(table.T_base_first, decimals)),
             configurations=Named({"zero": (ZERO,) * len(chain.joints)}),
             source=f"{chain.path.name}, link {chain.base} to link {chain.tip}",
@@ -313,16 +317,20 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
     links = [chain.tree.links[link] for group in chain.groups for link in group]
     visible = any(link.visuals for link in links)
     groups = []
+    left_out: list[str] = []
     for group in chain.groups:
-        found = list(_group_shapes(chain, group, meshes, notes, visible=visible))
+        found = list(_group_shapes(chain, group, meshes, left_out, visible=visible))
         if len(found) > MAX_SHAPES:
             notes.append(f"{len(found)} shapes move with link {group[0]!r}; the first {MAX_SHAPES} are shown")
         groups.append(tuple(found[:MAX_SHAPES]))
+    notes += left_out[:LISTED]
+    if len(left_out) > LISTED:
+        notes.append(f"{len(left_out) - LISTED} more meshes left out")
     return tuple(groups)
 
 
 def _group_shapes(
-    chain: Chain, group: Sequence[str], meshes: MeshFinder, notes: list[str], *, visible: bool
+    chain: Chain, group: Sequence[str], meshes: MeshFinder, left_out: list[str], *, visible: bool
 ) -> Iterator[tuple[UrdfShape, str, Array]]:
     from dhkit.description.mesh_files import check_mesh_file
 
@@ -335,7 +343,7 @@ def _group_shapes(
                     path = meshes.path(shape.file)
                     check_mesh_file(meshes.mesh_folder / path)
                 except DhkitError as error:
-                    notes.append(f"link {name!r}: {_without_folder(str(error), meshes.mesh_folder)}; left out")
+                    left_out.append(f"link {name!r}: {_without_folder(str(error), meshes.mesh_folder)}; left out")
                     continue
             yield shape, path, chain.zero_poses[name] @ shape.T_link_shape
 

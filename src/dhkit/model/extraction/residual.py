@@ -18,8 +18,8 @@ STATES = 40
 """Random states that a residual is taken over."""
 STROKE = 1.0
 """m: range of a prismatic joint without limits."""
-SMALL_GRAVITY = 1e-3
-"""Share of weight times reach: gravity torques are compared with at least this, so that noise is no error."""
+SMALL_GRAVITY = 1e-6
+"""Share of weight times reach that gravity torques are compared with at least: roundings are 1e-16 of that product."""
 
 
 @dataclass(frozen=True)
