@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from bad_robot_files import GOOD
 from dhkit.description import DHTable, Units, from_toml, library_robot, read_robot, robots, to_toml, write_robot
 from dhkit.expressions import PI, exact
-from bad_robot_files import GOOD
 from random_arms import arms
 
 INCHES_AND_DEGREES = """

@@ -140,6 +140,10 @@ def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):
         "structs": {f"s{i}": fields(mesh, i) for i, mesh in enumerate(meshes, start=1)},
         "one": {"s": {k: v for i, mesh in enumerate(meshes, start=1) for k, v in fields(mesh, i).items()}},
     }
+    array = np.empty((1, 4), dtype=[(name, object) for name in "FVC"])
+    for i, mesh in enumerate(meshes):
+        array[0, i] = tuple(np.array(value) for value in fields(mesh, "").values())
+    kinds["array"] = {"s": array}
     for name, content in kinds.items():
         for compressed in (True, False):
             savemat(tmp_path / f"{name}.mat", content, do_compression=compressed)
@@ -205,6 +209,14 @@ def test_the_unit_is_found_by_size(tmp_path, unit):
     assert f"unit: {unit}, found by size" in found.notes[2]
     wrong = import_cad(folder, arm, q=q, unit="m" if unit != "m" else "mm")
     assert wrong.notes[2].startswith("warning: ") or unit in ("cm", "in")
+
+
+def test_parts_in_a_wrong_place_are_warned_of(tmp_path):
+    arm, q = planar(), np.array([0.0, 1.2, -1.0])
+    folder = export(tmp_path / "parts", arm, links(arm), q)
+    assert not any(note.startswith("warning") for note in import_cad(folder, arm, q=q).notes)
+    bent = import_cad(folder, arm).notes  # all joint values 0: not the pose of the export
+    assert any("link 3: its part lies" in note and "beside the axis of joint 3" in note for note in bent)
 
 
 def test_collada_states_its_own_unit(tmp_path):
@@ -304,7 +316,7 @@ REFUSED = {
     "a link mapped and numbered": (stated(files={1: ["Assem1 - link2-1.STL"]}), "link 1 is mapped, and"),
     "a broken part": (broken, "link2-1.STL: truncated"),
     "parts a thousand times too small": (resized(1e-6), "no unit of .* fits"),
-    "parts ten times too small": (resized(0.06), "cm and in fit; state the unit"),
+    "parts ten times too small": (resized(0.06), "cm and in fit.*state the unit"),
     "an unknown unit": (stated(unit="km"), "unit is 'km'"),
     "no density": (stated(density=0.0), "density is 0"),
     "a negative mass": (stated(mass={1: -1.0}), "mass of link 1 is -1"),

@@ -10,6 +10,9 @@ __all__ = ["MESH_FORMATS", "asset", "inside"]
 
 MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
 
+MAX_PATH = 500
+"""Characters of a mesh's path."""
+
 PACKAGE = Path(__file__).resolve().parents[1]
 CHECKOUT = PACKAGE.parents[1]
 """The repository root when the package is used from its sources; elsewhere a folder without our assets."""
@@ -39,7 +42,7 @@ def inside(folder: Path | None, path: str, where: str) -> Path | None:
         The path is absolute, a URL, or leaves the folder.
     """
     parts = PurePosixPath(path.replace("\\", "/"))
-    if not path or not path.isprintable() or ":" in path or parts.is_absolute() or ".." in parts.parts:
+    if not path or len(path) > MAX_PATH or not path.isprintable() or ":" in path or parts.is_absolute() or ".." in parts.parts:
         raise DescriptionError(f"{where}.mesh is {path[:80]!r}; expected a relative path inside the robot's folder")
     if folder is None:
         return None

@@ -47,7 +47,9 @@ def _resolve(
     if name in values:
         return
     if name in path:
-        raise DescriptionError(f"parameters: {' -> '.join((*path[path.index(name) :], name))} is a cycle")
+        cycle = (*path[path.index(name) :], name)
+        shown = cycle if len(cycle) <= 6 else (*cycle[:3], "...", *cycle[-2:])
+        raise DescriptionError(f"parameters: {' -> '.join(shown)} is a cycle")
     for needed in sorted(parameters[name].symbols):
         if needed not in parameters:
             raise DescriptionError(f"parameters.{name}: {needed!r} is not defined")

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["MAX_JOINTS", "check", "check_body"]
 
 MAX_JOINTS = 32
+LARGEST = 1e12
+"""Size of a number, SI units: products of several of them are finite doubles, and no robot comes near."""
+MESSAGE = 300
+"""Characters of an expression's own message, which may quote the whole of it."""
 MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
 MAX_SHAPES = 200
@@ -83,9 +87,12 @@ def check(description: Description) -> tuple[str, ...]:
 
 def _finite(where: str, expression: Expression, values: Mapping[str, Expression]) -> float:
     try:
-        return float(substitute(expression, values))
+        value = float(substitute(expression, values))
     except ExpressionError as error:
-        raise DescriptionError(f"{where}: {error}") from None
+        raise DescriptionError(f"{where}: {str(error)[:MESSAGE]}") from None
+    if abs(value) > LARGEST:
+        raise DescriptionError(f"{where}: {value:.3g} in SI units; expected at most {LARGEST:g}")
+    return value
 
 
 def _check_counts(description: Description) -> None:

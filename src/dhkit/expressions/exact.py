@@ -200,8 +200,8 @@ class Expression:
             value = coefficient
             for atom, exponent in monomial:
                 base = atom.value()
-                if exponent < 0 and base == 0:
-                    raise ExpressionError(f"{self.text} divides by zero")
+                if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
+                    raise ExpressionError(f"{self.text} divides by zero" + (", to rounding" if base else ""))
                 value *= base**exponent
             total += value
         return total
@@ -291,6 +291,9 @@ class Expression:
             result = result * result * (self if bit == "1" else 1)
         return result
 
+
+CANCELLED = Fraction(1, 10**14)
+"""Share of its terms' sizes below which a sum of rounded values may be zero: each is rounded to 1e-16."""
 
 ZERO = Expression()
 PI = Expression.of_atom(Atom("pi"))
@@ -396,6 +399,14 @@ def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
         return None
     ratio = dividend.terms[0][1] / divisor.terms[0][1]
     return ratio if dividend.terms == tuple((m, c * ratio) for m, c in divisor.terms) else None
+
+
+def _is_rounding(atom: Atom, value: Fraction) -> bool:
+    """Return whether a group's value is no more than what its terms leave when they cancel, as sin^2 + cos^2 - 1 does."""
+    if atom.name != "group":
+        return False
+    terms = sum(abs(Expression((term,)).value()) for term in atom.arguments[0].terms)
+    return abs(value) <= CANCELLED * terms
 
 
 def _reciprocal(divisor: Expression) -> Expression:

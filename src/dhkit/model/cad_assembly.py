@@ -32,7 +32,7 @@ from dhkit.description.assets import inside
 from dhkit.errors import ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
-from dhkit.model.cad_units import UNITS, check_positions, unit_of
+from dhkit.model.cad_units import UNITS, check_positions, far_from_axes, unit_of
 from dhkit.model.shape_inertia import convex_hull
 from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
@@ -186,10 +186,16 @@ def import_cad(
     metres, unit_note = _metres(folder, description, frames, parts, unit)
     notes = [*found_notes, pose_note, unit_note]
 
+    standing = {
+        link: [part.mesh.scaled(1.0 if part.in_metres else metres) for part in several]
+        for link, several in parts.items()
+    }
+    notes += far_from_axes(description, frames, standing)
+
     meshes, bodies = {}, {}
     for link, several in parts.items():
         T_frame_world = _inverse(frames[link])
-        own = [part.mesh.scaled(1.0 if part.in_metres else metres).moved(T_frame_world) for part in several]
+        own = [mesh.moved(T_frame_world) for mesh in standing.pop(link)]
         bodies[link] = stated.body(link, own, T_frame_world)
         if simplify is not None:
             own = [simplified(mesh, simplify, part.name) for mesh, part in zip(own, several, strict=True)]

@@ -17,6 +17,8 @@ from dhkit.model.triangle_mesh import TriangleMesh
 
 __all__ = ["LinkBody", "StatedMasses", "combined"]
 
+ROUNDING = 1e-13
+"""Coordinates and products below this share of a link's size and moments are 0: integrals are exact to some 1e-15."""
 OUTSIDE = 0.1
 """How far a reported centre of mass may lie outside the box around its link, as a share of the link's size."""
 
@@ -109,7 +111,8 @@ class StatedMasses:
         density = self.density if stated is None else stated / volume
         if density is None:
             raise ModelError(f"link {link}: neither a density nor a mass")
-        properties = MassProperties(density * one.mass, one.com, density * one.inertia)
+        size = max(mesh.size for mesh in meshes)
+        properties = _without_rounding(MassProperties(density * one.mass, one.com, density * one.inertia), size)
         basis = f"{density:.6g} kg/m^3" if stated is None else f"{stated:.6g} kg"
         methods = {shape.method for shape in shapes}
         worst = next(method for method in reversed(InertiaMethod) if method in methods)
@@ -130,6 +133,13 @@ class StatedMasses:
                     "made in the coordinates of the assembly?"
                 )
         return LinkBody(properties, tuple(notes))
+
+
+def _without_rounding(body: MassProperties, size: float) -> MassProperties:
+    """Return mass properties with 0 for coordinates and products that are rounding alone: people read the file."""
+    com = np.where(np.abs(body.com) < ROUNDING * size, 0.0, body.com)
+    products = (np.abs(body.inertia) < ROUNDING * np.trace(body.inertia)) & ~np.eye(3, dtype=bool)
+    return MassProperties(body.mass, com, np.where(products, 0.0, body.inertia))
 
 
 def combined(bodies: Sequence[MassProperties]) -> MassProperties:

@@ -11,7 +11,7 @@ from dhkit.description.frames import carrying
 from dhkit.errors import ModelError
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["UNITS", "check_positions", "unit_of"]
+__all__ = ["UNITS", "check_positions", "far_from_axes", "unit_of"]
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 SMALLEST, LARGEST = 0.25, 6.0
@@ -22,6 +22,8 @@ NEAR = 0.05
 """How far the axes of the joints pass the boxes around their links, on average, as a share of the arm's length."""
 CLEARER = 2.0
 """The second best unit must miss the axes by this factor more."""
+FAR = 0.1
+"""How far a joint's axis may pass the box around a link of it without a warning, as a share of the arm's length."""
 FEWEST_AXES = 2
 """Joints from which on axes decide: one axis through the origin passes a part of any size."""
 AXIS_POINTS = 401
@@ -80,17 +82,54 @@ def unit_of(description: Description, frames: Array, links: Mapping[int, Sequenc
         raise ModelError(f"{where}: {found}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
     missed = {unit: _missed(description, frames, links, UNITS[unit]) / length for unit in fitting}
     best, second = sorted(missed, key=missed.__getitem__)[:2]
-    if description.n < FEWEST_AXES or missed[best] > NEAR or missed[second] < CLEARER * missed[best] + NEAR / 5:
+    if missed[best] > NEAR:
+        raise ModelError(
+            f"{where}: {found}: {' and '.join(fitting)} fit, but in all of them the parts lie beside the joints' axes; "
+            "is the pose of the export the table's? else state the unit, such as --unit mm"
+        )
+    if description.n < FEWEST_AXES or missed[second] < CLEARER * missed[best] + NEAR / 5:
         raise ModelError(f"{where}: {found}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
     return best
+
+
+def far_from_axes(
+    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]]
+) -> tuple[str, ...]:
+    """Return a warning for each link whose parts lie far from the axis of a joint that it is joined by.
+
+    So a part in a wrong place shows: a pose that is not that of the export, another origin, or a CAD program that has
+    lost a placement.
+
+    Parameters
+    ----------
+    description, frames
+        As for :func:`unit_of`.
+    links
+        Meshes of each link in the world, m.
+    """
+    allowed = FAR * description.reach
+    missed = {key: miss for key, miss in _misses(description, frames, links, 1.0).items() if miss > allowed}
+    return tuple(
+        f"warning: link {link}: its part lies {miss:.3g} m beside the axis of joint {joint}; is the pose of the export "
+        "the table's, and the assembly's origin frame 0?"
+        for (joint, link), miss in missed.items()
+    )
 
 
 def _missed(
     description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], metres: float
 ) -> float:
     """Return how far the joints' axes pass the boxes around the links that they join, on average, m."""
+    missed = _misses(description, frames, links, metres)
+    return float(np.mean(list(missed.values()))) if missed else np.inf
+
+
+def _misses(
+    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], metres: float
+) -> dict[tuple[int, int], float]:
+    """Return how far each joint's axis passes the box around each of its two links, m, by joint and link."""
     along = np.linspace(-2, 2, AXIS_POINTS) * description.reach
-    missed = []
+    missed = {}
     for joint, frame in enumerate(carrying(description.convention, frames), start=1):
         points = frame[:3, 3] + along[:, None] * frame[:3, 2]
         for link in (joint - 1, joint):
@@ -98,5 +137,5 @@ def _missed(
                 low = metres * np.min([mesh.bounds[0] for mesh in meshes], axis=0)
                 high = metres * np.max([mesh.bounds[1] for mesh in meshes], axis=0)
                 outside = np.maximum(np.maximum(low - points, points - high), 0)
-                missed.append(float(np.linalg.norm(outside, axis=1).min()))
-    return float(np.mean(missed)) if missed else np.inf
+                missed[joint, link] = float(np.linalg.norm(outside, axis=1).min())
+    return missed
