@@ -51,3 +51,12 @@ def test_the_documents_that_the_readme_names_are_there():
     root = Path(__file__).resolve().parents[1]
     for name in re.findall(r"\]\(([\w./-]+)\)", README):
         assert (root / name).is_file(), name
+
+
+def test_nothing_installs_the_strangers_package():
+    """The name dhkit belongs to somebody else on PyPI."""
+    root = Path(__file__).parents[1]
+    texts = [root / "README.md", *root.glob("docs/**/*.md"), *root.glob("src/dhkit/**/*.py"), root / "CONTRIBUTING.md"]
+    found = [path.name for path in texts if re.search(r"pip3? install ['\"]?dhkit(?!-robotics)", path.read_text())]
+    assert found == []
+    assert 'name = "dhkit-robotics"' in (root / "pyproject.toml").read_text()

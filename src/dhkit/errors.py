@@ -13,7 +13,13 @@ __all__ = [
     "PlanningError",
     "SimulationError",
     "UnreachableError",
+    "from_checkout",
 ]
+
+
+def from_checkout(extra: str) -> str:
+    """Return how to install one of dhkit's extras; the distribution is not published yet."""
+    return f"`.venv/bin/pip install -e '.[{extra}]'` in dhkit's checkout"
 
 
 class DhkitError(Exception):

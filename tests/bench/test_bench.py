@@ -138,7 +138,7 @@ def test_peers_that_are_not_installed_are_listed():
     missing = {gap.name for gap in report.missing}
     assert missing == {c.name for c in all_contenders() if c.quantity == "fk"} - {row.contender for row in report.rows}
     assert all("not installed" in gap.reason for gap in report.missing)
-    assert "pip install 'dhkit[bench]'" in str(report)
+    assert "pip install -e '.[bench]'" in str(report)
 
 
 def moved_puma():
@@ -229,7 +229,7 @@ def test_unusable_arguments_are_named(arguments, complaint):
 
 
 def test_a_missing_package_says_how_to_get_it():
-    with pytest.raises(UnavailableError, match=r"no module named no_such_peer; pip install"):
+    with pytest.raises(UnavailableError, match=r"no module named no_such_peer; `.venv/bin/pip install"):
         import_peer("no_such_peer")
 
 

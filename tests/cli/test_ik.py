@@ -160,7 +160,7 @@ def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):
     monkeypatch.setitem(sys.modules, "ssik", None)
     status, said = facts("panda", "--like", "ready")
     assert (status, said["method"]) == (0, "numeric")
-    assert "pip install dhkit[ik]" in said["note"]
+    assert "pip install -e '.[ik]'" in said["note"]
     status, out, _ = ik("panda", "--like", "ready")
     assert status == 0
     assert "note: one solution by iteration: panda is 7R: no closed form known" in out

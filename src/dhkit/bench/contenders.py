@@ -14,6 +14,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
+from dhkit.errors import from_checkout
 from dhkit.verification import random_states
 
 __all__ = [
@@ -149,7 +150,7 @@ def import_peer(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        raise UnavailableError(f"not installed: no module named {error.name}; pip install 'dhkit[bench]'") from None
+        raise UnavailableError(f"not installed: no module named {error.name}; {from_checkout('bench')}") from None
     except ImportError as error:
         raise UnavailableError(f"cannot be imported: {error}") from None
 

@@ -139,7 +139,7 @@ def _explained(
 
 def _version() -> str:
     try:
-        return version("dhkit")
+        return version("dhkit-robotics")
     except PackageNotFoundError:
         return "unknown"
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
-from dhkit.errors import ModelError
+from dhkit.errors import ModelError, from_checkout
 from dhkit.kernels import pose_rows, uncounted
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
@@ -93,7 +93,7 @@ def _solver(description: Description) -> Any:
     try:
         import ssik
     except ImportError:
-        message = f"{words}; `pip install dhkit[ik]` brings ssik, which finds its solutions; ik_numeric solves any arm"
+        message = f"{words}; {from_checkout('ik')} brings ssik, which finds its solutions; ik_numeric solves any arm"
         raise ModelError(message) from None
     log.info("preparing ssik for %s, which may take a minute the first time", description.name)
     axes = Axes.of(description)
