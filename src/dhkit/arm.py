@@ -531,7 +531,14 @@ class Arm:
         friction: bool | Friction = False,
         restitution: float | None = 0.0,
         pushes: Sequence[Push] = (),
-        **options: Any,
+        duration: float | None = None,
+        q0: ArrayLike | None = None,
+        qd0: ArrayLike | None = None,
+        rate: float | None = 1000.0,
+        plant_rate: float | None = None,
+        sensors: Sensors | None = None,
+        saturation: bool = True,
+        tolerance: float = 1e-13,
     ) -> Comparison:
         """Return how controllers follow a motion, all of dhkit's or chosen ones; see :func:`dhkit.control.compare`.
 
@@ -547,7 +554,22 @@ class Arm:
 
         moved = Plant((plant or self).description, Friction.chosen(friction), restitution, _listed(pushes))
         chosen = tuple(CONTROLLERS) if controllers is None else controllers
-        return compare(self._description, reference, chosen, bandwidth, damping, plant=moved, **options)
+        return compare(
+            self._description,
+            reference,
+            chosen,
+            bandwidth,
+            damping,
+            plant=moved,
+            duration=duration,
+            q0=q0,
+            qd0=qd0,
+            rate=rate,
+            plant_rate=plant_rate,
+            sensors=sensors,
+            saturation=saturation,
+            tolerance=tolerance,
+        )
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return A (2n, 2n) and B (2n, n) of the arm near a state; see :func:`dhkit.control.linearize`."""

@@ -18,6 +18,7 @@ from dhkit.control.sensors import Sensors
 from dhkit.control.step_kernel import StepKernel
 from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics import Friction
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
@@ -29,6 +30,7 @@ MOST_BYTES = 4_000_000_000
 """Of all states of a batch that are kept."""
 
 
+@takes_robot
 def simulate_batch(
     description: Description,
     controller: Controller | None = None,

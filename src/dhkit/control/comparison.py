@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.control.adaptive import Adaptive
 from dhkit.control.controller import Controller
@@ -17,8 +18,10 @@ from dhkit.control.operational_space import OperationalSpace
 from dhkit.control.plant import Plant
 from dhkit.control.references import Reference, reference_of
 from dhkit.control.result import SimulationResult
+from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.errors import DhkitError
 from dhkit.trajectories import Trajectory
 
@@ -129,6 +132,7 @@ def _row(result: SimulationResult) -> tuple[str, ...]:
     return (*(f"{error:.2g}" for error in errors), f"{tool:.0f}" if tool >= LARGE else f"{tool:.2g}", torque)
 
 
+@takes_robot
 def compare(
     description: Description,
     reference: Reference | Trajectory,
@@ -138,7 +142,14 @@ def compare(
     done: Callable[[str], None] | None = None,
     *,
     plant: Plant | None = None,
-    **options: Any,
+    duration: float | None = None,
+    q0: ArrayLike | None = None,
+    qd0: ArrayLike | None = None,
+    rate: float | None = 1000.0,
+    plant_rate: float | None = None,
+    sensors: Sensors | None = None,
+    saturation: bool = True,
+    tolerance: float = 1e-13,
 ) -> Comparison:
     """Return how controllers follow a motion that begins on it.
 
@@ -157,8 +168,8 @@ def compare(
         Called with each controller's name when its run ends.
     plant
         What moves; the robot unless given.
-    options
-        As for :func:`simulate`: ``rate``, ``duration``, ``sensors`` and others.
+    duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance
+        As for :func:`simulate`.
 
     Raises
     ------
@@ -176,7 +187,20 @@ def compare(
         try:
             named = isinstance(given, str)
             controller = make_controller(given, description, bandwidth, damping, middle) if named else given
-            results[name] = simulate(description, controller, wanted, plant=plant, **options)
+            results[name] = simulate(
+                description,
+                controller,
+                wanted,
+                duration,
+                q0,
+                qd0,
+                rate,
+                plant,
+                plant_rate,
+                sensors=sensors,
+                saturation=saturation,
+                tolerance=tolerance,
+            )
         except DhkitError as error:
             failures[name] = str(error)
         if done is not None:

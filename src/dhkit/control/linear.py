@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Description, Robot, description_of, joint_vector
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics import bias, gravity_torque, require_inertia
 from dhkit.symbolic import CasadiFunctions
 
@@ -22,6 +23,7 @@ ERROR, RATE, ACCELERATION = 0.1, 1.0, 200.0
 """Acceptable deviations, rad, rad/s and rad/s^2, or m."""
 
 
+@takes_robot
 def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
     """Return A and B of dx/dt = A x + B u near a state, x = (q, qd) and u = tau less what holds the state.
 

@@ -14,6 +14,7 @@ from dhkit.control.complementarity import bounded_forces
 from dhkit.control.pushes import Push
 from dhkit.control.step_kernel import StepKernel
 from dhkit.description import Array, Description
+from dhkit.description.robot import description_of
 from dhkit.dynamics import (
     Friction,
     bias,
@@ -66,6 +67,7 @@ class Plant:
     _single: tuple[Kernel, Array] = field(init=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "description", description_of(self.description))
         require_inertia(self.description)
         for push in self.pushes:
             _require_push(push)

@@ -24,6 +24,7 @@ from dhkit.control.timing import (
     substeps,
 )
 from dhkit.description import Array, Description, joint_vector
+from dhkit.description.robot import takes_robot
 from dhkit.trajectories import Trajectory
 
 __all__ = ["simulate"]
@@ -38,6 +39,7 @@ TOLERANCES = (3e-14, 1e-3)
 """What DOP853 can meet in doubles, and what would be no accuracy."""
 
 
+@takes_robot
 def simulate(
     description: Description,
     controller: Controller | None = None,

@@ -42,7 +42,14 @@ def inside(folder: Path | None, path: str, where: str) -> Path | None:
         The path is absolute, a URL, or leaves the folder.
     """
     parts = PurePosixPath(path.replace("\\", "/"))
-    if not path or len(path) > MAX_PATH or not path.isprintable() or ":" in path or parts.is_absolute() or ".." in parts.parts:
+    if (
+        not path
+        or len(path) > MAX_PATH
+        or not path.isprintable()
+        or ":" in path
+        or parts.is_absolute()
+        or ".." in parts.parts
+    ):
         raise DescriptionError(f"{where}.mesh is {path[:80]!r}; expected a relative path inside the robot's folder")
     if folder is None:
         return None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.exact_poses import ExactPose, settled, vector
+from dhkit.description.robot import takes_robot
 from dhkit.description.values import INERTIA_PLACES, Body, Inertia, Vector
 from dhkit.errors import DescriptionError
 from dhkit.expressions import ZERO, Expression
@@ -58,6 +59,7 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     return Body(mass, vector((first + last) / 2), _inertia(_steiner(last - first, mass / 12)))
 
 
+@takes_robot
 def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
     """Return the bodies of each link, and refuse an arm whose dynamics are unknown.
 

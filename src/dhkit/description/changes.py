@@ -15,7 +15,7 @@ from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
 from dhkit.description.named import Named
 from dhkit.description.parameters import resolved
 from dhkit.description.poses import check_pose, pose_parts
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, takes_robot
 from dhkit.description.table import Quantity, quantity
 from dhkit.description.traversal import names_in
 from dhkit.description.validation import check_body
@@ -29,18 +29,21 @@ SYMMETRIC = 1e-12
 __all__ = ["with_base", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
 
 
+@takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:
     """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), in place of the one it has."""
     return replace(description, tool=Tool(_placement(T, "tool"), description.tool.shapes))
 
 
+@takes_robot
 def with_base(description: Description, T: ArrayLike) -> Description:
     """Return the arm with frame 0 at T in the world, shape (4, 4), in place of where it stood."""
     base = description.base
     return replace(description, base=Base(_placement(T, "base"), base.shapes, base.body))
 
 
-def with_parameters(description: Description, **values: Quantity) -> Description:
+@takes_robot
+def with_parameters(description: Description, /, **values: Quantity) -> Description:
     """Return the arm with other values of its parameters, SI and radians.
 
     Raises
@@ -56,6 +59,7 @@ def with_parameters(description: Description, **values: Quantity) -> Description
     return replace(description, parameters=Named(dict(known) | new))
 
 
+@takes_robot
 def with_payload(
     description: Description,
     mass: Quantity,
@@ -100,6 +104,7 @@ def _payload_name(bodies: Sequence[Body]) -> str:
     return next(name for name in names if name not in taken)
 
 
+@takes_robot
 def with_uniform_links(description: Description, masses: Sequence[Quantity] | None = None) -> Description:
     """Return the arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
 

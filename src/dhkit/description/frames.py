@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description.numbers import Array
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
 
 __all__ = [
     "carrying",
+    "configuration",
     "joint_array",
     "joint_vector",
     "link_transforms",
@@ -21,24 +22,44 @@ __all__ = [
     "world_to_tool",
 ]
 
+RATES = ("qd", "tau", "start_velocity", "goal_velocity")
+"""Beginnings of the names of arguments that are speeds, accelerations or torques."""
 Frames = TypeVar("Frames", Array, list[Any])
 """An array (n+1, ...), or a list of n+1 expressions."""
 
 
 def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
-    """Return an array of joint values, shape (..., n).
+    """Return an array of joint values, shape (..., n); where they are positions, ``q`` may name a configuration.
 
     Raises
     ------
     ValueError
-        Another last axis than n.
+        Another last axis than n, or no configuration of that name.
     TypeError
         Not numbers.
     """
+    if isinstance(q, str) and not name.startswith(RATES):
+        return configuration(description, q, name)
     array = number_array(q, name, "(..., n)")
     if array.ndim == 0 or array.shape[-1] != description.n:
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
     return array
+
+
+def configuration(description: Description, name: str, argument: str = "q") -> Array:
+    """Return a configuration's joint values by its name, shape (n,), rad and m.
+
+    Raises
+    ------
+    ValueError
+        The robot has none of that name; ``argument`` begins the message.
+    """
+    known = description_of(description).numbers.configurations
+    if name not in known:
+        raise ValueError(
+            f"{argument}: {description.name} has no configuration {name[:60]!r}; it has {', '.join(known) or 'none'}"
+        )
+    return known[name]
 
 
 def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Array:
@@ -79,6 +100,7 @@ def number_array(value: ArrayLike, name: str, shape: str) -> Array:
         raise TypeError(f"{name}: found {found}; expected numbers, shape {shape}") from None
 
 
+@takes_robot
 def link_transforms(description: Description, q: ArrayLike) -> Array:
     """Return the table's matrices A_1 ... A_n.
 
@@ -126,6 +148,7 @@ def carrying(convention: Convention, frames: Frames) -> Frames:
     return frames[:-1] if convention is Convention.STANDARD else frames[1:]
 
 
+@takes_robot
 def world_to_frames(description: Description, q: ArrayLike) -> Array:
     """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), for joint values of shape (..., n)."""
     A = link_transforms(description, q)
@@ -137,6 +160,7 @@ def world_to_frames(description: Description, q: ArrayLike) -> Array:
     return frames
 
 
+@takes_robot
 def world_to_tool(description: Description, q: ArrayLike) -> Array:
     """Return the tool's frame in the world, shape (..., 4, 4): base A_1 ... A_n tool."""
     A = link_transforms(description, q)

@@ -34,7 +34,7 @@ from dhkit.description.exact_poses import (
 )
 from dhkit.description.named import Named
 from dhkit.description.parameters import needs, resolved
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, takes_robot
 from dhkit.description.table import Quantity, quantity
 from dhkit.description.traversal import expressions_in, names_in, with_values
 from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
@@ -75,6 +75,7 @@ class _Row(NamedTuple):
     delta: Expression
 
 
+@takes_robot
 def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Description:
     """Return the arm with some joints frozen, their links joined to the link before, or to the base.
 

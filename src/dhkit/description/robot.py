@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
 
 from dhkit.description.named import Named
 from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units, Vector
@@ -15,7 +16,10 @@ from dhkit.expressions import Expression
 if TYPE_CHECKING:
     from dhkit.description.numbers import Numbers
 
-__all__ = ["Description", "Robot", "description_of"]
+__all__ = ["Description", "Robot", "description_of", "takes_robot"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 Robot = Any
 """An arm, or its description."""
@@ -108,6 +112,22 @@ class Description:
     def __getstate__(self) -> dict[str, Any]:
         """Leave the hash out: that of text differs from process to process."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+
+def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:
+    """Let a function that takes a description take an arm as well: its first argument, or ``description=``."""
+
+    @wraps(function)
+    def taking(*arguments: Any, **options: Any) -> R:
+        if arguments:
+            if not isinstance(arguments[0], Description):
+                arguments = (description_of(arguments[0]), *arguments[1:])
+        elif "description" in options:
+            options["description"] = description_of(options["description"])
+        return function(*arguments, **options)
+
+    taking.takes_robot = True  # type: ignore[attr-defined]  # for the test that finds functions without
+    return cast("Callable[Concatenate[Robot, P], R]", taking)
 
 
 def description_of(robot: Robot) -> Description:

@@ -10,7 +10,7 @@ import tomlkit
 from tomlkit.items import Array, Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.files import write_atomically
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, takes_robot
 from dhkit.description.values import (
     STANDARD_GRAVITY,
     UNSCALED,
@@ -32,11 +32,13 @@ ONE = exact(1)
 Content: TypeAlias = Mapping[str, Any]
 
 
+@takes_robot
 def write_robot(description: Description, path: str | Path) -> None:
     """Write a robot file; it is there whole or not at all."""
     write_atomically(Path(path), to_toml(description))
 
 
+@takes_robot
 def to_toml(description: Description) -> str:
     """Return a description as a robot file's text.
 

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics.programs import evaluate
 from dhkit.kernels import result_array
 
 __all__ = ["kinetic_energy", "potential_energy", "power"]
 
 
+@takes_robot
 def kinetic_energy(
     description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
 ) -> Array:
@@ -39,6 +41,7 @@ def kinetic_energy(
     return evaluate("kinetic_energy", description, {"q": q, "qd": qd}, (), out, threads)
 
 
+@takes_robot
 def potential_energy(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return the potential energy of the moving links in gravity, shape (...), J; arguments as for ``mass_matrix``.
 
@@ -47,6 +50,7 @@ def potential_energy(description: Description, q: ArrayLike, out: Array | None =
     return evaluate("potential_energy", description, {"q": q}, (), out, threads)
 
 
+@takes_robot
 def power(description: Description, qd: ArrayLike, tau: ArrayLike, out: Array | None = None) -> Array:
     """Return the mechanical power of the joints, qd . tau, shape (...), W; qd and tau (..., n) broadcast.
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics.loads import external_torque
 from dhkit.dynamics.programs import evaluate
 from dhkit.symbolic import Friction
@@ -13,6 +14,7 @@ from dhkit.symbolic import Friction
 __all__ = ["bias", "coriolis_matrix", "gravity_torque", "inverse_dynamics", "mass_matrix"]
 
 
+@takes_robot
 def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return the joint-space mass matrix M(q), drives' rotor inertia included.
 
@@ -42,6 +44,7 @@ def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None
     return evaluate("mass_matrix", description, {"q": q}, (description.n, description.n), out, threads)
 
 
+@takes_robot
 def coriolis_matrix(
     description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
 ) -> Array:
@@ -63,16 +66,19 @@ def coriolis_matrix(
     return evaluate("coriolis_matrix", description, {"q": q, "qd": qd}, tail, out, threads)
 
 
+@takes_robot
 def gravity_torque(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return g(q), shape (..., n), N m and N: what holds the arm at rest; arguments as for :func:`mass_matrix`."""
     return evaluate("gravity_torque", description, {"q": q}, (description.n,), out, threads)
 
 
+@takes_robot
 def bias(description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return C(q, qd) qd + g(q), shape (..., n), N m and N; arguments as for :func:`coriolis_matrix`."""
     return evaluate("bias", description, {"q": q, "qd": qd}, (description.n,), out, threads)
 
 
+@takes_robot
 def inverse_dynamics(
     description: Description,
     q: ArrayLike,

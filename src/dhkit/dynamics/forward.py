@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics.equations import mass_matrix
 from dhkit.dynamics.loads import external_torque
 from dhkit.dynamics.programs import evaluate
@@ -22,6 +23,7 @@ PROBES = 16
 """Random states at which a mass matrix must be singular to be called singular everywhere."""
 
 
+@takes_robot
 def forward_dynamics(
     description: Description,
     q: ArrayLike,
@@ -69,6 +71,7 @@ def forward_dynamics(
     return qdd
 
 
+@takes_robot
 def require_inertia(description: Description) -> None:
     """Refuse an arm whose mass matrix is singular at every state, so that its joints have no accelerations.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics.loads import friction_kernel, wrench_kernel
 from dhkit.dynamics.programs import EXPRESSIONS, dynamics_kernel
 from dhkit.kernels import Kernel
@@ -10,6 +11,7 @@ from dhkit.kernels import Kernel
 __all__ = ["dynamic_kernels"]
 
 
+@takes_robot
 def dynamic_kernels(description: Description) -> list[Kernel]:
     """Return the kernels of friction and wrenches, and of an arm with bodies those of its equation of motion."""
     kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.frames import number_array
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
 from dhkit.symbolic import friction_torque as friction_expression
@@ -16,6 +17,7 @@ from dhkit.symbolic import friction_torque as friction_expression
 __all__ = ["external_torque", "friction_kernel", "friction_torque", "wrench_kernel", "wrench_torque"]
 
 
+@takes_robot
 def friction_torque(
     description: Description,
     qd: ArrayLike,
@@ -54,6 +56,7 @@ def friction_torque(
     return fill(run, parameters, [state], (description.n,), out, threads)
 
 
+@takes_robot
 def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, threads: int = 1) -> Array:
     """Return J^T w, shape (..., n): the torques with which a wrench on the tool drives the joints.
 

@@ -7,10 +7,12 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import INERTIA_PLACES, Array, Description, joint_array
 from dhkit.description.frames import carrying, world_to_frames
+from dhkit.description.robot import takes_robot
 
 __all__ = ["inertial_parameters", "regressor"]
 
 
+@takes_robot
 def inertial_parameters(description: Description) -> Array:
     """Return the links' inertial parameters, shape (10 n,), that :func:`regressor` is to be multiplied by.
 
@@ -20,6 +22,7 @@ def inertial_parameters(description: Description) -> Array:
     return description.numbers.inertial_parameters.ravel()
 
 
+@takes_robot
 def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
     """Return Y with tau = Y theta + armature qdd, theta of :func:`inertial_parameters`.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.dynamics.regressor import regressor
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
@@ -23,6 +24,7 @@ STATES_PER_JOINT = 20
 """Random states per joint at which dependent columns are looked for: twice as many equations as parameters."""
 
 
+@takes_robot
 def velocity_regressor(
     description: Description,
     q: ArrayLike,
@@ -103,6 +105,7 @@ class ParameterGrouping:
         return len(self.columns)
 
 
+@takes_robot
 @lru_cache(maxsize=128)
 def parameter_grouping(description: Description) -> ParameterGrouping:
     """Return an arm's base parameters from the rank of its regressor at random states.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dhkit.description import Description, library_robot, read_robot, robots
+from dhkit.description.robot import takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
@@ -85,6 +86,7 @@ def _names(own: Names, given: Names) -> Names:
     return replace(own, q=q, qd=qd, qdd=qdd, absolute=own.absolute or given.absolute, parameters=parameters)
 
 
+@takes_robot
 def grade_answers(
     description: Description,
     answers: Mapping[str, Any],

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane
@@ -52,6 +53,7 @@ class Boundary:
     """What it is seen as along axis 1, shape (m, 3), m; m is 0 where it is no border from there."""
 
 
+@takes_robot
 def boundaries(description: Description) -> tuple[Boundary, ...]:
     """Return an arm's boundaries in closed form: outer, inner and shoulder, as far as it has them.
 

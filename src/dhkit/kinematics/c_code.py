@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import limit_parameters
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
@@ -12,6 +13,7 @@ from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbo
 __all__ = ["export_kinematics"]
 
 
+@takes_robot
 def export_kinematics(description: Description, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
     """Write forward kinematics, Jacobian and, where it has a closed form, inverse kinematics as ``NAME.c`` and ``.h``.
 

@@ -7,12 +7,14 @@ from functools import lru_cache
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
 __all__ = ["forward_kinematics", "frames", "frames_kernel", "tool_kernel"]
 
 
+@takes_robot
 def forward_kinematics(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return the tool's pose in the world, T_world_tool = base A_1 ... A_n tool.
 
@@ -41,6 +43,7 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
     return fill(run, parameters, [joint_array(description, q)], (4, 4), out, threads)
 
 
+@takes_robot
 def frames(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
     """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`."""
     run, parameters = frames_kernel(description)

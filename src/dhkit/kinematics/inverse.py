@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.frames import configuration
+from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
@@ -23,6 +25,7 @@ CHUNK = 16_384
 """Poses of a chunk: about 6 MB of joint values with eight branches, which the processor's cache holds."""
 
 
+@takes_robot
 def inverse_kinematics(
     description: Description, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
 ) -> IKSolutions:
@@ -99,6 +102,7 @@ def inverse_kinematics(
     )
 
 
+@takes_robot
 def inverse_kinematics_in_chunks(
     description: Description, T: ArrayLike, size: int = CHUNK, seed: ArrayLike | None = None, threads: int = 1
 ) -> Iterator[tuple[slice, IKSolutions]]:
@@ -161,8 +165,9 @@ def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, bat
     """Return the angles of joint 1 and of the wrist's free joint where they are not determined, shape (..., 2)."""
     if seed is None:
         return np.zeros((*batch, 2))
+    start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
     try:
-        joints = joint_array(description, seed, "seed")[..., [0, fit.free or 0]]
+        joints = joint_array(description, start, "seed")[..., [0, fit.free or 0]]
         angles = np.broadcast_to(joints, (*batch, 2))
     except ValueError:
         raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None

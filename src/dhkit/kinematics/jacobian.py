@@ -7,6 +7,7 @@ from functools import lru_cache
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols, table_pattern
 from dhkit.symbolic import jacobian as symbolic_jacobian
@@ -15,6 +16,7 @@ from dhkit.symbolic import jacobian_dot as symbolic_jacobian_dot
 __all__ = ["ReferenceAxes", "jacobian", "jacobian_dot", "jacobian_dot_kernel", "jacobian_kernel"]
 
 
+@takes_robot
 def jacobian(
     description: Description,
     q: ArrayLike,
@@ -51,6 +53,7 @@ def jacobian(
     return fill(run, parameters, [joint_array(description, q)], (6, description.n), out, threads)
 
 
+@takes_robot
 def jacobian_dot(
     description: Description,
     q: ArrayLike,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.inverse import solver_of
@@ -12,6 +13,7 @@ from dhkit.kinematics.newton import error_kernel, step_kernel
 __all__ = ["kinematic_kernels"]
 
 
+@takes_robot
 def kinematic_kernels(description: Description) -> list[Kernel]:
     """Return the kernels of frames, Jacobians and inverse kinematics, in closed form where there is one."""
     solver = solver_of(description)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 
@@ -53,6 +54,7 @@ class Ellipsoid:
     0 or infinite in a direction that the tool cannot move in."""
 
 
+@takes_robot
 def manipulability(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
     """Return Yoshikawa's manipulability: the volume, up to a constant, of what joint rates of unit norm can do.
 
@@ -92,6 +94,7 @@ def manipulability(description: Description, q: ArrayLike, motion: Motion = "tra
     return _volume(_rows(description, q, motion), rank)
 
 
+@takes_robot
 def isotropy(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
     """Return the reciprocal of the condition number: 1 where all directions are alike, 0 where singular.
 
@@ -112,12 +115,14 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
     return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
 
 
+@takes_robot
 def condition_number(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
     """Return the ratio of the largest to the smallest singular value, infinite where singular; see :func:`isotropy`."""
     with np.errstate(divide="ignore"):
         return 1.0 / isotropy(description, q, motion)
 
 
+@takes_robot
 def singular_values(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
     """Return the Jacobian's singular values, the largest first.
 
@@ -134,6 +139,7 @@ def singular_values(description: Description, q: ArrayLike, motion: Motion = "tr
     return sigma
 
 
+@takes_robot
 def freedoms(description: Description, motion: Motion = "translational") -> int:
     """Return in how many independent directions the tool can move in general: the generic rank of the Jacobian.
 
@@ -148,6 +154,7 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
     return int(np.sum(sigma > ZERO * sigma.max(initial=0.0), axis=-1).max())
 
 
+@takes_robot
 def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
     """Return the tool's velocities for joint rates of unit norm: the ellipsoid v^T (J J^T)^-1 v = 1.
 
@@ -182,6 +189,7 @@ def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = 
     return Ellipsoid(forward_kinematics(description, q)[..., :3, 3], U, lengths)
 
 
+@takes_robot
 def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
     """Return the tool's forces (moments) for joint torques of unit norm: the ellipsoid f^T J J^T f = 1.
 

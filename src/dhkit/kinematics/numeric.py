@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import SMALL, check_whole, in_threads, pose_rows, uncounted
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
 from dhkit.kinematics.closed_form.family import ALL
@@ -42,6 +43,7 @@ ROUNDING = 1e-13
 """Damping that is always there, for Jacobians without full rank."""
 
 
+@takes_robot
 def solve_numerically(
     description: Description,
     T: ArrayLike,

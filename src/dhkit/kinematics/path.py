@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_vector
+from dhkit.description.robot import takes_robot
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows
 from dhkit.kinematics.inverse import inverse_kinematics
@@ -70,6 +71,7 @@ class IKPath:
         )
 
 
+@takes_robot
 def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
     """Follow one branch along a path of poses.
 

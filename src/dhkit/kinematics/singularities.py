@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, world_to_tool
+from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
@@ -71,6 +72,7 @@ class Singularities:
         return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
 
 
+@takes_robot
 @lru_cache(maxsize=512)
 def singularities(description: Description) -> Singularities:
     """Return where an arm is singular, in closed form.
@@ -102,6 +104,7 @@ def singularities(description: Description) -> Singularities:
     return Singularities(tuple(factor.kind for factor in factors), factors, point, rows)
 
 
+@takes_robot
 def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
     """Return how far joint values are from each kind of singularity: 0 on it, without unit.
 
@@ -131,6 +134,7 @@ def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
     return {factor.kind: factor.measure(q) for factor in singularities(description).factors}
 
 
+@takes_robot
 def determinant(description: Description, q: ArrayLike) -> Array:
     """Return abs(det J) as the product of its factors, shape (...), for joint values (..., n).
 
@@ -150,6 +154,7 @@ def determinant(description: Description, q: ArrayLike) -> Array:
     return product
 
 
+@takes_robot
 def singular_configurations(description: Description, kind: str, count: int, seed: int = 0) -> Array:
     """Return random joint values at one kind of singularity, inside the joint limits where there are such.
 

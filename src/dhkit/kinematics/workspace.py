@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention, Description
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
 
@@ -134,6 +135,7 @@ class Workspace:
         return self.grid.estimate
 
 
+@takes_robot
 def workspace(
     description: Description,
     samples: int = 100_000,

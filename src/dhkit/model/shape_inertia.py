@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import INERTIA_PLACES, Array, Body, Inertia
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
-from dhkit.model.closed_surface import closed_surface
+from dhkit.model.closed_surface import closed_surface, tetrahedra
 from dhkit.model.triangle_mesh import TriangleMesh
 
 __all__ = ["InertiaMethod", "MassProperties", "ShapeInertia", "convex_hull", "shape_inertia"]
@@ -149,22 +149,17 @@ def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
     """
     size = mesh.size or 1.0
     middle = mesh.bounds.mean(axis=0)
-    corners = (mesh.corners - middle) / size
-    volume, first, _ = _sums(corners)
+    shares = TriangleMesh((mesh.vertices - middle) / size, mesh.faces)
+    a, b, c = shares.corners_about(np.zeros(3))
+    v = tetrahedra(a, b, c)
+    volume = float(v.sum())
     if volume <= FLAT:
         return volume * size**3, middle, np.zeros((3, 3))
-    centre = first / volume
-    volume, first, second = _sums(corners - centre)
-    rest = first / volume  # rounding alone
-    covariance = second - volume * np.outer(rest, rest)
-    return volume * size**3, middle + size * (centre + rest), covariance * size**5
-
-
-def _sums(corners: Array) -> tuple[float, Array, Array]:
-    """Return the integrals of 1, r and r r^T over the signed tetrahedra between triangles and the origin."""
-    a, b, c = np.moveaxis(corners, 1, 0)
-    v = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+    centre = v @ (a + b + c) / (4 * volume)
+    a, b, c = shares.corners_about(centre)
+    v = tetrahedra(a, b, c)
     s = a + b + c
-    first = v @ s / 4
-    second = sum((x * v[:, None]).T @ x for x in (a, b, c, s)) / 20
-    return float(v.sum()), first, np.asarray((second + second.T) / 2)
+    rest = v @ s / (4 * volume)  # rounding alone
+    second = np.sum([(x * v[:, None]).T @ x for x in (a, b, c, s)], axis=0) / 20
+    covariance = (second + second.T) / 2 - volume * np.outer(rest, rest)
+    return volume * size**3, middle + size * (centre + rest), covariance * size**5

@@ -11,8 +11,9 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
+from dhkit.description import Array
 from dhkit.description.frames import world_to_tool
+from dhkit.description.robot import Robot, description_of
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
 from dhkit.planning.clear import Clear, Surroundings
@@ -99,13 +100,14 @@ class Planner:
 
     def __init__(
         self,
-        description: Description,
+        description: Robot,
         objective: ObjectiveLike = "time",
         limits: Limits | None = None,
         constraints: Constraint | Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> None:
+        description = description_of(description)
         if intervals is not None and (type(intervals) is not int or not LEAST <= intervals <= MOST):
             raise ValueError(f"intervals is {intervals!r}; expected a whole number from {LEAST} to {MOST}")
         constraints = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)

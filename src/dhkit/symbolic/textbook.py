@@ -17,6 +17,7 @@ from functools import cached_property, lru_cache, reduce
 import numpy as np
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, Symbols, exact_arm, point_inertia
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
@@ -190,6 +191,7 @@ def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozen
     return np.array(torques, dtype=object)
 
 
+@takes_robot
 def derive(
     description: Description, mistakes: Iterable[MadeAt | str] = frozenset(), symbols: Symbols = "file"
 ) -> TextbookDerivation:

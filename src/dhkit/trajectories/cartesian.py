@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.trajectories.following import joint_path
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.paths import quintic_law
@@ -17,6 +18,7 @@ from dhkit.trajectories.trajectory import Trajectory
 __all__ = ["circle", "straight_line"]
 
 
+@takes_robot
 def straight_line(
     description: Description,
     T0: ArrayLike,
@@ -62,6 +64,7 @@ def straight_line(
     return _along(description, tool_line(T0, T1), q0, duration, limits, torques)
 
 
+@takes_robot
 def circle(
     description: Description,
     T0: ArrayLike,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.errors import PlanningError
 from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
 from dhkit.kinematics.newton import Newton
@@ -48,6 +49,7 @@ OUTSIDE = 1e-9
 """rad and m: how far rounding may lead out of the joint limits."""
 
 
+@takes_robot
 def joint_path(
     description: Description, tool: ToolPath, q0: ArrayLike | None = None, limits: Limits | None = None
 ) -> JointPath:

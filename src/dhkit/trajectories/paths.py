@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
-from dhkit.trajectories.pieces import Pieces, check_description, shifted
+from dhkit.description import Array, Description, description_of
+from dhkit.trajectories.pieces import Pieces, shifted
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
 
@@ -50,7 +50,7 @@ class JointPath:
     """The same polynomials, without the robot."""
 
     def __post_init__(self) -> None:
-        check_description(self.description)
+        object.__setattr__(self, "description", description_of(self.description))
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
         if pieces.end != 1.0:
             raise ValueError(f"breaks end with {pieces.end:g}; expected 1")

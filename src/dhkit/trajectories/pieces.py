@@ -10,10 +10,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description
+from dhkit.description import Array
 from dhkit.description.frames import number_array
 
-__all__ = ["Pieces", "Side", "check_description", "joined", "shifted"]
+__all__ = ["Pieces", "Side", "joined", "shifted"]
 
 Side: TypeAlias = Literal["right", "left"]
 """Which piece counts at a break."""
@@ -148,16 +148,3 @@ def shifted(coefficients: Array, u: Array) -> Array:
         for j in range(i, degrees):
             matrix[:, i, j] = comb(j, i) * u ** (j - i)
     return np.asarray(matrix @ coefficients)
-
-
-def check_description(description: object) -> None:
-    """Refuse what is no description.
-
-    Raises
-    ------
-    TypeError
-        It is something else, an arm for example.
-    """
-    if not isinstance(description, Description):
-        hint = "; give arm.description" if hasattr(description, "description") else ""
-        raise TypeError(f"the robot is {type(description).__name__}; expected a Description{hint}")

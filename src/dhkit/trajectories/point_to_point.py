@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.trajectories.interpolation import cubic_hermite, quintic_hermite
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
@@ -20,6 +21,7 @@ GRID, ZOOMED, ZOOMS = 50, 15, 4
 """Blends that are tried, then those between the best one's neighbours, so many times: to 2e-6 of the duration."""
 
 
+@takes_robot
 def cubic(
     description: Description,
     q0: ArrayLike,
@@ -72,6 +74,7 @@ def cubic(
     return timed(Trajectory(description, times, cubic_hermite(times, q, qd)), duration, limits, torques)
 
 
+@takes_robot
 def quintic(
     description: Description,
     q0: ArrayLike,
@@ -106,6 +109,7 @@ def quintic(
     return timed(Trajectory(description, times, quintic_hermite(times, q, qd, qdd)), duration, limits, torques)
 
 
+@takes_robot
 def trapezoidal(
     description: Description,
     q0: ArrayLike,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.trajectories.interpolation import check_times
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques
@@ -15,6 +16,7 @@ from dhkit.trajectories.trajectory import Trajectory
 __all__ = ["spline"]
 
 
+@takes_robot
 def spline(
     description: Description,
     points: ArrayLike,

@@ -15,7 +15,7 @@ from dhkit.description.frames import number_array
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
 from dhkit.trajectories.interpolation import interpolated
-from dhkit.trajectories.pieces import Pieces, Side, check_description, joined
+from dhkit.trajectories.pieces import Pieces, Side, joined
 from dhkit.trajectories.samples import Samples
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Trajectory:
     """The same polynomials, without the robot."""
 
     def __post_init__(self) -> None:
-        check_description(self.description)
+        object.__setattr__(self, "description", description_of(self.description))
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
         for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
             object.__setattr__(self, name, value)
@@ -241,7 +241,7 @@ class Trajectory:
 
     def matches(self, description: Description) -> bool:
         """Return whether it is a motion of this robot."""
-        check_description(description)
+        description = description_of(description)
         return self.description == description or self.description.digest == description.digest
 
     def require(self, description: Description) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.errors import DescriptionError
 from dhkit.model import pinocchio_model
 from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error
@@ -34,6 +35,7 @@ class Comparison(NamedTuple):
     """1: q alone; 2: qd too; 3: qdd too."""
 
 
+@takes_robot
 def verify(description: Description, samples: int = 1000, seed: int = 0) -> VerificationReport:
     """Hold our kinematics and dynamics against Pinocchio's, computed from the URDF that dhkit writes.
 

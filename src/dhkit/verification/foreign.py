@@ -9,6 +9,7 @@ import numpy as np
 
 from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description, pose_parts
+from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, read_chain
 from dhkit.verification.comparison import Comparison, largest, worst
@@ -28,6 +29,7 @@ CLOSE = 1e-6
 """m and rotation entries: poses that differ by less from state to state differ by a constant transform."""
 
 
+@takes_robot
 def verify_urdf(
     description: Description,
     path: str | Path,

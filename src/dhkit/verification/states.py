@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import check_whole
 
 __all__ = ["Motion", "random_motions", "random_states"]
@@ -23,6 +24,7 @@ class Motion(NamedTuple):
     qdd: Array
 
 
+@takes_robot
 def random_states(description: Description, samples: int, seed: int = 0) -> Array:
     """Return random joint values, shape (samples, n): full turns, and strokes within the limits (1 m where none).
 
@@ -40,6 +42,7 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
     return np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
 
 
+@takes_robot
 def random_motions(description: Description, samples: int, seed: int = 0) -> Motion:
     """Return random states inside the limits of position and speed, with accelerations up to 10 rad/s^2 or m/s^2.
 

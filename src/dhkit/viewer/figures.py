@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Convention, Description
 from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
 from dhkit.description.numbers import Array
+from dhkit.description.robot import takes_robot
 from dhkit.viewer.motion import check_motion
 from dhkit.viewer.scene import first_configuration, frame_labels, scene_size
 
@@ -62,6 +63,7 @@ def _(value: Description) -> Figure:
     return plot_arm(value, first_configuration(value))
 
 
+@takes_robot
 def plot_arm(description: Description, q: ArrayLike) -> Figure:
     """Return an arm's skeleton with its DH frames.
 
@@ -94,6 +96,7 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     return figure
 
 
+@takes_robot
 def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Figure:
     """Return joint curves over time, revolute ones in degrees and prismatic ones in m, beside the tool's path.
 

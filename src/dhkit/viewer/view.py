@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Description
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
+from dhkit.description.robot import Robot, description_of
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
 from dhkit.viewer.motion import Motion, played_motion
@@ -73,14 +74,14 @@ class View:
 
     def __init__(
         self,
-        description: Description,
+        description: Robot,
         *,
         frames: bool = False,
         answer: Answer | None = None,
         port: int = 0,
         token: str | None = None,
     ) -> None:
-        self._description = description
+        self._description = description_of(description)
         self._answer, self._port, self._token = answer, port, token
         self._server: ViewerServer | None = None
         self._widget: Any = None

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, world_to_frames, world_to_tool
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
@@ -136,6 +137,7 @@ def plot_workspace(workspace: Workspace) -> Figure:
     return figure
 
 
+@takes_robot
 def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     """Return an arm with the velocity ellipsoid of its tool's origin; the title says its scale.
 

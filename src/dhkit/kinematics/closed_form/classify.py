@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
 from dhkit.kinematics.closed_form.family import Family, Fit
@@ -38,6 +39,7 @@ class Classification:
     fit: Fit | None
 
 
+@takes_robot
 @lru_cache(maxsize=512)
 def classify(description: Description) -> Classification:
     """Read the axes of an arm and return its closed form, if it has one.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_kept, require_path
 from dhkit.planning.along.search import MOST, solved
@@ -26,6 +27,7 @@ FEWEST = 6
 """Intervals."""
 
 
+@takes_robot
 def along_path(
     description: Description,
     path: JointPath,

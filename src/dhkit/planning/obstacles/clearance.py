@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
+from dhkit.description.robot import takes_robot
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import checked_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
@@ -38,6 +39,7 @@ class Distances:
     """Shape (...), m: the smallest distance between two links; inf if it was not asked for."""
 
 
+@takes_robot
 def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
     """Return exact distances of an arm's capsules from obstacles, and from each other.
 

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from dhkit.description import Description
+from dhkit.description.robot import Robot, description_of
 from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
 from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleration
@@ -61,7 +62,7 @@ class CasadiFunctions:
 
     def __init__(
         self,
-        description: Description,
+        description: Robot,
         friction: bool | Friction | None = None,
         payload: bool = False,
         wrench: bool = False,
@@ -69,7 +70,7 @@ class CasadiFunctions:
         for name, layer in (("payload", payload), ("wrench", wrench)):
             if not isinstance(layer, bool):
                 raise TypeError(f"{name} is {layer!r}; expected True or False")
-        self._description = description
+        self._description = description_of(description)
         self._friction = Friction.chosen(friction)
         self._payload = payload
         self._wrench = wrench

@@ -10,6 +10,7 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description
 from dhkit.description.frames import carrying
+from dhkit.description.robot import takes_robot
 
 if TYPE_CHECKING:
     import casadi
@@ -128,6 +129,7 @@ def table_numbers(description: Description) -> Array:
     return np.concatenate([joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()]) + 0.0
 
 
+@takes_robot
 def table_pattern(description: Description) -> tuple[str, Array]:
     """Return what a parametric table's expressions depend on, as text, and the values of its symbols.
 

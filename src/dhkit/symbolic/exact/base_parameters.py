@@ -17,6 +17,7 @@ from itertools import chain
 import numpy as np
 
 from dhkit.description import Description, Named
+from dhkit.description.robot import takes_robot
 from dhkit.expressions import Expression
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.composite import RigidBody, Step
@@ -78,6 +79,7 @@ class BaseParameters:
         return Proof("M and g in base parameters are those in all parameters", difference)
 
 
+@takes_robot
 @lru_cache(maxsize=32)
 def base_parameters(description: Description) -> BaseParameters:
     """Return an arm's base parameters, with what each stands for, and its equations of motion in them.

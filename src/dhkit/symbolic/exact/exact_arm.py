@@ -9,7 +9,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import INERTIA_PLACES, Array, Convention, Description, joint_array, require_bodies
+from dhkit.description import (
+    INERTIA_PLACES,
+    Array,
+    Convention,
+    Description,
+    description_of,
+    joint_array,
+    require_bodies,
+)
 from dhkit.expressions import ZERO, Expression, exact_angle
 from dhkit.symbolic.exact.naming import BodyNumbers, LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
@@ -177,6 +185,8 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     ValueError
         Another choice of symbols.
     """
+    if not isinstance(description, Description):
+        return exact_arm(description_of(description), symbols, needed)
     if symbols not in ("none", "file", "inertial"):
         raise ValueError(f"symbols is {symbols!r}; expected 'none', 'file' or 'inertial'")
     bodies = require_bodies(description)

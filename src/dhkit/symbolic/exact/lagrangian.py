@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.expressions import Expression
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
@@ -273,6 +274,7 @@ class Lagrangian:
         return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - route.tau)
 
 
+@takes_robot
 def lagrangian(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> Lagrangian:
     """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for the arguments."""
     arm = exact_arm(description, symbols, needed)
