@@ -9,9 +9,23 @@ import numpy as np
 import pytest
 
 import dhkit
-from dhkit import Arm, control, description, dynamics, kinematics, symbolic, trajectories, verification
+from dhkit import (
+    Arm,
+    control,
+    description,
+    dynamics,
+    kinematics,
+    model,
+    planning,
+    symbolic,
+    trajectories,
+    verification,
+)
+from dhkit.viewer import View
 
-PACKAGES = "description kinematics dynamics symbolic verification trajectories planning control viewer grading".split()  # noqa: SIM905
+PACKAGES = (
+    "description kinematics dynamics symbolic verification trajectories planning control viewer model grading".split()
+)  # noqa: SIM905
 WITHIN = {"exact_arm", "joint_array", "joint_vector"}
 """Functions that look for themselves whether they were given an arm: they are called for every batch."""
 
@@ -50,6 +64,13 @@ CALLS = {
     "linearize": lambda arm: control.linearize(arm, Q)[0],
     "toml": description.to_toml,
     "with tool": lambda arm: description.with_tool(arm, np.eye(4)).name,
+    "planner": lambda arm: planning.Planner(arm).limits.velocity,
+    "view": lambda arm: View(arm).description.name,
+    "casadi": lambda arm: float(symbolic.CasadiFunctions(arm).mass_matrix(Q)[0, 0]),
+    "plant": lambda arm: control.Plant(arm).description.name,
+    "trajectory": lambda arm: trajectories.Trajectory(arm, [0, 1], np.zeros((1, 2, 2))).description.name,
+    "urdf": model.urdf_text,
+    "pinocchio": lambda arm: model.pinocchio_model(arm).nq,
     "joint array": lambda arm: description.joint_array(arm, Q),
 }
 

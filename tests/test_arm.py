@@ -50,9 +50,70 @@ def test_nothing_in_an_arm_can_be_changed():
         arm.name = "other"
     with pytest.raises(AttributeError, match="cannot be changed"):
         arm.other = 1
-    model = arm.model
-    model.gravity.linear = np.zeros(3)
-    assert np.array_equal(arm.model.gravity.linear, [0, 0, -9.81])
+
+
+def test_the_pinocchio_model_is_one_object_that_nothing_else_uses():
+    arm = Arm.load("planar2r")
+    assert arm.model is arm.model
+    arm.model.gravity.linear = np.zeros(3)
+    arm.model.inertias[1].mass = 100.0
+    assert np.array_equal(arm.model.gravity.linear, np.zeros(3))
+    assert np.array_equal(arm.pinocchio_model().gravity.linear, arm.description.numbers.gravity)
+    for other in (pickle.loads(pickle.dumps(arm)), copy.copy(arm), copy.deepcopy(arm)):
+        assert other == arm
+        assert np.array_equal(other.model.gravity.linear, arm.description.numbers.gravity)
+    assert arm.verify(10).ok
+    motion = arm.plan([0, 0], [1.0, 0.5], intervals=24)
+    assert motion.report.certificate.ok
+    assert np.array_equal(motion.tau(0.1), Arm.load("planar2r").plan([0, 0], [1.0, 0.5], intervals=24).tau(0.1))
+
+
+def test_limits_names_and_files(tmp_path):
+    arm = Arm.load("puma560")
+    assert arm.joint_names[:2] == ("waist", "shoulder")
+    assert np.array_equal(arm.limits.velocity, arm.description.numbers.velocity)
+    slower = arm.with_limits(velocity=0.5, lower=[-1] * 6, upper=np.full(6, 2.0), torque=np.inf)
+    assert slower.limits.velocity.tolist() == [0.5] * 6
+    assert (slower.limits.lower[0], slower.limits.upper[5], slower.limits.torque[1]) == (-1, 2, np.inf)
+    assert slower.description.joints[0].bodies == arm.description.joints[0].bodies
+    assert arm.with_limits(lower=-np.inf, upper=np.inf).description.joints[0].limits is None
+    for wrong in ({"lower": 2.0, "upper": 1.0}, {"upper": np.inf}, {"velocity": -1.0}, {"lower": np.nan}):
+        with pytest.raises(dhkit.DhkitError, match=r"joint 1 \(waist\): "):
+            arm.with_limits(**wrong)
+    with pytest.raises(ValueError, match=r"velocity has shape \(2,\); expected \(6,\) or one number"):
+        arm.with_limits(velocity=[1, 2])
+    files = arm.save(tmp_path / "puma.toml")
+    assert files[0] == tmp_path / "puma.toml"
+    assert len(files) > 1
+    again = Arm.load(tmp_path / "puma.toml")
+    assert np.array_equal(again.mass_matrix([0.1] * 6), arm.mass_matrix([0.1] * 6))
+    with pytest.raises(dhkit.DhkitError, match="ends in .toml"):
+        arm.save(tmp_path / "puma.yaml")
+
+
+def test_a_table_may_have_limits_and_bodies():
+    rod = {"mass": "m", "com": ("-l/2", 0, 0), "inertia": ((0, 0, 0), (0, "m*l^2/12", 0), (0, 0, "m*l^2/12"))}
+    arm = Arm.from_dh(
+        [(0, 0, "l", 0), (0, 0, 0.3, 0)],
+        angle="deg",
+        limits=[(-90, 90), None],
+        bodies=[rod, dhkit.description.Body(dhkit.expressions.exact(2))],
+        parameters={"l": 0.5, "m": 3},
+    )
+    assert arm.limits.upper.tolist() == [np.pi / 2, np.inf]
+    assert arm.mass_matrix([0.0, 0.0])[1, 1] == pytest.approx(2 * 0.3**2)
+    assert arm.mass_matrix([0.0, 0.0])[0, 0] == pytest.approx(3 * 0.25 / 3 + 2 * 0.8**2)
+    for wrong, said in (
+        ({"limits": [(0, 1)]}, "limits: 1 entries; expected 2"),
+        ({"limits": [(0, 1, 2), None]}, "limits of joint 1: found"),
+        ({"limits": ["ab", None]}, "limits of joint 1: found"),
+        ({"bodies": [3, None]}, "body of link 1: found 3; expected a Body"),
+        ({"bodies": [{"mass": 1, "moi": 2}, None]}, "body of link 1"),
+        ({"bodies": [{"mass": 1, "com": (0, 0)}, None]}, "com has 2 numbers"),
+        ({"bodies": [{"mass": 1, "inertia": ((1, 2, 0), (0, 1, 0), (0, 0, 1))}, None]}, "symmetric 3x3"),
+    ):
+        with pytest.raises(dhkit.DhkitError, match=said):
+            Arm.from_dh([(0, 0, 1, 0), (0, 0, 1, 0)], **wrong)
 
 
 def test_arms_come_from_the_library_from_files_and_from_tables(tmp_path):
@@ -65,7 +126,7 @@ def test_arms_come_from_the_library_from_files_and_from_tables(tmp_path):
     assert Arm.from_dh([(0, 0, 1, 0)]).n == 1
     with pytest.raises(dhkit.DescriptionError, match="no such file"):
         Arm.load(tmp_path / "none.toml")
-    with pytest.raises(dhkit.DescriptionError, match="URDF"):
+    with pytest.raises(dhkit.ModelError, match="No such file"):
         Arm.load("arm.urdf")
 
 

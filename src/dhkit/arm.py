@@ -16,6 +16,7 @@ from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
     from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
+    from dhkit.description import Body
     from dhkit.description.table import Quantity
     from dhkit.grading import GradeReport
     from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
@@ -130,6 +131,8 @@ class Arm:
         length: str = "m",
         name: str = "arm",
         parameters: Mapping[str, Quantity] | None = None,
+        limits: Sequence[Sequence[Quantity] | None] | None = None,
+        bodies: Sequence[Body | Mapping[str, Any] | None] | None = None,
     ) -> Arm:
         """Return the arm of a Denavit-Hartenberg table; see :func:`dhkit.description.from_dh`."""
         return cls(
@@ -142,6 +145,8 @@ class Arm:
                 length=length,
                 name=name,
                 parameters=parameters,
+                limits=limits,
+                bodies=bodies,
             )
         )
 
@@ -162,6 +167,17 @@ class Arm:
     def with_parameters(self, **values: Quantity) -> Arm:
         """Return this arm with other values of its parameters, SI and radians."""
         return Arm(describe.with_parameters(self._description, **values))
+
+    def with_limits(
+        self,
+        *,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
+    ) -> Arm:
+        """Return this arm with other limits, SI and radians; see :func:`dhkit.description.with_limits`."""
+        return Arm(describe.with_limits(self._description, lower=lower, upper=upper, velocity=velocity, torque=torque))
 
     def with_uniform_links(self, masses: Sequence[Quantity] | None = None) -> Arm:
         """Return this arm with thin uniform rods for links; see :func:`dhkit.description.with_uniform_links`."""
@@ -187,6 +203,34 @@ class Arm:
     def n(self) -> int:
         """The number of joints."""
         return self._description.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints' names."""
+        return tuple(joint.name for joint in self._description.joints)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """The joints' limits of position, velocity and torque; of acceleration and jerk a description has none."""
+        from dhkit.trajectories import Limits
+
+        return Limits.of(self._description)
+
+    def save(self, path: str | Path) -> tuple[Path, ...]:
+        """Write the arm's robot file (``.toml``), with its meshes beside it; return the files, the robot file first.
+
+        Raises
+        ------
+        DescriptionError
+            Another ending.
+        ModelError
+            A file cannot be read or written.
+        """
+        from dhkit.model import write_robot_with_meshes
+
+        if Path(path).suffix.lower() != ".toml":
+            raise DescriptionError(f"{path}: expected a robot file that ends in .toml")
+        return write_robot_with_meshes(self._description, path)
 
     @cached_property
     def dh(self) -> DHTable:
@@ -800,17 +844,24 @@ class Arm:
 
     @property
     def model(self) -> PinocchioModel:
-        """A Pinocchio model with gravity, armature, friction and limits set; made once, a copy each time.
+        """The arm's Pinocchio model, with gravity, armature, friction and limits set; one object, made once.
+
+        What is changed in it stays changed, for this object alone: equality, pickling, ``verify``, certificates of
+        motions and all else in dhkit go back to the description. :meth:`pinocchio_model` is a fresh one.
 
         Raises
         ------
         ModelError
             Pinocchio is not installed.
         """
-        return self._model.copy()
+        return self._model
 
     @cached_property
     def _model(self) -> PinocchioModel:
+        return self.pinocchio_model()
+
+    def pinocchio_model(self) -> PinocchioModel:
+        """Return a new Pinocchio model of the arm; see :func:`dhkit.model.pinocchio_model`."""
         from dhkit.model import pinocchio_model
 
         return pinocchio_model(self._description)
@@ -839,6 +890,13 @@ class Arm:
 
     def __hash__(self) -> int:
         return hash(self._description)
+
+    def __getstate__(self) -> dict[str, Description]:
+        """Leave out what can be made again, and the Pinocchio model, which may have been changed."""
+        return {"_description": self._description}
+
+    def __setstate__(self, state: dict[str, Description]) -> None:
+        object.__setattr__(self, "_description", state["_description"])
 
     def __reduce__(self) -> tuple[type[Arm], tuple[Description]]:
         return Arm, (self._description,)

@@ -2,7 +2,14 @@
 
 from dhkit.description.assets import asset
 from dhkit.description.bodies import require_bodies
-from dhkit.description.changes import with_base, with_parameters, with_payload, with_tool, with_uniform_links
+from dhkit.description.changes import (
+    with_base,
+    with_limits,
+    with_parameters,
+    with_payload,
+    with_tool,
+    with_uniform_links,
+)
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array, joint_vector, link_transforms, world_to_frames, world_to_tool
 from dhkit.description.library import library_robot, robots
@@ -78,6 +85,7 @@ __all__ = [
     "robots",
     "to_toml",
     "with_base",
+    "with_limits",
     "with_parameters",
     "with_payload",
     "with_tool",

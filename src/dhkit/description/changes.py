@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from dhkit.description.bodies import moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
+from dhkit.description.frames import number_array
 from dhkit.description.named import Named
+from dhkit.description.numbers import Array
 from dhkit.description.parameters import resolved
 from dhkit.description.poses import check_pose, pose_parts
 from dhkit.description.robot import Description, takes_robot
@@ -26,7 +28,7 @@ from dhkit.expressions import Expression, exact, exact_angle
 SYMMETRIC = 1e-12
 """How unequal the products of an inertia may be, of its largest entry: what R I R^T leaves."""
 
-__all__ = ["with_base", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
+__all__ = ["with_base", "with_limits", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
 
 
 @takes_robot
@@ -57,6 +59,65 @@ def with_parameters(description: Description, /, **values: Quantity) -> Descript
             raise DescriptionError(f"{description.name} has no parameter {name!r}; it has {', '.join(known) or 'none'}")
     new = {name: quantity(f"parameters.{name}", value, known) for name, value in values.items()}
     return replace(description, parameters=Named(dict(known) | new))
+
+
+@takes_robot
+def with_limits(
+    description: Description,
+    *,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
+) -> Description:
+    """Return the arm with other limits of its joints; those not given stay.
+
+    Parameters
+    ----------
+    lower, upper
+        Lowest and highest joint values, rad and m, one number for all joints or shape (n,). Infinite on both sides:
+        the joint is unlimited.
+    velocity, torque
+        Largest speeds, rad/s and m/s, and torques or forces, N m and N, likewise; inf: unlimited.
+
+    Raises
+    ------
+    DescriptionError
+        A lower limit above the upper one, one side infinite, NaN, or a speed or torque that is not positive.
+    ValueError
+        Another shape.
+    """
+    numbers, n = description.numbers, description.n
+    own = {"lower": numbers.lower, "upper": numbers.upper, "velocity": numbers.velocity, "torque": numbers.effort}
+    given = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
+    arrays = {name: own[name] if value is None else _each(value, name, n) for name, value in given.items()}
+    joints = []
+    for i, joint in enumerate(description.joints):
+        row = {name: float(array[i]) for name, array in arrays.items()}
+        where = f"joint {i + 1} ({joint.name})"
+        if np.isnan(list(row.values())).any() or np.isinf(row["lower"]) != np.isinf(row["upper"]):
+            raise DescriptionError(
+                f"{where}: limits [{row['lower']:g}, {row['upper']:g}]; expected two numbers, or both inf"
+            )
+        changed = replace(joint)
+        if lower is not None or upper is not None:
+            changed = replace(
+                changed, limits=None if np.isinf(row["lower"]) else (exact(row["lower"]), exact(row["upper"]))
+            )
+        if velocity is not None:
+            changed = replace(changed, velocity=None if np.isinf(row["velocity"]) else exact(row["velocity"]))
+        if torque is not None:
+            changed = replace(changed, effort=None if np.isinf(row["torque"]) else exact(row["torque"]))
+        joints.append(changed)
+    return replace(description, joints=tuple(joints))
+
+
+def _each(value: ArrayLike, name: str, n: int) -> Array:
+    """Return one number for each joint, shape (n,)."""
+    array = number_array(value, name, f"({n},) or ()")
+    if array.shape not in ((), (n,)):
+        raise ValueError(f"{name} has shape {array.shape}; expected ({n},) or one number")
+    return np.broadcast_to(array, (n,))
 
 
 @takes_robot

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from dhkit.description.named import Named
 from dhkit.description.parameters import check_parameter_name
 from dhkit.description.robot import Description
-from dhkit.description.values import Convention, Joint, JointType, Units
+from dhkit.description.values import INERTIA_PLACES, Body, Convention, Inertia, Joint, JointType, Units
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, exact, exact_angle, parse
 
@@ -50,6 +50,8 @@ def from_dh(
     length: str = "m",
     name: str = "arm",
     parameters: Mapping[str, Quantity] | None = None,
+    limits: Sequence[Sequence[Quantity] | None] | None = None,
+    bodies: Sequence[Body | Mapping[str, Any] | None] | None = None,
 ) -> Description:
     """Return the description of a Denavit-Hartenberg table.
 
@@ -69,6 +71,11 @@ def from_dh(
         The robot's name.
     parameters
         Values of the names that occur in text.
+    limits
+        Of each joint: its lowest and highest value, in the units given, or None.
+    bodies
+        Of each link: a :class:`Body`, or ``{"mass": 2.0, "com": (x, y, z), "inertia": ((…), (…), (…))}`` in kg, m and
+        kg m^2, about the centre of mass in the axes of the link's own DH frame; or None.
 
     Raises
     ------
@@ -97,12 +104,22 @@ def from_dh(
     named = dict(parameters or {})
     for key in named:
         check_parameter_name(key)
+    joints = [
+        _joint(i, row, order, type, units, named) for i, (row, type) in enumerate(zip(rows, types, strict=True), 1)
+    ]
+    for what, given in (("limits", limits), ("bodies", bodies)):
+        if given is not None and len(given) != len(joints):
+            raise DescriptionError(f"{what}: {len(given)} entries; expected {len(joints)}, one a joint")
+    for i, pair in enumerate(limits or ()):
+        if pair is not None:
+            joints[i] = replace(joints[i], limits=_limits(i + 1, pair, joints[i], units, named))
+    for i, body in enumerate(bodies or ()):
+        if body is not None:
+            joints[i] = replace(joints[i], bodies=(_body(i + 1, body, named),))
     return Description(
         name=name,
         convention=Convention(convention),
-        joints=tuple(
-            _joint(i, row, order, type, units, named) for i, (row, type) in enumerate(zip(rows, types, strict=True), 1)
-        ),
+        joints=tuple(joints),
         parameters=Named({key: quantity(f"parameters.{key}", value, named) for key, value in named.items()}),
         units=units,
     )
@@ -126,6 +143,34 @@ def _joint(
         entries[key] = exact_angle(entries[key])
     a, alpha, d, theta = (entries[key] for key in ("a", "alpha", "d", "theta"))
     return Joint(JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, a, alpha, d, theta)
+
+
+def _limits(
+    number: int, pair: Sequence[Quantity], joint: Joint, units: Units, names: Mapping[str, object]
+) -> tuple[Expression, Expression]:
+    if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
+        raise DescriptionError(f"limits of joint {number}: found {pair!r}; expected lowest and highest value, or None")
+    unit = units.radians if joint.is_revolute else units.metres
+    low, high = (quantity(f"limits of joint {number}", value, names, unit) for value in pair)
+    return low, high
+
+
+def _body(number: int, body: object, names: Mapping[str, object]) -> Body:
+    if isinstance(body, Body):
+        return body
+    where = f"body of link {number}"
+    if not isinstance(body, Mapping) or "mass" not in body or set(body) - {"mass", "com", "inertia"}:
+        raise DescriptionError(f"{where}: found {str(body)[:80]}; expected a Body, or mass, com and inertia by name")
+    com = tuple(quantity(f"{where}: com", value, names) for value in body.get("com", (0, 0, 0)))
+    if len(com) != 3:
+        raise DescriptionError(f"{where}: com has {len(com)} numbers; expected 3")
+    rows = [
+        [quantity(f"{where}: inertia", value, names) for value in row] for row in body.get("inertia", [[0] * 3] * 3)
+    ]
+    if [len(row) for row in rows] != [3, 3, 3] or any(rows[i][j] != rows[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
+        raise DescriptionError(f"{where}: inertia: expected a symmetric 3x3 matrix, kg m^2 about the centre of mass")
+    inertia = Inertia(**{key: rows[i][j] for key, (i, j) in INERTIA_PLACES.items()})
+    return Body(quantity(f"{where}: mass", body["mass"], names), (com[0], com[1], com[2]), inertia)
 
 
 def length(value: Expression, units: Units) -> str:

@@ -6,6 +6,7 @@ from dhkit.model.extraction import Extraction, Residual, extract_dh
 from dhkit.model.mass_report import ReportedMass, read_mass_report
 from dhkit.model.mesh_reader import read_mesh
 from dhkit.model.reference import PinocchioModel, pinocchio_model
+from dhkit.model.robot_folder import write_robot_with_meshes
 from dhkit.model.shape_inertia import InertiaMethod, MassProperties, ShapeInertia, shape_inertia
 from dhkit.model.shapes import Part, link_parts
 from dhkit.model.triangle_mesh import TriangleMesh
@@ -35,5 +36,6 @@ __all__ = [
     "shape_inertia",
     "urdf_source",
     "urdf_text",
+    "write_robot_with_meshes",
     "write_urdf",
 ]

@@ -29,6 +29,7 @@ from dhkit.description import (
     write_robot,
 )
 from dhkit.description.assets import inside
+from dhkit.description.robot import Robot, description_of
 from dhkit.errors import ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
@@ -134,7 +135,7 @@ class CadImport:
 
 def import_cad(
     folder: str | Path,
-    description: Description,
+    description: Robot,
     *,
     unit: str | None = None,
     q: ArrayLike | None = None,
@@ -175,7 +176,7 @@ def import_cad(
     ModelError
         A part that is missing, cannot be told or read, was moved on export, or whose unit is not clear: one line.
     """
-    folder = Path(folder)
+    folder, description = Path(folder), description_of(description)
     if unit is not None and unit not in UNITS:
         raise ModelError(f"unit is {unit[:20]!r}; expected one of {', '.join(UNITS)}")
     stated = StatedMasses.of(description.n, density, mass, [Path(report) for report in reports])

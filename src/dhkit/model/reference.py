@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from dhkit.description import Description
+from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.urdf import urdf_text
 
@@ -20,6 +21,7 @@ else:
 __all__ = ["PinocchioModel", "pinocchio_model"]
 
 
+@takes_robot
 def pinocchio_model(description: Description) -> PinocchioModel:
     """Return a Pinocchio model of a description, made from its URDF.
 

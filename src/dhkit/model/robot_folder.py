@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from dhkit.description import Description, Mesh, Shape, to_toml, write_atomically
+from dhkit.description.robot import takes_robot
 from dhkit.errors import DescriptionError, ModelError
 
 __all__ = ["write_robot_with_meshes"]
@@ -14,6 +15,7 @@ __all__ = ["write_robot_with_meshes"]
 MESHES = "meshes"
 
 
+@takes_robot
 def write_robot_with_meshes(description: Description, path: str | Path) -> tuple[Path, ...]:
     """Write a robot file and copies of its meshes in ``meshes/NAME`` beside it; return the files, robot file first.
 

@@ -20,6 +20,7 @@ from dhkit.description.assets import inside
 from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
+from dhkit.description.robot import takes_robot
 from dhkit.expressions import Expression, exact, substitute
 
 __all__ = ["Part", "link_parts"]
@@ -77,6 +78,7 @@ class Part:
     """The mesh's file; None for other geometry."""
 
 
+@takes_robot
 def link_parts(description: Description) -> tuple[Part, ...]:
     """Return the solids of an arm's links, from the base to the tool.
 

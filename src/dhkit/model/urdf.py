@@ -31,6 +31,7 @@ from dhkit.description import (
     pose_parts,
     write_atomically,
 )
+from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.shapes import Part, link_parts
 
@@ -52,6 +53,7 @@ class Origin(NamedTuple):
     rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
+@takes_robot
 def urdf_text(
     description: Description,
     mesh_path: Callable[[str], str] | None = None,
@@ -97,6 +99,7 @@ def urdf_text(
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding="unicode") + "\n"
 
 
+@takes_robot
 def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
     """Write a URDF, with the meshes that it names in ``meshes/`` beside it; return the files, the URDF first.
 

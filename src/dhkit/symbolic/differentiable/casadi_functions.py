@@ -70,7 +70,8 @@ class CasadiFunctions:
         for name, layer in (("payload", payload), ("wrench", wrench)):
             if not isinstance(layer, bool):
                 raise TypeError(f"{name} is {layer!r}; expected True or False")
-        self._description = description_of(description)
+        description = description_of(description)
+        self._description = description
         self._friction = Friction.chosen(friction)
         self._payload = payload
         self._wrench = wrench
