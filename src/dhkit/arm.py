@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dhkit.description import Body
     from dhkit.description.table import Quantity
     from dhkit.grading import GradeReport
-    from dhkit.kinematics import IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
+    from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
     from dhkit.planning import Constraint, Distances, ObjectiveLike, Planner, Scene
@@ -333,11 +333,11 @@ class Arm:
         return follow_path(self._description, T, q0, limits=limits)
 
     @property
-    def family(self) -> str:
-        """What the axes are like, and whether inverse kinematics have a closed form, in words."""
+    def family(self) -> Classification:
+        """What the axes are like, and whether inverse kinematics have a closed form; prints as words."""
         from dhkit.kinematics import classify
 
-        return classify(self._description).words
+        return classify(self._description)
 
     def manipulability(self, q: ArrayLike, motion: Motion = "translational") -> Array:
         """Return how well the tool can move at q, shape (...); see :func:`dhkit.kinematics.manipulability`."""

@@ -20,12 +20,12 @@ EXPECTED = {
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_library_robots(name):
-    assert Arm.load(name).family == EXPECTED[name]
+    assert str(Arm.load(name).family) == EXPECTED[name]
 
 
 @pytest.mark.parametrize("name", ["planar2r", "planar3r", "cobra600", "polar_rp", "cart_pendulum", "pan_tilt", "al5d"])
 def test_arms_of_few_joints_say_what_they_meet(name):
-    words = Arm.load(name).family
+    words = Arm.load(name).family.words
     assert "closed form" in words
     assert "meets" in words
 
@@ -39,21 +39,30 @@ def rows(right=np.pi / 2, tilt=0.0):
 
 def test_angles_typed_with_few_digits_are_said():
     """1.5708 is no right angle: axes 4 to 6 still meet, but joint 1's is off by 4e-6."""
-    words = Arm.from_dh(rows(1.5708)).family
+    words = Arm.from_dh(rows(1.5708)).family.words
     assert words.startswith("6R: no closed form known (nearly")
     assert "are its angles rounded?" in words
-    assert Arm.from_dh(rows(1.5707963267948966)).family == SPHERICAL
+    assert str(Arm.from_dh(rows(1.5707963267948966)).family) == SPHERICAL
 
 
 def test_a_tilt_beyond_the_tolerance_ends_the_family():
     assert classify(Arm.from_dh(rows(tilt=1e-13)).description).family is not None
     assert classify(Arm.from_dh(rows(tilt=1e-11)).description).family is None
-    assert Arm.from_dh(rows(tilt=0.3)).family == "6R: no closed form known"
+    assert str(Arm.from_dh(rows(tilt=0.3)).family) == "6R: no closed form known"
 
 
 def test_base_tool_units_and_convention_change_nothing():
     arm = Arm.load("kr5")
     moved = arm.with_base(pose((1, 2, 3), euler=(0.1, 0.2, 0.3))).with_tool(pose((0.1, 0, 0.2), euler=(1, 2, 3)))
-    assert moved.family == arm.family == SPHERICAL
+    assert str(moved.family) == str(arm.family) == SPHERICAL
     locked = Arm.load("panda").lock({2: 0.0})  # without its third joint axes 2 and 4 are parallel
-    assert "6R" in locked.family
+    assert "6R" in str(locked.family)
+
+
+def test_a_family_is_an_object_that_prints_as_words():
+    family = Arm.load("puma560").family
+    assert (family.closed_form, family.name, len(family.branches)) == (True, "elbow_wrist", 8)
+    assert family.branches == Arm.load("puma560").ik(np.eye(4)).branches
+    assert str(family) == repr(family) == f"{family}" == SPHERICAL
+    none = Arm.load("panda").family
+    assert (none.closed_form, none.name, none.branches) == (False, "", ())

@@ -144,7 +144,9 @@ def test_the_solver_is_prepared_once(ssik, caplog):
 def test_without_ssik_the_error_says_how_to_get_it_and_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "ssik", None)
     arm = from_dh([*TWISTED[:-1], (0, 0.321, 0, 0)], name="plain")
-    with pytest.raises(ModelError, match=r"plain is 6R: no closed form known; `\.venv/bin/pip install -e '\.\[ik\]'`.*ik_numeric"):
+    with pytest.raises(
+        ModelError, match=r"plain is 6R: no closed form known; `\.venv/bin/pip install -e '\.\[ik\]'`.*ik_numeric"
+    ):
         inverse_kinematics(arm, np.eye(4))
     assert Arm(arm).ik_numeric(forward_kinematics(arm, np.full(6, 0.3))).valid.all()
 

@@ -144,7 +144,7 @@ def test_limits_are_kept_or_flagged():
     assert free.status.tolist() == ["ok", "ok"]
     assert free.q[1, 0] == pytest.approx([0.0, -1.0], abs=1e-10)
     assert free.flags[:, 0].tolist() == [0, IKFlag.out_of_limits]
-    assert free.within[:, 0].tolist() == [True, False]
+    assert free.allowed[:, 0].tolist() == [True, False]
 
 
 def test_windings_inside_the_limits_are_kept():
@@ -154,7 +154,7 @@ def test_windings_inside_the_limits_are_kept():
     found = solve_numerically(arm, forward_kinematics(arm, q), q + 0.05)
     assert found.q[0] == pytest.approx(q, abs=1e-9)
     outside = solve_numerically(library_robot("puma560"), forward_kinematics(library_robot("puma560"), q * 0), q * 10)
-    assert outside.within.all()
+    assert outside.allowed.all()
 
 
 @pytest.mark.parametrize("beyond", [1e-6, 0.05, 1.0])

@@ -169,7 +169,7 @@ def test_windings_and_limits():
     inside = ~np.isnan(kept).any(axis=-1)
     assert inside.any()
     assert ((kept[inside] >= lower - 1e-9) & (kept[inside] <= upper + 1e-9)).all()
-    assert np.array_equal(inside, solutions.within)
+    assert np.array_equal(inside, solutions.allowed)
     closest = kept[inside][np.argmin(np.abs(kept[inside] - q).max(axis=-1))]
     assert np.abs(closest - q).max() < 1e-12
     assert np.abs(solutions.require(near=q) - q).max() < 1e-12
@@ -214,7 +214,7 @@ def test_require_says_what_is_missing():
         arm.ik(T).require()
     q = np.radians([170, 0, 0, 0, 30, 0])  # the waist ends at 160 degrees
     T = arm.fk(q)
-    if not arm.ik(T).within.any():
+    if not arm.ik(T).allowed.any():
         with pytest.raises(UnreachableError, match="outside the joint limits"):
             arm.ik(T).require()
 

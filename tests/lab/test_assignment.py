@@ -72,7 +72,7 @@ def attempt(lab, condition):
     """Do what a condition asks for, as a person does it in the panels."""
     if isinstance(condition, ToolAt):
         found = lab.desk.arm.ik(condition.T)
-        assert np.any(found.valid & found.within)
+        assert np.any(found.valid & found.allowed)
         xyz, euler = pose_parts(condition.T)
         assert lab.answer("tool.pose", {"xyz": xyz.tolist(), "euler": euler.tolist()})["reached"]
     elif isinstance(condition, JointsAt):

@@ -200,7 +200,7 @@ def inside(lab, axis, length):
     """Return whether the arm can follow the target so far along an axis, m, within its limits."""
     steps = [pose(share * length * np.eye(3)[axis]) for share in np.linspace(0, 1, 7)]
     found = [lab.desk.arm.ik(lab._tool.T @ step) for step in steps]
-    return all(np.any(solutions.valid & solutions.within) for solutions in found)
+    return all(np.any(solutions.valid & solutions.allowed) for solutions in found)
 
 
 def at_target(lab):

@@ -149,7 +149,7 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "kinds": description.kinds,
         "convention": description.convention.value,
         "reach": description.reach,
-        "inverse_kinematics": arm.family,
+        "inverse_kinematics": str(arm.family),
         "branches": [] if fit is None else list(fit.branches),
         "gravity": numbers.gravity.tolist(),
         "parameters": numbers.values,

@@ -87,7 +87,7 @@ def run(
 ) -> int:
     """Print all solutions of fk(q) = T; return 0, or 1 where there is none."""
     found, method, note = _solved(arm, T, near, limits=limits, numeric=numeric)
-    counts = found.within if limits else found.valid
+    counts = found.allowed if limits else found.valid
     answer = Answer(
         arm=arm,
         T=T,
@@ -159,7 +159,7 @@ def _line(answer: Answer, k: int) -> tuple[str, ...]:
 
 def _limits(answer: Answer, k: int) -> str:
     """Return whether a branch is inside the limits, and which joints are not."""
-    if answer.found.within[k]:
+    if answer.found.allowed[k]:
         return "inside"
     numbers, q = answer.arm.description.numbers, answer.q[k]
     outside = np.flatnonzero((q < numbers.lower - LIMIT_SLACK) | (q > numbers.upper + LIMIT_SLACK))
@@ -168,7 +168,7 @@ def _limits(answer: Answer, k: int) -> str:
 
 def _summary(answer: Answer) -> str:
     found, nearest = answer.found, answer.nearest
-    reach, inside = int(np.sum(found.valid)), int(np.sum(found.within))
+    reach, inside = int(np.sum(found.valid)), int(np.sum(found.allowed))
     if answer.method == "closed form":
         text = f"{reach} of {len(found)} branches reach the pose, {inside} inside the limits"
     else:
@@ -185,14 +185,14 @@ def _facts(answer: Answer) -> dict[str, Any]:
         {
             "name": found.branches[k],
             "q": answer.q[k].tolist(),
-            "within_limits": bool(found.within[k]),
+            "within_limits": bool(found.allowed[k]),
             "flags": [flag.name for flag in FLAG_WORDS if found.flags[k] & flag],
         }
         for k in answer.shown
     ]
     return {
         "robot": answer.arm.name,
-        "inverse_kinematics": answer.arm.family,
+        "inverse_kinematics": str(answer.arm.family),
         "method": answer.method,
         "note": answer.note,
         "T": answer.T.tolist(),

@@ -108,7 +108,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
     q0 = joint_vector(description, q0, "q0")
     solutions = inverse_kinematics(description, poses, seed=q0)
-    usable = solutions.within if limits else solutions.valid
+    usable = solutions.allowed if limits else solutions.valid
     jump = JUMP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
@@ -118,7 +118,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
         if np.any(solutions.flags[k] & (IKFlag.wrist | IKFlag.shoulder)):
             # Where the wrist is straight, or its centre on axis 1, one joint is free: it keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
-            candidates, allowed = here.q, here.within if limits else here.valid
+            candidates, allowed = here.q, here.allowed if limits else here.valid
         chosen = _next(candidates, allowed, at, solutions, limits)
         if chosen is None:
             lost.append(k)

@@ -80,7 +80,7 @@ class IKSolutions:
         return names
 
     @property
-    def within(self) -> NDArray[np.bool_]:
+    def allowed(self) -> NDArray[np.bool_]:
         """Whether the branch reaches the pose and is inside the limits, shape (..., B)."""
         inside: NDArray[np.bool_] = self.valid & (self.flags & IKFlag.out_of_limits == 0)
         return inside
@@ -145,7 +145,7 @@ class IKSolutions:
             ``near`` does not fit.
         """
         at = self._near(near)[..., None, :]
-        return np.where(self.within[..., None], self.wound(self.q, at, limits=True), np.nan)
+        return np.where(self.allowed[..., None], self.wound(self.q, at, limits=True), np.nan)
 
     def wound(self, q: Array, near: Array, *, limits: bool) -> Array:
         """Return joint values (..., n) with the whole turns added that bring each angle nearest to ``near``.
@@ -185,7 +185,7 @@ class IKSolutions:
             Some pose has none: says which, and why.
         """
         at = self._near(near)
-        chosen = self._closest(self.within_limits(at), at, self.within)
+        chosen = self._closest(self.within_limits(at), at, self.allowed)
         missing = np.argwhere(np.isnan(chosen).any(axis=-1))
         if len(missing):
             raise UnreachableError(self._reason(tuple(int(k) for k in missing[0]), len(missing)))

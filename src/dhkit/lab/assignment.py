@@ -305,7 +305,7 @@ def _tool_at(arm: Arm, form: PoseForm, position: float, angle: float, place: str
     if decided:
         found = arm.ik(T)
         near = 0 < float(found.distance) <= position  # beyond the workspace by less than the tolerance
-        if not near and not bool(np.any(found.valid & found.within)):
+        if not near and not bool(np.any(found.valid & found.allowed)):
             beyond = "in reach only outside the joint limits" if np.any(found.valid) else "out of reach"
             raise DescriptionError(f"{place}{beyond}; expected a pose that the arm can take")
     return ToolAt(T, form.euler is not None, position, angle)

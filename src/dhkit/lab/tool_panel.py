@@ -163,7 +163,7 @@ class ToolPanel:
     def _branches(self, found: IKSolutions, numeric: bool) -> list[dict[str, Any]]:
         """Return the branches that reach the pose, angles by whole turns near the state on show."""
         q = found.q if numeric else found.within_limits(near=self.desk.q)
-        q, within = np.where(np.isfinite(q), q, found.q), np.atleast_1d(found.within)
+        q, within = np.where(np.isfinite(q), q, found.q), np.atleast_1d(found.allowed)
         return [
             {"name": name, "q": q[k].tolist(), "within": bool(within[k]), "chosen": False}
             for k, name in enumerate(found.branches)

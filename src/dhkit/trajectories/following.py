@@ -246,7 +246,7 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
     if fit is not None:
         solutions = inverse_kinematics(description, T)
         near = configuration(description, q0, "q0") if q0 is not None else _middle(description)
-        usable = solutions.q[solutions.within if q0 is None else solutions.valid]
+        usable = solutions.q[solutions.allowed if q0 is None else solutions.valid]
         yield from sorted(_wound(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
         return
     found = solve_numerically(description, T, q0, position_only=position_only)

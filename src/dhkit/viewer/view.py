@@ -81,8 +81,8 @@ class View:
         port: int = 0,
         token: str | None = None,
     ) -> None:
-        description = description_of(description)
-        self._description = description
+        self._description: Description = description_of(description)
+        description = self._description
         self._answer, self._port, self._token = answer, port, token
         self._server: ViewerServer | None = None
         self._widget: Any = None

@@ -31,12 +31,35 @@ NEARLY = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Classification:
-    """What the geometry of an arm's axes allows."""
+    """What the geometry of an arm's axes allows; prints as its words."""
 
     words: str
     """Such as ``6R, spherical wrist, axes 2 and 3 parallel: closed form, 8 branches``."""
     family: Family | None
+    """Arms that share its closed form; None where none is known."""
     fit: Fit | None
+    """Its numbers in that form."""
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether its inverse kinematics have a closed form of ours."""
+        return self.family is not None
+
+    @property
+    def name(self) -> str:
+        """The family's identifier, such as ``elbow_wrist``; empty where there is none."""
+        return "" if self.family is None else self.family.name
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """Labels of the branches, in the order of ``solutions.branches``."""
+        return () if self.fit is None else tuple(self.fit.branches)
+
+    def __str__(self) -> str:
+        return self.words
+
+    def __repr__(self) -> str:
+        return self.words
 
 
 @takes_robot
