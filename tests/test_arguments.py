@@ -129,3 +129,41 @@ def test_speeds_and_torques_have_no_names():
         arm.bias("ready", "ready")
     with pytest.raises(TypeError, match="tau: found 'ready'; expected numbers"):
         arm.forward_dynamics("ready", np.zeros(6), "ready")
+
+
+def test_methods_of_an_arm_have_signatures():
+    """A misspelt option is an error at the front door, and an editor shows what there is."""
+    free = [
+        name
+        for name, one in inspect.getmembers(Arm, inspect.isfunction)
+        if not name.startswith("_")
+        for argument in inspect.signature(one).parameters.values()
+        if argument.kind is argument.VAR_KEYWORD and name not in ("grade", "with_parameters")
+    ]
+    assert free == []
+
+
+@pytest.mark.parametrize(
+    ("method", "function"),
+    [
+        ("ik_numeric", kinematics.solve_numerically),
+        ("workspace", kinematics.workspace),
+        ("plan", planning.Planner.solve),
+        ("plan_path", planning.along_path),
+        ("compare", control.compare),
+        ("simulate", control.simulate),
+    ],
+)
+def test_a_method_has_the_options_and_defaults_of_its_function(method, function):
+    options, own = inspect.signature(function).parameters, inspect.signature(getattr(Arm, method)).parameters
+    for name, option in options.items():
+        if option.kind is option.KEYWORD_ONLY and name not in ("plant", "compare"):
+            assert own[name].default == option.default, name
+
+
+def test_a_rubric_decides_how_many_digits_count():
+    from dhkit.grading import Rubric
+
+    arm = Arm.load("planar2r")
+    loose, strict = (arm.grade(M22="0.333*m2*l2^2", rubric=Rubric(digits=digits)) for digits in (3, 5))
+    assert (loose.verdict.value, strict.verdict.value) == ("incomplete", "wrong")  # right, as far as it goes

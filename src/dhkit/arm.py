@@ -18,11 +18,12 @@ if TYPE_CHECKING:
     from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
     from dhkit.description import Body
     from dhkit.description.table import Quantity
-    from dhkit.grading import GradeReport
+    from dhkit.grading import GradeReport, Rubric
     from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
-    from dhkit.planning import Constraint, Distances, ObjectiveLike, Planner, Scene
+    from dhkit.planning import Constraint, Distances, ObjectiveLike, Payload, Planner, Scene
+    from dhkit.planning.solver import ProgressCall
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
@@ -320,11 +321,34 @@ class Arm:
 
         return inverse_kinematics_in_chunks(self._description, T, size, seed, threads)
 
-    def ik_numeric(self, T: ArrayLike, q0: ArrayLike | None = None, **options: Any) -> IKSolutions:
+    def ik_numeric(
+        self,
+        T: ArrayLike,
+        q0: ArrayLike | None = None,
+        *,
+        position_only: bool = False,
+        restarts: int = 63,
+        tolerance: float = 1e-12,
+        seed: int = 0,
+        limits: bool = True,
+        threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> IKSolutions:
         """Return one solution per pose by iteration, for any arm; see :func:`dhkit.kinematics.solve_numerically`."""
         from dhkit.kinematics import solve_numerically
 
-        return solve_numerically(self._description, T, q0, **options)
+        return solve_numerically(
+            self._description,
+            T,
+            q0,
+            position_only=position_only,
+            restarts=restarts,
+            tolerance=tolerance,
+            seed=seed,
+            limits=limits,
+            threads=threads,
+            progress=progress,
+        )
 
     def ik_path(self, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
         """Follow one branch along poses (N, 4, 4) from near q0; see :func:`dhkit.kinematics.follow_path`."""
@@ -345,11 +369,19 @@ class Arm:
 
         return manipulability(self._description, q, motion)
 
-    def workspace(self, samples: int = 100_000, seed: int = 0, **options: Any) -> Workspace:
+    def workspace(
+        self,
+        samples: int = 100_000,
+        seed: int = 0,
+        *,
+        edge: float | None = None,
+        threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Workspace:
         """Return where the tool can be, by random states; see :func:`dhkit.kinematics.workspace`."""
         from dhkit.kinematics import workspace
 
-        return workspace(self._description, samples, seed, **options)
+        return workspace(self._description, samples, seed, edge=edge, threads=threads, progress=progress)
 
     def singularities(self) -> Singularities:
         """Return where the arm is singular, in closed form; see :func:`dhkit.kinematics.singularities`."""
@@ -741,13 +773,23 @@ class Arm:
         constraints: Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
+        via: Sequence[ArrayLike | str] = (),
+        duration: float | None = None,
+        start_velocity: ArrayLike | None = None,
+        goal_velocity: ArrayLike | None = None,
+        limits: Limits | None = None,
+        payload: Payload | None = None,
+        obstacles: Scene = (),
+        clearance: float = 0.01,
+        self_collision: bool = False,
+        warm: Trajectory | None = None,
+        time_limit: float = 10.0,
+        progress: ProgressCall | None = None,
         compare: bool = True,
-        **options: Any,
     ) -> Trajectory:
         """Return the best motion between two configurations, or to a pose of the tool; its planners are kept.
 
-        See :meth:`dhkit.planning.Planner.solve` for the options: ``via``, ``duration``, ``limits``, ``payload``,
-        ``obstacles`` and others.
+        Arguments are those of :class:`dhkit.planning.Planner` and of its :meth:`~dhkit.planning.Planner.solve`.
 
         Examples
         --------
@@ -762,17 +804,54 @@ class Arm:
         planner = self._planners.get(key)
         if planner is None:
             planner = self._planners.setdefault(key, self.planner(key[0], None, constraints, intervals, friction))
-        return planner.solve(start, goal, compare=compare, **options)
+        return planner.solve(
+            start,
+            goal,
+            via=via,
+            duration=duration,
+            start_velocity=start_velocity,
+            goal_velocity=goal_velocity,
+            limits=limits,
+            payload=payload,
+            obstacles=obstacles,
+            clearance=clearance,
+            self_collision=self_collision,
+            warm=warm,
+            time_limit=time_limit,
+            progress=progress,
+            compare=compare,
+        )
 
     @cached_property
     def _planners(self) -> dict[object, Planner]:
         return {}
 
-    def plan_path(self, path: JointPath, objective: ObjectiveLike = "time", **options: Any) -> Trajectory:
+    def plan_path(
+        self,
+        path: JointPath,
+        objective: ObjectiveLike = "time",
+        *,
+        duration: float | None = None,
+        limits: Limits | None = None,
+        constraints: Sequence[Constraint] = (),
+        intervals: int = 200,
+        time_limit: float = 10.0,
+        progress: ProgressCall | None = None,
+    ) -> Trajectory:
         """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
         from dhkit.planning import along_path
 
-        return along_path(self._description, path, objective=objective, **options)
+        return along_path(
+            self._description,
+            path,
+            objective=objective,
+            duration=duration,
+            limits=limits,
+            constraints=constraints,
+            intervals=intervals,
+            time_limit=time_limit,
+            progress=progress,
+        )
 
     def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
         """Return how far the links are from obstacles, and from each other; see :func:`dhkit.planning.distance`."""
@@ -788,13 +867,14 @@ class Arm:
         *,
         names: Mapping[str, Any] | None = None,
         task: Mapping[str, Any] | None = None,
+        rubric: Rubric | None = None,
         seed: int | None = None,
         explain: bool = True,
         **quantities: Any,
     ) -> GradeReport:
         """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
 
-        Entries may be given one by one: ``M11=...``, ``g2=...``.
+        Entries may be given one by one: ``M11=...``, ``g2=...``; a rubric makes marks of the verdicts.
 
         Examples
         --------
@@ -805,7 +885,7 @@ class Arm:
         from dhkit.grading import grade_answers
 
         given = {**(answers or {}), **quantities}
-        return grade_answers(self._description, given, names, task, seed=seed, explain=explain)
+        return grade_answers(self._description, given, names, task, rubric, seed=seed, explain=explain)
 
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
         """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.
@@ -874,11 +954,11 @@ class Arm:
 
     # Showing
 
-    def view(self, **options: Any) -> View:
+    def view(self, *, frames: bool = False, port: int = 0, token: str | None = None) -> View:
         """Return a view of the arm for a browser; see :class:`dhkit.viewer.View`."""
         from dhkit.viewer import View
 
-        return View(self._description, **options)
+        return View(self._description, frames=frames, port=port, token=token)
 
     # Value semantics
 
