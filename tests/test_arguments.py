@@ -167,3 +167,17 @@ def test_a_rubric_decides_how_many_digits_count():
     arm = Arm.load("planar2r")
     loose, strict = (arm.grade(M22="0.333*m2*l2^2", rubric=Rubric(digits=digits)) for digits in (3, 5))
     assert (loose.verdict.value, strict.verdict.value) == ("incomplete", "wrong")  # right, as far as it goes
+
+
+def test_what_an_arm_returns_is_exported():
+    """A reader can write the type of everything that the front door gives."""
+    import re
+
+    returned = set()
+    for name, one in inspect.getmembers(Arm):
+        function = one.fget if isinstance(one, property) else getattr(one, "func", one)
+        if not name.startswith("_") and callable(function) and not inspect.isclass(function):
+            returned |= set(re.findall(r"[A-Z]\w+", str(inspect.signature(function).return_annotation)))
+    foreign = {"Array", "Iterator", "Mapping", "None", "Path", "PinocchioModel"}
+    assert returned - foreign <= set(dhkit.__all__)
+    assert all(hasattr(dhkit, name) for name in dhkit.__all__)

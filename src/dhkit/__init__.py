@@ -22,6 +22,8 @@ if TYPE_CHECKING:
         LQR,
         PID,
         Adaptive,
+        BatchResult,
+        Comparison,
         ComputedTorque,
         FeedForward,
         FrictionCompensation,
@@ -34,11 +36,12 @@ if TYPE_CHECKING:
         Step,
         ToolPoses,
     )
-    from dhkit.description import Description, pose, pose_parts, robots
+    from dhkit.description import Description, DHTable, pose, pose_parts, robots
     from dhkit.dynamics import Friction
     from dhkit.grading import GradeReport, grade
-    from dhkit.kinematics import IKFlag, IKSolutions, IKStatus
+    from dhkit.kinematics import Classification, IKFlag, IKPath, IKSolutions, IKStatus, Singularities, Workspace
     from dhkit.planning import (
+        Distances,
         Effort,
         Energy,
         Floor,
@@ -46,6 +49,7 @@ if TYPE_CHECKING:
         MotorPower,
         Obstacle,
         Payload,
+        Planner,
         Time,
         ToolAcceleration,
         ToolDirection,
@@ -53,8 +57,10 @@ if TYPE_CHECKING:
         ToolSpeed,
         TorqueSpeedLine,
     )
-    from dhkit.trajectories import Limits, Trajectory
-    from dhkit.viewer import plot
+    from dhkit.symbolic import BaseParameters, CasadiFunctions, Lagrangian
+    from dhkit.trajectories import JointPath, Limits, Trajectory
+    from dhkit.verification import VerificationReport
+    from dhkit.viewer import View, plot
 
 __version__ = "0.1.0"
 
@@ -64,10 +70,17 @@ __all__ = [
     "Adaptive",
     "AnswerError",
     "Arm",
+    "BaseParameters",
+    "BatchResult",
+    "CasadiFunctions",
+    "Classification",
+    "Comparison",
     "ComputedTorque",
+    "DHTable",
     "Description",
     "DescriptionError",
     "DhkitError",
+    "Distances",
     "Effort",
     "Energy",
     "ExpressionError",
@@ -77,9 +90,12 @@ __all__ = [
     "FrictionCompensation",
     "GradeReport",
     "IKFlag",
+    "IKPath",
     "IKSolutions",
     "IKStatus",
     "Jerk",
+    "JointPath",
+    "Lagrangian",
     "Limits",
     "ModelError",
     "MotorPower",
@@ -87,12 +103,14 @@ __all__ = [
     "OperationalSpace",
     "PDGravity",
     "Payload",
+    "Planner",
     "PlanningError",
     "Push",
     "Sensors",
     "SimulationError",
     "SimulationResult",
     "Sine",
+    "Singularities",
     "Step",
     "Time",
     "ToolAcceleration",
@@ -103,6 +121,9 @@ __all__ = [
     "TorqueSpeedLine",
     "Trajectory",
     "UnreachableError",
+    "VerificationReport",
+    "View",
+    "Workspace",
     "__version__",
     "grade",
     "plot",
@@ -130,12 +151,15 @@ __getattr__, __dir__ = lazy_names(
             "Sine",
             "Step",
             "ToolPoses",
+            "BatchResult",
+            "Comparison",
         ),
         "dhkit.description": (
             "Description",
             "pose",
             "pose_parts",
             "robots",
+            "DHTable",
         ),
         "dhkit.planning": (
             "Effort",
@@ -151,6 +175,8 @@ __getattr__, __dir__ = lazy_names(
             "ToolOrientation",
             "ToolSpeed",
             "TorqueSpeedLine",
+            "Distances",
+            "Planner",
         ),
         "dhkit.dynamics": ("Friction",),
         "dhkit.grading": (
@@ -161,12 +187,26 @@ __getattr__, __dir__ = lazy_names(
             "IKFlag",
             "IKSolutions",
             "IKStatus",
+            "Classification",
+            "IKPath",
+            "Singularities",
+            "Workspace",
         ),
         "dhkit.trajectories": (
             "Limits",
             "Trajectory",
+            "JointPath",
         ),
-        "dhkit.viewer": ("plot",),
+        "dhkit.symbolic": (
+            "BaseParameters",
+            "CasadiFunctions",
+            "Lagrangian",
+        ),
+        "dhkit.verification": ("VerificationReport",),
+        "dhkit.viewer": (
+            "plot",
+            "View",
+        ),
     },
     (
         "control",
@@ -175,7 +215,9 @@ __getattr__, __dir__ = lazy_names(
         "grading",
         "kinematics",
         "lab",
+        "model",
         "planning",
+        "programs",
         "symbolic",
         "trajectories",
         "verification",

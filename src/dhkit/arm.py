@@ -280,7 +280,11 @@ class Arm:
     def jacobian(
         self, q: ArrayLike, frame: ReferenceAxes = "world", out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return the tool's Jacobian, shape (..., 6, n): linear, then angular velocity, in ``frame``'s axes."""
+        """Return the tool's Jacobian, shape (..., 6, n): velocity of the tool's origin, then angular velocity.
+
+        ``frame="world"`` gives both in the world's axes (Pinocchio's LOCAL_WORLD_ALIGNED, not its WORLD), ``"tool"`` in
+        the tool's (Pinocchio's LOCAL).
+        """
         from dhkit.kinematics import jacobian
 
         return jacobian(self._description, q, frame, out, threads)
