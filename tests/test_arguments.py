@@ -23,9 +23,19 @@ from dhkit import (
 )
 from dhkit.viewer import View
 
-PACKAGES = (
-    "description kinematics dynamics symbolic verification trajectories planning control viewer model grading".split()
-)  # noqa: SIM905
+PACKAGES = [
+    "description",
+    "kinematics",
+    "dynamics",
+    "symbolic",
+    "verification",
+    "trajectories",
+    "planning",
+    "control",
+    "viewer",
+    "model",
+    "grading",
+]
 WITHIN = {"exact_arm", "joint_array", "joint_vector"}
 """Functions that look for themselves whether they were given an arm: they are called for every batch."""
 

@@ -87,7 +87,7 @@ def test_limits_names_and_files(tmp_path):
     assert len(files) > 1
     again = Arm.load(tmp_path / "puma.toml")
     assert np.array_equal(again.mass_matrix([0.1] * 6), arm.mass_matrix([0.1] * 6))
-    with pytest.raises(dhkit.DhkitError, match="ends in .toml"):
+    with pytest.raises(dhkit.DhkitError, match=r"ends in \.toml"):
         arm.save(tmp_path / "puma.yaml")
 
 

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
         ToolSpeed,
         TorqueSpeedLine,
     )
-    from dhkit.symbolic import BaseParameters, CasadiFunctions, Lagrangian
+    from dhkit.symbolic import BaseParameters, CasadiFunctions, Lagrangian, SymbolicKinematics
     from dhkit.trajectories import JointPath, Limits, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View, plot
@@ -112,6 +112,7 @@ __all__ = [
     "Sine",
     "Singularities",
     "Step",
+    "SymbolicKinematics",
     "Time",
     "ToolAcceleration",
     "ToolDirection",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dhkit.model.urdf_chain import Side
     from dhkit.planning import Constraint, Distances, ObjectiveLike, Payload, Planner, Scene
     from dhkit.planning.solver import ProgressCall
-    from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, Symbols
+    from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
@@ -905,6 +905,13 @@ class Arm:
     def lagrangian(self) -> Lagrangian:
         """Lagrange's equations in the file's parameters: exact M, C, g, tau, K and V."""
         return self.derive()
+
+    @cached_property
+    def symbolic(self) -> SymbolicKinematics:
+        """Kinematics to be read: exact ``A(1)`` ... ``A(n)``, ``T`` and ``J`` as text, LaTeX, sympy and code."""
+        from dhkit.symbolic import symbolic_kinematics
+
+        return symbolic_kinematics(self._description)
 
     def base_parameters(self) -> BaseParameters:
         """Return the fewest inertial parameters that decide the torques; see :func:`dhkit.symbolic.base_parameters`."""

@@ -12,7 +12,14 @@ from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
 from dhkit.description import Description, write_atomically
 from dhkit.errors import DescriptionError
-from dhkit.symbolic import Lagrangian, Symbols, base_parameters, lagrangian
+from dhkit.symbolic import (
+    Lagrangian,
+    SymbolicKinematics,
+    Symbols,
+    base_parameters,
+    lagrangian,
+    symbolic_kinematics,
+)
 from dhkit.symbolic.equations import (
     Quantity,
     equations_c,
@@ -20,6 +27,8 @@ from dhkit.symbolic.equations import (
     equations_matlab,
     equations_python,
     equations_text,
+    is_kinematic,
+    kinematic_quantities,
     latex_document,
     matlab_files,
     quantities,
@@ -30,7 +39,7 @@ __all__ = ["FORMATS", "lagrangian_of", "run"]
 
 LARGEST_TITLE = 200
 
-Printed = Callable[[Lagrangian, Sequence[Quantity]], str]
+Printed = Callable[[Any, Sequence[Quantity]], str]
 
 
 def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
@@ -49,12 +58,25 @@ def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrang
     return base_parameters(description).lagrangian if base else lagrangian(description, known[symbols])
 
 
+def _kinematics_of(description: Description, symbols: str, base: bool) -> SymbolicKinematics:
+    if base:
+        raise DescriptionError("--base-parameters: A, T and J have no inertial parameters")
+    if symbols not in ("none", "file"):
+        raise DescriptionError(f"--symbols: found {symbols!r}; expected none or file for A, T and J")
+    return symbolic_kinematics(description, "none" if symbols == "none" else "file")
+
+
 def run(arm: Arm, *, what: str, form: str, symbols: str, base: bool, output: Path | None, json: bool) -> None:
     """Print equations, or write them to a file."""
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
-    lag = lagrangian_of(arm.description, symbols, base)
-    listed = (quantities if form in ("python", "c", "matlab") else readable)(lag, what)
+    if is_kinematic(what):
+        kinematics = _kinematics_of(arm.description, symbols, base)
+        lag: Lagrangian | SymbolicKinematics = kinematics
+        listed = kinematic_quantities(kinematics, what)
+    else:
+        lag = derived = lagrangian_of(arm.description, symbols, base)
+        listed = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
     if output is not None:
         files = _written(lag, listed, form, output)
         if json:
@@ -69,7 +91,7 @@ def run(arm: Arm, *, what: str, form: str, symbols: str, base: bool, output: Pat
         sys.stdout.write(text)
 
 
-def _written(lag: Lagrangian, listed: Sequence[Quantity], form: str, output: Path) -> list[Path]:
+def _written(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity], form: str, output: Path) -> list[Path]:
     """Write a file, or for MATLAB a file a function into a folder; return their paths."""
     if output.suffix == ".toml":
         raise DescriptionError(f"{output}: equations would overwrite a robot file; expected another name")
@@ -88,12 +110,12 @@ def _written(lag: Lagrangian, listed: Sequence[Quantity], form: str, output: Pat
     return list(contents)
 
 
-def _text(lag: Lagrangian, listed: Sequence[Quantity]) -> str:
+def _text(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity]) -> str:
     notes = "".join(f"note: {note}\n" for note in lag.notes)
     return f"{equations_text(listed)}\n{notes}"
 
 
-def _latex(lag: Lagrangian, listed: Sequence[Quantity]) -> str:
+def _latex(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity]) -> str:
     return latex_document(equations_latex(listed), lag.description.name[:LARGEST_TITLE])
 
 
@@ -108,7 +130,7 @@ FORMATS: Mapping[str, Printed] = {
 """What equations can be printed as."""
 
 
-def _facts(lag: Lagrangian, listed: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
+def _facts(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
     return {
         "robot": lag.description.name,
         "what": [quantity.name for quantity in listed],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from dhkit.description import DHTable
 from dhkit.symbolic.equations import (
+    QUANTITIES,
     Quantity,
     constant_latex,
     constants_of,
@@ -21,6 +22,7 @@ from dhkit.symbolic.equations import (
 
 if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
+    from dhkit.symbolic.kinematics import SymbolicKinematics
 
 __all__ = ["equations_page", "mathml"]
 
@@ -40,6 +42,7 @@ UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m
     "ZZ": "kg m²",
 }
 """Of the symbols that we name ourselves, by their first letters."""
+PRODUCT = r"T = T_{\mathrm{base}}\, A_{1} A_{2} \cdots A_{n}\, T_{\mathrm{tool}}"
 LAW = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
 STYLE = """
 body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
@@ -72,13 +75,15 @@ def mathml(latex: str) -> str:
     )
 
 
-def equations_page(lag: Lagrangian, quantities: Sequence[Quantity]) -> str:
+def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
     """Return a page: the robot's table, quantities, what the constants are worth, and notes."""
     description = lag.description
+    moving = any(quantity.name in QUANTITIES for quantity in quantities)
+    subject = "equations of motion" if moving else "kinematics"
     body = [
-        f"<h1>{escape(description.name)}: equations of motion</h1>",
+        f"<h1>{escape(description.name)}: {subject}</h1>",
         f'<p class="source">{escape(description.source)}</p>' if description.source else "",
-        f'<div class="display">{mathml(LAW)}</div>',
+        f'<div class="display">{mathml(LAW if moving else PRODUCT)}</div>',
         "<h2>Denavit-Hartenberg table</h2>",
         DHTable.of(description)._repr_html_(),
         *_sections(quantities),
@@ -88,7 +93,7 @@ def equations_page(lag: Lagrangian, quantities: Sequence[Quantity]) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(description.name)}: equations of motion</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        f"<title>{escape(description.name)}: {subject}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
         + "\n".join(part for part in body if part)
         + "\n</body>\n</html>\n"
     )
@@ -103,7 +108,7 @@ def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
         yield f'<h2>Sines and cosines</h2>\n<div class="display">{mathml(latex)}</div>'
 
 
-def _constants(lag: Lagrangian, quantities: Sequence[Quantity]) -> Iterator[str]:
+def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> Iterator[str]:
     """Yield a table of the constants that occur, with their values."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     values = dict(lag.description.numbers.values) | lag.arm.parameters
@@ -120,7 +125,7 @@ def _constants(lag: Lagrangian, quantities: Sequence[Quantity]) -> Iterator[str]
     yield "</table>"
 
 
-def _unit(lag: Lagrangian, name: str) -> str:
+def _unit(lag: Lagrangian | SymbolicKinematics, name: str) -> str:
     """Return the unit of a symbol that we named; the file's own parameters are in SI units."""
     letters = re.match(r"Jm|Ia|M[XYZ]|[XYZ]{2}|[A-Za-z]", name)
     if lag.arm.symbols != "inertial" or name in lag.description.parameters or not letters:

@@ -624,7 +624,7 @@ def workspace(
 @app.command()
 def equations(
     robot: Robot,
-    what: Annotated[str, typer.Option(help="Any of M, C, h, g, tau, K, V.")] = "M,C,g",
+    what: Annotated[str, typer.Option(help="Any of M, C, h, g, tau, K, V; or of A (A1 ... An), T, J.")] = "M,C,g",
     form: Annotated[str, typer.Option("--format", help="text, latex, python, c, matlab or html.")] = "text",
     symbols: Annotated[
         str, typer.Option(help="none: numbers; file: the file's parameters; inertial: every inertial parameter.")

@@ -402,7 +402,7 @@ def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
 
 
 def _is_rounding(atom: Atom, value: Fraction) -> bool:
-    """Return whether a group's value is no more than what its terms leave when they cancel, as sin^2 + cos^2 - 1 does."""
+    """Return whether a group's value is no more than the rounding of its terms, as that of sin^2 + cos^2 - 1 is."""
     if atom.name != "group":
         return False
     terms = sum(abs(Expression((term,)).value()) for term in atom.arguments[0].terms)

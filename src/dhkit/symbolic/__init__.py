@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
     from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
     from dhkit.symbolic.exact.regressor import Regressor
+    from dhkit.symbolic.kinematics import SymbolicKinematics, SymbolicMatrix, symbolic_kinematics
     from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
     from dhkit.symbolic.programs.graph import Graph, Node, Variable
     from dhkit.symbolic.programs.operations import operation_count
@@ -68,6 +69,8 @@ __all__ = [
     "Regressor",
     "RingError",
     "Subject",
+    "SymbolicKinematics",
+    "SymbolicMatrix",
     "SymbolicTable",
     "Symbols",
     "TextbookDerivation",
@@ -99,6 +102,7 @@ __all__ = [
     "recursive_inverse_dynamics",
     "smooth_direction",
     "solve_for_acceleration",
+    "symbolic_kinematics",
     "table_pattern",
     "velocity_regressor",
 ]
@@ -164,6 +168,7 @@ __getattr__, __dir__ = lazy_names(
             "lagrangian",
         ),
         "dhkit.symbolic.exact.regressor": ("Regressor",),
+        "dhkit.symbolic.kinematics": ("SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"),
         "dhkit.symbolic.mistakes": (
             "MISTAKES",
             "MadeAt",

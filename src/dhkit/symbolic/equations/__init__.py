@@ -6,11 +6,20 @@ from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
 from dhkit.symbolic.equations.notation import constants_of, generators_of, renamings, symbols_of
 from dhkit.symbolic.equations.python_code import equations_python
-from dhkit.symbolic.equations.quantities import QUANTITIES, Quantity, quantities, readable
+from dhkit.symbolic.equations.quantities import (
+    KINEMATIC_QUANTITIES,
+    QUANTITIES,
+    Quantity,
+    is_kinematic,
+    kinematic_quantities,
+    quantities,
+    readable,
+)
 from dhkit.symbolic.equations.sympy_objects import equations_sympy, sympy_object
 from dhkit.symbolic.equations.text import equations_text, plain_text
 
 __all__ = [
+    "KINEMATIC_QUANTITIES",
     "QUANTITIES",
     "Quantity",
     "constant_latex",
@@ -23,6 +32,8 @@ __all__ = [
     "equations_sympy",
     "equations_text",
     "generators_of",
+    "is_kinematic",
+    "kinematic_quantities",
     "latex_document",
     "latex_lines",
     "latex_text",

@@ -37,7 +37,7 @@ FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2"
 ZEROS = 6
 """Entries in a line that says that they are zero."""
 HEADS = {"tau": r"\tau"}
-WHOLE = {"M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
+WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
 """Matrices and vectors with what they depend on, which also tells the vector g from the constant."""
 
 
@@ -169,7 +169,7 @@ def _matrix(quantity: Quantity) -> str:
     if sum(widths) + len(widths) + 6 > LINE:
         return ""
     body = " \\\\\n".join(" & ".join(row) for row in rows)
-    head = WHOLE.get(quantity.name) or HEADS[quantity.name]
+    head = WHOLE.get(quantity.name) or HEADS.get(quantity.name) or _head(quantity.name)
     return f"\\begin{{equation*}}\n{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}\n\\end{{equation*}}"
 
 
@@ -192,6 +192,8 @@ def _entries(quantity: Quantity) -> str:
 
 
 def _head(name: str) -> str:
+    if link := re.fullmatch(r"A(\d+)_(\d+)", name):
+        return rf"(A_{{{link[1]}}})_{{{link[2]}}}"
     letters, number = re.fullmatch(r"([A-Za-z]+)([\d_]*)", name).groups()  # type: ignore[union-attr]
     head = HEADS.get(letters, letters if len(letters) == 1 else rf"\mathit{{{letters}}}")
     return head + (f"_{{{number.replace('_', ',')}}}" if number else "")

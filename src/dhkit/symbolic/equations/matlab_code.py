@@ -11,13 +11,14 @@ from dhkit.symbolic.equations.quantities import Quantity
 
 if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
+    from dhkit.symbolic.kinematics import SymbolicKinematics
 
 __all__ = ["equations_matlab", "matlab_files"]
 
 MATLAB = Language(item="{array}({k})", offset=1, pi="pi", functions={})
 
 
-def matlab_files(lag: Lagrangian, quantities: Sequence[Quantity]) -> dict[str, str]:
+def matlab_files(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> dict[str, str]:
     """Return function files by name: ``NAME_M.m`` with ``M = NAME_M(q, p)``, and so on; vectors are columns.
 
     ``p`` is a structure of parameters, that of ``NAME_parameters.m`` unless given.
@@ -32,7 +33,7 @@ def matlab_files(lag: Lagrangian, quantities: Sequence[Quantity]) -> dict[str, s
     return files
 
 
-def equations_matlab(lag: Lagrangian, quantities: Sequence[Quantity]) -> str:
+def equations_matlab(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
     """Return all functions as one text, each after a comment with its file's name."""
     return "\n".join(f"% ---- {name}\n{text}" for name, text in matlab_files(lag, quantities).items())
 

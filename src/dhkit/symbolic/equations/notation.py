@@ -61,7 +61,10 @@ def variables(ring: Ring) -> set[str]:
 def entry_names(n: int) -> set[str]:
     """Return what the entries of all quantities of n joints are called: M12, g1, K."""
     vectors = {entry_name(name, (i,)) for name in ("h", "g", "tau") for i in range(n)}
-    return vectors | {entry_name(name, (i, j)) for name in "MC" for i in range(n) for j in range(n)} | {"K", "V"}
+    square = {entry_name(name, (i, j)) for name in "MC" for i in range(n) for j in range(n)}
+    kinematic = {entry_name("T", (i, j)) for i in range(4) for j in range(4)}
+    kinematic |= {entry_name("J", (i, j)) for i in range(6) for j in range(n)} | {f"A{i + 1}" for i in range(n)}
+    return vectors | square | kinematic | {"K", "V"}
 
 
 def entry_name(quantity: str, place: tuple[int, ...]) -> str:

@@ -23,11 +23,12 @@ from dhkit.symbolic.ring import Element, Generator
 
 if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
+    from dhkit.symbolic.kinematics import SymbolicKinematics
 
 __all__ = ["INPUTS", "Entry", "Function", "Language", "Parameter", "Program", "harmless", "identifier", "program"]
 
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
-"""What each quantity is a function of."""
+"""What each quantity is a function of; those of kinematics of q alone."""
 STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}
 WORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long
@@ -140,8 +141,14 @@ class Program:
     functions: tuple[Function, ...]
     notes: tuple[str, ...]
 
+    @property
+    def subject(self) -> str:
+        """What the functions are, in words."""
+        moving = any(function.quantity.name in INPUTS for function in self.functions)
+        return "Equations of motion" if moving else "Kinematics"
 
-def program(lag: Lagrangian, quantities: Sequence[Quantity], language: Language) -> Program:
+
+def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Language) -> Program:
     """Return quantities as functions in a language."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     values = dict(lag.description.numbers.values) | lag.arm.parameters
@@ -252,7 +259,7 @@ class _Code:
         used = {STATES[g.kind] for g in states} | ({"q"} if angles_of(generators) else set())
         return Function(
             quantity,
-            tuple(INPUTS[quantity.name].split()),
+            tuple(INPUTS.get(quantity.name, "q").split()),
             frozenset(used),
             tuple(listed),
             entries,

@@ -1,7 +1,8 @@
-"""What is printed: M, C, h, g, tau, K and V of a Lagrangian, entry by entry."""
+"""What is printed, entry by entry: M, C, h, g, tau, K and V of a Lagrangian; A1 ... An, T and J of kinematics."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,8 +15,19 @@ from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
+    from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = ["MOST_TERMS", "QUANTITIES", "Quantity", "check_length", "quantities", "readable"]
+__all__ = [
+    "KINEMATIC_QUANTITIES",
+    "MOST_TERMS",
+    "QUANTITIES",
+    "Quantity",
+    "check_length",
+    "is_kinematic",
+    "kinematic_quantities",
+    "quantities",
+    "readable",
+]
 
 QUANTITIES = {
     "M": "mass matrix",
@@ -27,6 +39,13 @@ QUANTITIES = {
     "V": "potential energy",
 }
 """What can be printed, with its name in words."""
+KINEMATIC_QUANTITIES = {
+    "A": "link transforms",
+    "T": "pose of the tool in the world",
+    "J": "Jacobian of the tool, in the world's axes",
+}
+"""The same of kinematics; A stands for A1 ... An."""
+LINK = re.compile(r"A([1-9][0-9]*)")
 MOST_TERMS = 2_000
 """Terms of an entry that people are asked to read."""
 
@@ -38,9 +57,9 @@ class Quantity:
     Attributes
     ----------
     name
-        One of :data:`QUANTITIES`, or ``definitions``.
+        One of :data:`QUANTITIES`, ``definitions``, A1 ... An, T or J.
     elements
-        Shape (n, n), (n,) or ().
+        Shape (n, n), (n,) or (); of kinematics (4, 4) or (6, n).
     labels
         What the entries of definitions are called.
     """
@@ -52,7 +71,9 @@ class Quantity:
     @property
     def title(self) -> str:
         """The quantity in words."""
-        return QUANTITIES.get(self.name, "base parameters")
+        if link := LINK.fullmatch(self.name):
+            return f"transform of link {link[1]}"
+        return (QUANTITIES | KINEMATIC_QUANTITIES).get(self.name, "base parameters")
 
     @property
     def is_symmetric(self) -> bool:
@@ -74,7 +95,10 @@ class Quantity:
 
     def head(self, place: tuple[int, ...]) -> str:
         """Return an entry's name."""
-        return self.labels[place[0]] if self.labels else entry_name(self.name, place)
+        if self.labels:
+            return self.labels[place[0]]
+        # A1_12, since A112 would be read as a number
+        return entry_name(f"{self.name}_" if LINK.fullmatch(self.name) else self.name, place)
 
 
 def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
@@ -92,6 +116,34 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     if unknown or not names:
         raise ValueError(f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}")
     return [Quantity(name, shortened(lag.arm, element_array(getattr(lag, name)))) for name in dict.fromkeys(names)]
+
+
+def kinematic_quantities(
+    kinematics: SymbolicKinematics, what: str | Sequence[str], *, shorten: bool = True
+) -> list[Quantity]:
+    """Return A1 ... An (A: all of them), T and J by name, in the angles that make each entry shortest.
+
+    Raises
+    ------
+    ValueError
+        No such quantity, or none at all.
+    """
+    listed = what.replace(",", " ").split() if isinstance(what, str) else list(what)
+    links = [f"A{i}" for i in range(1, kinematics.n + 1)]
+    names = [name for one in listed for name in (links if one == "A" else [one])]
+    unknown = [name for name in names if name not in (*links, "T", "J")]
+    if unknown or not names:
+        raise ValueError(
+            f"no quantity {unknown[0] if unknown else ''!r}; expected some of A, {links[0]} ... {links[-1]}, T, J"
+        )
+    found = {name: kinematics.elements(name) for name in dict.fromkeys(names)}
+    return [Quantity(name, shortened(kinematics.arm, x) if shorten else x) for name, x in found.items()]
+
+
+def is_kinematic(what: str | Sequence[str]) -> bool:
+    """Return whether all names are of kinematics: A, A1 ... An, T, J."""
+    names = what.replace(",", " ").split() if isinstance(what, str) else list(what)
+    return bool(names) and all(name in KINEMATIC_QUANTITIES or LINK.fullmatch(name) for name in names)
 
 
 def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:

@@ -1,0 +1,201 @@
+"""An arm's kinematics as exact matrices that can be read: A_1 ... A_n, the tool's pose T and its Jacobian J."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
+from dhkit.symbolic import equations
+from dhkit.symbolic.equations.notation import notation
+from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols
+from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
+
+__all__ = ["SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"]
+
+CODE = {
+    "python": equations.equations_python,
+    "c": equations.equations_c,
+    "matlab": equations.equations_matlab,
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SymbolicMatrix:
+    """A matrix of exact functions of the joint values: one of A1 ... An, T and J.
+
+    Attributes
+    ----------
+    name
+        A1 ... An, T or J.
+    elements
+        Its entries in the exact ring, shape (4, 4), of J (6, n).
+    kinematics
+        What it is a part of.
+    """
+
+    name: str
+    elements: Elements
+    kinematics: SymbolicKinematics
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.elements[place]
+
+    def evaluate(self, q: ArrayLike) -> Array:
+        """Return its numbers at joint values (..., n), shape (..., 4, 4) or (..., 6, n)."""
+        return self.kinematics.arm.evaluate(self.elements, q)
+
+    def text(self) -> str:
+        """Return it as text, entry by entry, in the angles that make each shortest."""
+        return self.kinematics.text(self.name)
+
+    def latex(self) -> str:
+        """Return it in LaTeX, for a page that loads amsmath."""
+        return self.kinematics.latex(self.name)
+
+    def sympy(self) -> Any:
+        """Return it as a ``sympy.Matrix`` in q1, q2 ... and the file's parameters."""
+        return self.kinematics.sympy(self.name)[self.name]
+
+    def code(self, language: str = "python") -> str:
+        """Return a function that computes it, in ``"python"``, ``"c"`` or ``"matlab"``."""
+        return self.kinematics.code(self.name, language)
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        return f"<{self.name} of {self.kinematics.description.name}, shape {self.elements.shape}>"
+
+    def _repr_latex_(self) -> str:
+        return self.latex()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SymbolicKinematics:
+    """An arm's forward kinematics and Jacobian in the exact ring; links need no bodies.
+
+    Attributes
+    ----------
+    description
+        The robot.
+    derivation
+        The derivation, step by step: link transforms by their four elementary motions, their product, the Jacobian's
+        columns by axes and levers.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> kinematics = symbolic_kinematics(library_robot("planar2r"))
+    >>> print(kinematics.T[0, 3])
+    l1*c1 + l2*c1*c2 - l2*s1*s2
+    >>> print(kinematics.A(1).sympy()[0, 3])
+    l1*cos(q1)
+    """
+
+    description: Description
+    derivation: TextbookKinematics
+    definitions = ()
+    """No symbols that stand for others."""
+
+    @property
+    def arm(self) -> ExactArm:
+        """The description in the ring."""
+        return self.derivation.arm
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return self.description.n
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which numbers are symbols because they cannot be written exactly."""
+        return self.arm.notes
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """The symbols as they are printed, and what they are worth, SI."""
+        names = notation(self.arm.ring).names
+        return {names.get(name, name): value for name, value in self.arm.parameters.items()}
+
+    def A(self, i: int) -> SymbolicMatrix:
+        """Return the transform of link i, from 1: frame i in frame i - 1, m.
+
+        Raises
+        ------
+        ValueError
+            No such link.
+        """
+        if i not in range(1, self.n + 1):
+            raise ValueError(f"A({i!r}): expected a link from 1 to {self.n}")
+        return self.matrix(f"A{i}")
+
+    @cached_property
+    def T(self) -> SymbolicMatrix:
+        """The tool in the world, base A_1 ... A_n tool, m."""
+        return self.matrix("T")
+
+    @cached_property
+    def J(self) -> SymbolicMatrix:
+        """The Jacobian: linear velocity of the tool's origin, then angular velocity, in the world's axes."""
+        return self.matrix("J")
+
+    def matrix(self, name: str) -> SymbolicMatrix:
+        """Return one of A1 ... An, T and J by its name."""
+        (quantity,) = equations.kinematic_quantities(self, [name], shorten=False)
+        return SymbolicMatrix(quantity.name, quantity.elements, self)
+
+    # Reading
+
+    def text(self, what: str | Sequence[str] = ("A", "T")) -> str:
+        """Return some of A (all links), A1 ... An, T and J as text."""
+        return equations.equations_text(equations.kinematic_quantities(self, what))
+
+    def latex(self, what: str | Sequence[str] = ("A", "T")) -> str:
+        """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath."""
+        return equations.equations_latex(equations.kinematic_quantities(self, what))
+
+    def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, Any]:
+        """Return sympy matrices by name, not simplified."""
+        return equations.equations_sympy(equations.kinematic_quantities(self, what))
+
+    def code(self, what: str | Sequence[str] = ("T", "J"), language: str = "python") -> str:
+        """Return functions that compute some of A, A1 ... An, T and J, in ``"python"``, ``"c"`` or ``"matlab"``.
+
+        Raises
+        ------
+        ValueError
+            Another language, or no such quantity.
+        """
+        if language not in CODE:
+            raise ValueError(f"language is {language!r}; expected one of {', '.join(CODE)}")
+        return CODE[language](self, equations.kinematic_quantities(self, what))
+
+    def __str__(self) -> str:
+        return self.text("A")
+
+    def __repr__(self) -> str:
+        return f"<SymbolicKinematics of {self.description.name}: A(1) ... A({self.n}), T, J>"
+
+    def elements(self, name: str) -> Elements:
+        """Return a quantity's entries by its name, as an array of elements."""
+        found = self.derivation.A[int(name[1:]) - 1] if name.startswith("A") else getattr(self.derivation, name)
+        entries = np.empty(found.shape, dtype=object)
+        zero = self.arm.ring.zero
+        for place, entry in np.ndenumerate(found):
+            entries[place] = entry if isinstance(entry, Element) else zero + entry
+        return entries
+
+
+@takes_robot
+def symbolic_kinematics(description: Description, symbols: Symbols = "file") -> SymbolicKinematics:
+    """Return an arm's exact kinematics; see :func:`dhkit.symbolic.exact_arm` for ``symbols``."""
+    return SymbolicKinematics(description, derive_kinematics(description, symbols=symbols))
