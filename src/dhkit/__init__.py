@@ -202,6 +202,7 @@ __getattr__, __dir__ = lazy_names(
             "BaseParameters",
             "CasadiFunctions",
             "Lagrangian",
+            "SymbolicKinematics",
         ),
         "dhkit.verification": ("VerificationReport",),
         "dhkit.viewer": (
