@@ -927,11 +927,11 @@ class Arm:
 
         return urdf_text(self._description)
 
-    def write_urdf(self, path: str | Path) -> tuple[Path, ...]:
-        """Write the URDF and, beside it, the meshes that it names; return the files."""
+    def write_urdf(self, path: str | Path, mesh_prefix: str | None = None) -> tuple[Path, ...]:
+        """Write the URDF and, beside it, the meshes that it names; see :func:`dhkit.model.write_urdf`."""
         from dhkit.model import write_urdf
 
-        return write_urdf(self._description, path)
+        return write_urdf(self._description, path, mesh_prefix)
 
     @property
     def model(self) -> PinocchioModel:

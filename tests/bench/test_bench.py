@@ -374,7 +374,7 @@ def test_the_command_prints_json_and_writes_both_files(capsys, tmp_path):
     [
         (["bench", "torque"], "no quantity 'torque'"),
         (["bench", "--robot", "no_such_robot"], "no_such_robot"),
-        (["bench", "fk", "-o", "no_such_folder/result"], "no such folder"),
+        (["bench", "fk", "-o", "/dev/null/result"], "/dev/null: a file; expected a folder"),
     ],
 )
 def test_the_command_refuses_in_one_line(capsys, arguments, complaint):

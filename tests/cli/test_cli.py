@@ -125,7 +125,7 @@ def test_the_schema_is_printed(dhkit):
         (["fk", "planar2r", "1/0", "1"], "division by zero"),
         (["verify", "ur5", "--samples", "0"], "Invalid value"),
         (["verify", "ur5", "--samples", "many"], "Invalid value"),
-        (["build", "ur5", "-o", "/nowhere/at/all.urdf"], "no such folder"),
+        (["build", "ur5", "-o", "/dev/null/all.urdf"], "/dev/null: a file; expected a folder"),
         (["schema", "cake"], "no schema 'cake'; expected robot or assignment"),
         (["demo", "--robot", "cake"], "no robot 'cake'"),
     ],

@@ -63,7 +63,7 @@ def test_matlab_writes_a_file_for_each_function(dhkit, tmp_path):
     names = ["planar2r_C.m", "planar2r_M.m", "planar2r_g.m", "planar2r_parameters.m"]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(json.loads(out)["files"]) == names
     status, _, err = dhkit("planar2r", "--format", "matlab", "--output", "file.m")
-    assert (status, err) == (2, "dhkit: file.m: no such folder; MATLAB wants a file for every function\n")
+    assert (status, err) == (2, "dhkit: file.m: expected a folder; MATLAB wants a file for every function\n")
 
 
 def test_machines_are_told(dhkit):
@@ -81,7 +81,7 @@ def test_machines_are_told(dhkit):
         (["--what", "M,X"], "no quantity 'X'; expected some of M, C, h, g, tau, K, V"),
         (["--format", "word"], f"--format: found 'word'; expected {', '.join(FORMATS)}"),
         (["--symbols", "all"], "--symbols: found 'all'; expected none, file, inertial"),
-        (["--output", "no/where.tex"], "no: no such folder"),
+        (["--output", "/dev/null/where.tex"], "/dev/null: a file; expected a folder"),
         (["--output", "."], ". is a folder; expected the name of a file"),
         (["--output", "robot.toml"], "robot.toml: equations would overwrite a robot file; expected another name"),
     ],

@@ -58,7 +58,7 @@ def test_unusable_input_ends_in_one_line(tmp_path, capsys):
         ["extract", str(tmp_path / "none.urdf")],
         ["extract", str(asset("urdf/ur5.urdf")), "--tip", "x"],
         ["extract", str(asset("urdf/ur5.urdf")), "-o", str(tmp_path / "x.yaml")],
-        ["extract", str(asset("urdf/ur5.urdf")), "-o", str(tmp_path / "none" / "x.toml")],
+        ["extract", str(asset("urdf/ur5.urdf")), "-o", "/dev/null/x.toml"],
         ["extract", str(asset("urdf/ur5.urdf")), "--package-dir", str(tmp_path / "none")],
         ["extract", "example:r2d2"],
         ["info", str(bad)],

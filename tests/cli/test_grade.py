@@ -155,7 +155,7 @@ def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
         ({"form": "pdf"}, "--format: found 'pdf'; expected text, json, gradescope, junit, html"),
         ({"feedback": "some"}, "--feedback: found 'some'; expected full, hint, verdict"),
         ({"output": "ada.toml"}, "would overwrite an answer sheet"),
-        ({"output": "none/report", "form": "html"}, "none: no such folder"),
+        ({"output": "/dev/null/report", "form": "html"}, "/dev/null: a file; expected a folder"),
         ({"output": "marks.csv"}, "expected a folder for the reports of several sheets"),
     ],
 )

@@ -48,7 +48,7 @@ def test_a_motion_is_a_gif_or_numbered_pictures(tmp_path, motion):
     ("arguments", "complaint"),
     [
         (("-o", "a.gif"), "ends in '.gif'; expected .png"),
-        (("-o", "no/a.png"), "no such folder"),
+        (("-o", "/dev/null/a.png"), "/dev/null: a file; expected a folder"),
         (("-o", "a.png", "--size", "big"), "expected width and height"),
         (("-o", "a.png", "--size", "9x9"), "expected 16 to 4000 px"),
         (("-o", "a.png", "--at", "up"), "has no configuration 'up'"),

@@ -271,7 +271,7 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
         ("planar2r --to 1 1 --line --floor -1", 2, "--line: found obstacles too"),
         ("planar2r --to 1 1 -o run.txt", 2, "run.txt: ends in '.txt'; expected .npz, .mat, .csv, .yaml"),
         ("planar2r --to 1 1 --figure run.xyz", 2, "run.xyz: ends in '.xyz'; expected .png"),
-        ("planar2r --to 1 1 --html /nowhere/run.html", 2, "/nowhere: no such folder"),
+        ("planar2r --to 1 1 --html /dev/null/run.html", 2, "/dev/null: a file; expected a folder"),
     ],
 )
 def test_what_cannot_be_is_said_in_one_line(arguments, status, complaint, plan):

@@ -185,7 +185,10 @@ BAD = {
     "a bandwidth of 0": (("simulate", "planar2r", "--bandwidth", "0"), "bandwidth is 0.0"),
     "noise in continuous time": (("simulate", "planar2r", "--continuous", "--noise", "1e-3"), "expected a rate in Hz"),
     "a result of another suffix": (("simulate", "planar2r", "-o", "run.txt"), "run.txt: ends in '.txt'; expected .npz"),
-    "a folder that is not there": (("simulate", "planar2r", "-o", "no/run.npz"), "no: no such folder"),
+    "a file for a folder": (
+        ("simulate", "planar2r", "-o", "/dev/null/run.npz"),
+        "/dev/null: a file; expected a folder",
+    ),
     "no such controllers": (("compare", "planar2r", "--controllers", "pid,x"), "controller is 'x'"),
     "no motion to play": (("play", "planar2r", "x.png"), "x.png: found suffix '.png'"),
     "no robot": (("simulate", "robbie"), "robbie"),

@@ -1,6 +1,7 @@
 """What the URDF says beyond frames and masses, and where it goes."""
 
 import math
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -122,9 +123,19 @@ def test_meshes_are_written_beside_the_urdf(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["meshes", "puma.urdf"]
 
 
-def test_a_folder_that_is_not_there_is_said(tmp_path):
-    with pytest.raises(ModelError, match="no such folder"):
-        write_urdf(library_robot("planar2r"), tmp_path / "none" / "arm.urdf")
+def test_folders_are_created_and_what_is_none_is_said(tmp_path):
+    (path,) = write_urdf(library_robot("planar2r"), tmp_path / "new" / "folder" / "arm.urdf")
+    assert path.is_file()
+    with pytest.raises(ModelError, match=r"Not a directory|File exists"):
+        write_urdf(library_robot("planar2r"), path / "arm.urdf")
+
+
+def test_meshes_may_be_named_as_ros_names_them(tmp_path):
+    files = write_urdf(library_robot("puma560"), tmp_path / "puma.urdf", mesh_prefix="package://my_robot/meshes/")
+    names = re.findall(r'filename="([^"]*)"', files[0].read_text())
+    assert names
+    assert all(name.startswith("package://my_robot/meshes/puma560/") for name in names)
+    assert all(file.is_file() for file in files)
 
 
 @pytest.mark.parametrize("name", ["meshes/../../../etc/passwd", "urdf/none.urdf", "src", "", "/etc/passwd"])

@@ -12,7 +12,7 @@ from dhkit.bench import BenchReport
 from dhkit.bench import run as run_bench
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
-from dhkit.errors import DescriptionError
+from dhkit.description.files import check_place
 
 __all__ = ["run", "write"]
 
@@ -33,8 +33,8 @@ def run(
     json: bool,
 ) -> int:
     """Run the benchmark and print its report; return 0, or 130 where Ctrl-C ended it early."""
-    if output is not None and not output.parent.is_dir():
-        raise DescriptionError(f"{output.parent}: no such folder")
+    if output is not None:
+        check_place(output)
     progress = _Progress()
     report = run_bench(arm, quantities, batch, threads, repeats, seed, progress.show, probes=probes)
     progress.clear()

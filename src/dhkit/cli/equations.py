@@ -11,6 +11,7 @@ from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.output import print_json, say
 from dhkit.description import Description, write_atomically
+from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import (
     Lagrangian,
@@ -96,14 +97,13 @@ def _written(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity], f
     if output.suffix == ".toml":
         raise DescriptionError(f"{output}: equations would overwrite a robot file; expected another name")
     if form == "matlab":
-        if not output.is_dir():
-            raise DescriptionError(f"{output}: no such folder; MATLAB wants a file for every function")
+        if output.suffix or (output.exists() and not output.is_dir()):
+            raise DescriptionError(f"{output}: expected a folder; MATLAB wants a file for every function")
         contents = {output / name: text for name, text in matlab_files(lag, listed).items()}
     else:
         if output.is_dir():
             raise DescriptionError(f"{output} is a folder; expected the name of a file")
-        if not output.parent.is_dir():
-            raise DescriptionError(f"{output.parent}: no such folder")
+        check_place(output)
         contents = {output: FORMATS[form](lag, listed)}
     for path, text in contents.items():
         write_atomically(path, text)

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
+from dhkit.description.files import check_place
 from dhkit.errors import AnswerError
 from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
@@ -69,8 +70,8 @@ def check_output(output: Path | None, form: str, several: bool) -> None:
     if _is_folder(output, form, several):
         if output.exists() or output.suffix:
             raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
-    elif not output.parent.is_dir():
-        raise AnswerError(f"{output.parent}: no such folder")
+    else:
+        check_place(output)
 
 
 def deliver(

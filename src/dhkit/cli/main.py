@@ -14,6 +14,7 @@ from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import print_json, say
+from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError, DhkitError
 
 __all__ = ["main"]
@@ -106,6 +107,9 @@ def info(robot: Robot, json: Json = False) -> None:
 def build(
     robot: Robot,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The URDF to write; ./NAME.urdf.")] = None,
+    mesh_prefix: Annotated[
+        str | None, typer.Option(help="What it names its meshes by, as package://my_robot/meshes/; meshes/.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Write a robot's URDF, with its meshes beside it."""
@@ -113,9 +117,8 @@ def build(
     path = output or Path(f"{arm.name}.urdf")
     if path.suffix == ".toml":
         raise DescriptionError(f"{path}: a URDF would overwrite a robot file; expected another name")
-    if not path.parent.is_dir():
-        raise DescriptionError(f"{path.parent}: no such folder")
-    files = arm.write_urdf(path)
+    check_place(path)
+    files = arm.write_urdf(path, mesh_prefix)
     if json:
         print_json({"files": [str(file) for file in files]})
     else:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dhkit.description import write_atomically
+from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 
 __all__ = ["FIGURES", "PAGES", "check_outputs", "write_figure"]
@@ -29,15 +30,14 @@ def check_outputs(outputs: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
     Raises
     ------
     DescriptionError
-        Another suffix, or no such folder.
+        Another suffix, or a place that cannot be written to.
     """
     for path, expected in outputs:
         if path is None:
             continue
         if path.suffix.lower() not in expected:
             raise DescriptionError(f"{path}: ends in {path.suffix!r}; expected {', '.join(expected)}")
-        if not path.parent.is_dir():
-            raise DescriptionError(f"{path.parent}: no such folder")
+        check_place(path)
 
 
 def write_figure(figure: Any, path: Path) -> Path:

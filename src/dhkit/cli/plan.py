@@ -85,7 +85,7 @@ class Files:
         Raises
         ------
         DescriptionError
-            Another suffix, or no such folder.
+            Another suffix, or a place that cannot be written to.
         """
         check_outputs(((self.motion, (*ARCHIVES, *TABLES)), (self.page, PAGES), (self.figure, FIGURES)))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["read_bounded", "write_atomically"]
+__all__ = ["check_place", "read_bounded", "write_atomically"]
 
 
 def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes:
@@ -32,8 +32,29 @@ def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes
     return content
 
 
+def check_place(path: Path) -> None:
+    """Refuse a path that no file can be written to, before long work is done for it.
+
+    Raises
+    ------
+    DescriptionError
+        A folder of the path is a file, or the nearest one that exists cannot be written to.
+    """
+    above = path.absolute().parent
+    try:
+        while not above.exists():
+            above = above.parent
+        usable = above.is_dir()
+    except OSError as error:
+        raise DescriptionError(f"{path}: {error.strerror}") from None
+    if not usable:
+        raise DescriptionError(f"{above}: a file; expected a folder")
+    if not os.access(above, os.W_OK | os.X_OK) and not path.exists():
+        raise DescriptionError(f"{above}: cannot be written to")
+
+
 def write_atomically(path: Path, content: str | bytes, *, private: bool = False) -> None:
-    """Write a file under a temporary name and rename it: it is there whole, or not at all.
+    """Write a file under a temporary name and rename it: it is there whole, or not at all; folders are created.
 
     With ``private`` nobody else may read or write it, whatever the umask. A link is followed, and what is no file, such
     as ``/dev/stdout`` or a named pipe, is written to as it is: a file in its place would be another thing.
@@ -46,8 +67,7 @@ def write_atomically(path: Path, content: str | bytes, *, private: bool = False)
     data = content.encode() if isinstance(content, str) else content
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))
-    if not path.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, "no such folder", str(path.parent))
+    path.parent.mkdir(parents=True, exist_ok=True)
     if not private:
         path = path.resolve()
         if path.exists() and not path.is_file():

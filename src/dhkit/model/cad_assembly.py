@@ -73,8 +73,7 @@ class CadImport:
             if target.exists() and (not target.is_dir() or any(target.iterdir())):
                 what = "is not empty" if target.is_dir() else "is not a folder"
                 raise ModelError(f"{target} {what}; expected a new folder")
-            if not target.absolute().parent.is_dir():
-                raise ModelError(f"{target.absolute().parent}: no such folder")
+            target.absolute().parent.mkdir(parents=True, exist_ok=True)
             # Written beside it under another name and renamed: a folder that is there is whole.
             with tempfile.TemporaryDirectory(dir=target.absolute().parent, prefix=f".{target.name}.") as holder:
                 made = Path(holder) / "made"

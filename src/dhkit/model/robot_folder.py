@@ -32,8 +32,6 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
     names = _copies(description)
     written = [path]
     try:
-        if not path.parent.is_dir():
-            raise ModelError(f"{path.parent}: no such folder")
         for source, name in names.items():
             copy = path.parent / name
             copy.parent.mkdir(parents=True, exist_ok=True)

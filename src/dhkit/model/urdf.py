@@ -100,8 +100,15 @@ def urdf_text(
 
 
 @takes_robot
-def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
+def write_urdf(description: Description, path: str | Path, mesh_prefix: str | None = None) -> tuple[Path, ...]:
     """Write a URDF, with the meshes that it names in ``meshes/`` beside it; return the files, the URDF first.
+
+    Parameters
+    ----------
+    path
+        The file; its folder is created.
+    mesh_prefix
+        What the URDF names its meshes by, in place of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
 
     Raises
     ------
@@ -110,8 +117,6 @@ def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     written = [path]
-    if not path.parent.is_dir():
-        raise ModelError(f"{path.parent}: no such folder")
     try:
         for part in link_parts(description):
             if isinstance(part.geometry, Mesh) and part.file is not None:
@@ -120,7 +125,8 @@ def write_urdf(description: Description, path: str | Path) -> tuple[Path, ...]:
                 if copy not in written:
                     write_atomically(copy, part.file.read_bytes())
                     written.append(copy)
-        write_atomically(path, urdf_text(description))
+        prefix = f"{MESHES}/" if mesh_prefix is None else mesh_prefix
+        write_atomically(path, urdf_text(description, lambda mesh: f"{prefix}{mesh}"))
     except OSError as error:
         raise ModelError(f"{error.filename or path}: {error.strerror}") from None
     return tuple(written)

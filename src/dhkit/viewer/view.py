@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 import webbrowser
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -113,10 +114,18 @@ class View:
         """
         return self._live().url
 
-    def open(self) -> str:
-        """Open the page in the default browser and return where it is."""
+    def open(self, *, block: bool = False) -> str:
+        """Open the page in the default browser and return where it is.
+
+        With ``block`` it returns when Ctrl-C is pressed: a script that ends takes its view along.
+        """
         url = self.url
         webbrowser.open(url)
+        try:
+            while block:
+                time.sleep(0.2)
+        except KeyboardInterrupt:
+            pass
         return url
 
     def show(self, q: ArrayLike) -> None:

@@ -187,8 +187,10 @@ def test_a_robot_file_takes_its_meshes_along(tmp_path):
     assert len(files) > 5
     assert again.mesh_folder == tmp_path
     assert all((tmp_path / shape.geometry.path).is_file() for one in again.joints for shape in one.shapes)
-    with pytest.raises(ModelError, match="no such folder"):
-        write_robot_with_meshes(puma, tmp_path / "none" / "puma.toml")
+    (tmp_path / "file").touch()
+    with pytest.raises(ModelError, match=r"Not a directory|File exists"):
+        write_robot_with_meshes(puma, tmp_path / "file" / "puma.toml")
+    assert write_robot_with_meshes(puma, tmp_path / "new" / "folder" / "puma.toml")[0].is_file()
 
 
 def test_without_pinocchio_the_tool_is_held_to_the_files_own_transforms(tree, monkeypatch):
