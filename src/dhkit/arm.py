@@ -75,7 +75,7 @@ class Arm:
             A URDF that is refused, or has no such chain, or several and no tip was given.
         """
         text = str(name)
-        if text.startswith("example:") or text.partition("#")[0].lower().endswith(".urdf"):
+        if text.startswith("example:") or text.lower().endswith(".urdf") or ".urdf#" in text.lower():
             return cls.from_urdf(name, base=base, tip=tip)
         if base is not None or tip is not None:
             raise DescriptionError(
@@ -108,11 +108,11 @@ class Arm:
         """
         from dhkit.model import extract_dh, urdf_source
 
-        path, own_base, own_tip = urdf_source(str(name))
+        path, own_base, own_tip = (name, None, None) if isinstance(name, Path) else urdf_source(name)
         extraction = extract_dh(
             path,
-            base or own_base,
-            tip or own_tip,
+            own_base if base is None else base,
+            own_tip if tip is None else tip,
             convention=convention,
             side=side,
             as_designed=as_designed,

@@ -15,7 +15,7 @@ from dhkit.errors import DescriptionError
 from dhkit.model import Extraction, example_chains, extract_dh, urdf_source
 from dhkit.model.robot_folder import write_robot_with_meshes
 
-__all__ = ["list_examples", "run"]
+__all__ = ["chain_words", "list_examples", "run"]
 
 AGREES = 1e-9
 """The largest difference from the file that counts as the same robot."""
@@ -42,11 +42,11 @@ def run(
     """
     if output is not None and output.suffix.lower() != ".toml":
         raise DescriptionError(f"{output}: expected a robot file that ends in .toml")
-    path, own_base, own_tip = urdf_source(name)
+    path, base, tip = chain_words(name, base, tip)
     extraction = extract_dh(
         path,
-        base or own_base,
-        tip or own_tip,
+        base,
+        tip,
         convention="modified" if modified else "standard",
         side="drop" if drop else "freeze",
         as_designed=as_designed,
@@ -59,7 +59,23 @@ def run(
         _show(extraction)
         if files:
             say(f"wrote {files[0]}" + (f" and {len(files) - 1} meshes" if len(files) > 1 else ""))
-    return 0 if extraction.changes or extraction.residual.largest <= AGREES else 1
+    size = max(1.0, extraction.description.reach)
+    return 0 if extraction.changes or extraction.residual.largest <= AGREES * size else 1
+
+
+def chain_words(name: str, base: str | None, tip: str | None) -> tuple[Path, str | None, str | None]:
+    """Return the file, base and tip that a name and its options stand for.
+
+    Raises
+    ------
+    DescriptionError
+        A link is given twice.
+    """
+    path, own_base, own_tip = urdf_source(name)
+    for what, option, own in (("base", base, own_base), ("tip", tip, own_tip)):
+        if option is not None and own is not None:
+            raise DescriptionError(f"{name}: --{what} {option}: found #{own} too; expected one of them")
+    return path, own_base if base is None else base, own_tip if tip is None else tip
 
 
 def list_examples(json: bool) -> None:

@@ -547,7 +547,7 @@ def verify(
     robot: Robot,
     samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
-    urdf: Annotated[Path | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
+    urdf: Annotated[str | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
     base: Annotated[str | None, typer.Option(help="Its link that is the world; the root.")] = None,
     tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the end of the only chain.")] = None,
     tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,

@@ -6,6 +6,7 @@ import json as jsons
 from pathlib import Path
 
 from dhkit.arm import Arm
+from dhkit.cli.extract import chain_words
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
@@ -19,7 +20,7 @@ def run(
     samples: int,
     seed: int,
     *,
-    urdf: Path | None,
+    urdf: str | None,
     base: str | None,
     tip: str | None,
     tolerance: float,
@@ -38,7 +39,8 @@ def run(
     if urdf is None:
         report = arm.verify(samples, seed)
     else:
-        report = verify_urdf(arm.description, urdf, tip, samples, seed, tolerance, base=base)
+        path, base, tip = chain_words(urdf, base, tip)
+        report = verify_urdf(arm.description, path, tip, samples, seed, tolerance, base=base)
     if output is not None:
         write_atomically(output, _text(report, output.suffix))
     if json:

@@ -49,6 +49,8 @@ class Description:
     """Joint vectors by name, rad and m."""
     source: str = ""
     notes: str = ""
+    drawn: bool = True
+    """Whether links and tools without shapes are drawn from the table, where other links have shapes."""
     units: Units = field(default=Units(), compare=False)
     """What :func:`dhkit.description.to_toml` writes numbers in."""
     mesh_folder: Path | None = field(default=None, compare=False)

@@ -103,6 +103,7 @@ class _Reader:
             configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
             source=form.source,
             notes=form.notes,
+            drawn=form.drawn,
             units=self.units,
             mesh_folder=self.mesh_folder,
         )

@@ -240,6 +240,7 @@ class RobotForm(Form):
     gravity: Triple = Field(default=[0, 0, Decimal("-9.81")])
     source: Text = ""
     notes: Text = ""
+    drawn: bool = True
     parameters: dict[str, Number] = Field(default={}, max_length=200)
     joint: list[JointForm] = Field(min_length=1, max_length=32)
     base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))

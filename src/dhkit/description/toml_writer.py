@@ -56,6 +56,8 @@ def to_toml(description: Description) -> str:
     for key in ("source", "notes"):
         if text := getattr(description, key):
             document[key] = text
+    if not description.drawn:
+        document["drawn"] = False
     if description.parameters:
         document["parameters"] = _table({name: _entry(value) for name, value in description.parameters.items()})
     joints = tomlkit.aot()

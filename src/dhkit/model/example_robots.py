@@ -85,14 +85,16 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
     """Return the file, base and tip that a name stands for.
 
     A name is a path, or ``example:`` and the name of an example robot; after it ``#TIP`` or ``#BASE..TIP`` may name
-    the links between which the chain lies.
+    the links between which the chain lies. A file that exists under the whole name is that file.
 
     Raises
     ------
     ModelError
         No such example robot.
     """
-    source, _, links = name.partition("#")
+    if not name.startswith(PREFIX) and Path(name).is_file():
+        return Path(name), None, None
+    source, _, links = name.rpartition("#") if "#" in name else (name, "", "")
     base, between, tip = links.partition("..")
     path = example_urdf(source.removeprefix(PREFIX)) if source.startswith(PREFIX) else Path(source)
     return (path, base or None, tip or None) if between else (path, None, links or None)

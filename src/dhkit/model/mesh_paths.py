@@ -33,11 +33,15 @@ class MeshFinder:
         Folders with packages in them.
     """
 
-    def __init__(self, urdf: Path, package_dirs: Sequence[str | Path] = ()) -> None:
+    def __init__(self, urdf: Path, package_dirs: str | Path | Sequence[str | Path] = ()) -> None:
         self.folder = urdf.resolve().parent
         self.packages = _packages_above(self.folder)
         self.root = self.packages[0][0] if self.packages else self.folder
-        self.package_dirs = [Path(folder).resolve() for folder in package_dirs]
+        given = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
+        try:
+            self.package_dirs = [Path(folder).resolve() for folder in given]
+        except (OSError, RuntimeError, ValueError, TypeError) as error:
+            raise ModelError(f"package_dirs: {error}") from None
         for folder in self.package_dirs:
             if not folder.is_dir():
                 raise ModelError(f"package_dirs: {folder} is no folder")
@@ -57,11 +61,15 @@ class MeshFinder:
         """
         if not uri.isprintable():
             raise ModelError(f"mesh {uri[:80]!r}: not a file name")
-        file = self._file(uri).resolve()
+        try:
+            file = self._file(uri).resolve()
+            is_file = file.is_file()
+        except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that no file can have
+            raise ModelError(f"mesh {uri[:120]!r} cannot be found") from None
         roots = [self.root, *self.package_dirs]
         if not any(file.is_relative_to(root) for root in roots):
             raise ModelError(f"mesh {uri[:120]!r} lies outside the robot's folder {self.root}")
-        if not file.is_file():
+        if not is_file:
             raise ModelError(f"mesh {uri[:120]!r} is not there")
         return file.relative_to(self.mesh_folder).as_posix()
 

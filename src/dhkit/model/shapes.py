@@ -84,7 +84,8 @@ def link_parts(description: Description) -> tuple[Part, ...]:
 
     A link with shapes in its description has those. Without, or with a mesh whose file is missing or unreadable, it
     is drawn from the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has
-    no tool and ends in a common normal, as planar arms do) and opens along its x.
+    no tool and ends in a common normal, as planar arms do) and opens along its x. A description that is not ``drawn``,
+    such as one from a URDF with its own shapes, gets none of that unless it has no shape at all.
 
     Examples
     --------
@@ -96,11 +97,15 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
     joints, base, tool = description.joints, description.base, description.tool
     parts: list[Part] = []
+    shown: list[Part] = []
     for i, shapes in enumerate((base.shapes, *(joint.shapes for joint in joints))):
         color = PALETTE[(i - 1) % len(PALETTE)] if i else BASE_COLOR
         given = _given(description, shapes, i, IDENTITY, color)
+        shown += given
         parts += given or _parts(i, arm.link(i), color)
     at_tool = _given(description, tool.shapes, n, T_last_tool, BASE_COLOR)
+    if shown and not description.drawn:
+        return (*shown, *at_tool)
     if not at_tool and (not given or not np.array_equal(T_last_tool, IDENTITY)):
         at_tool = [*_parts(n, arm.neck(), color), *_parts(n, arm.gripper(), BASE_COLOR)]
     return (*parts, *at_tool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,8 @@ BASE_FRAME, TIP_FRAME = "dhkit:base", "dhkit:tip"
 """Links that are added to Pinocchio's reading: links and joints of a URDF may share a name, these are found."""
 CONVENTIONAL_TIPS = ("tool", "tool0")
 """Names of tool frames: dhkit's own, and that of ROS-Industrial's robots (REP 199)."""
+MAX_NOTES = 50
+"""Notes of the reader that are listed; robot files hold 20,000 characters of them."""
 FAR = 1e3
 """rad or m: limits of joints that a URDF leaves unlimited; Pinocchio asks for numbers."""
 
@@ -140,18 +143,21 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
     if side not in ("freeze", "drop"):
         raise ModelError(f"side is {side!r}; expected 'freeze' or 'drop'")
     for what, link in (("base", base), ("tip", tip)):
+        if link is not None and not isinstance(link, str):
+            raise TypeError(f"{what} is {link!r}; expected the name of a link")
         if link is not None and link not in tree.links:
             raise ModelError(f"{tree.path}: {what}: no link {link[:60]!r}; it has {_listed(tree.links, 400)}")
     first = tree.root if base is None else base
     last = _only_tip(tree, first) if tip is None else tip
     way = tree.joints_to(last, first)
     if way is None:
-        raise ModelError(f"{tree.path}: link {first!r} is not between the root and link {last!r}")
+        hint = "; swap base and tip" if tree.joints_to(first, last) is not None else ""
+        raise ModelError(f"{tree.path}: base {first!r} is not on the way from the root to tip {last!r}{hint}")
     joints = tuple(joint for joint in way if joint.kind != "fixed")
     _check_moving(tree, joints, first, last)
     frozen = tuple(joint.name for joint in tree.joints.values() if joint.kind != "fixed" and joint not in joints)
     groups, dropped = _groups(tree, first, joints, side)
-    poses, to_base = tree.zero_poses(), None
+    poses = tree.zero_poses()
     to_base = np.linalg.inv(poses[first])
     return Chain(
         tree=tree,
@@ -201,16 +207,38 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
     tips = chain_tips(tree, base)
     longest = max(tips, key=len, default=())
     tip = tool_frame(tips[longest]) if tips else None
-    if len(tips) > 1 and (tip not in CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in tips)):
+    chains = {*tips, *_other_chains(tree, base)}
+    if len(chains) > 1 and (tip not in CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
         return None
     return tip
+
+
+def _other_chains(tree: UrdfTree, base: str) -> set[tuple[str, ...]]:
+    """Return the moving joints to leaves that :func:`chain_tips` leaves out: fingers that follow others."""
+    inner = {joint.parent for joint in tree.joints.values()}
+    ways = [tree.joints_to(link, base) for link in tree.links if link not in inner]
+    moving = (tuple(joint for joint in way or () if joint.kind != "fixed") for way in ways)
+    return {
+        tuple(joint.name for joint in joints) for joints in moving if any(joint.mimics is not None for joint in joints)
+    }
+
+
+def _branchings(tree: UrdfTree, base: str, chains: Collection[tuple[str, ...]]) -> dict[str, int]:
+    """Return the links on which chains part, with the number of joints before them."""
+    found: dict[str, int] = {}
+    for chain in chains:
+        for k in range(1, len(chain)):
+            others = {other[k] for other in chains if other[:k] == chain[:k] and len(other) > k}
+            if len(others) > 1:
+                found[tree.joints[chain[k]].parent] = k
+    return found
 
 
 def chain_model(chain: Chain) -> PinocchioModel:
     """Return a chain as a Pinocchio model of the original file; joint i of the chain is joint i of the model.
 
-    Other joints are fixed at zero; frames :data:`BASE_FRAME` and :data:`TIP_FRAME` are added. Its world is the URDF's
-    root, its gravity (0, 0, -9.81) there.
+    Other joints are fixed at zero; frames :data:`BASE_FRAME` and :data:`TIP_FRAME` are added. Its world is the chain's
+    base; gravity is (0, 0, -9.81) in the URDF's root.
 
     Raises
     ------
@@ -227,6 +255,12 @@ def chain_model(chain: Chain) -> PinocchioModel:
         raise ModelError(f"{chain.path}: Pinocchio refuses the URDF: {' '.join(str(error).split())[:200]}") from None
     if list(model.names[1:]) != list(chain.names):
         raise ModelError(f"{chain.path}: joints {', '.join(model.names[1:])}; expected {', '.join(chain.names)}")
+    root_in_base = pin.SE3(np.linalg.inv(chain.tree.zero_poses()[chain.base]))
+    model.jointPlacements[1] = root_in_base * model.jointPlacements[1]
+    for frame in model.frames:
+        if frame.parentJoint == 0:
+            frame.placement = root_in_base * frame.placement
+    model.gravity.linear = root_in_base.rotation @ model.gravity.linear
     return model
 
 
@@ -237,11 +271,14 @@ def _only_tip(tree: UrdfTree, base: str) -> str:
     tips = chain_tips(tree, base)
     if not tips:
         raise ModelError(f"{tree.path}: no moving joints below link {base!r} that do not follow others (mimic)")
-    if len(tips) == 1:
+    others = _other_chains(tree, base)
+    if len(tips) == 1 and not others:
         (leaves,) = tips.values()
         raise ModelError(f"{tree.path}: several frames end the chain: {_listed(leaves, 400)}; choose one (tip)")
-    ends = [f"{tool_frame(leaves) or leaves[0]} ({len(joints)} joints)" for joints, leaves in tips.items()]
-    raise ModelError(f"{tree.path}: {len(tips)} chains end at {_listed(ends, 600)}; choose one (tip)")
+    ends = {tool_frame(leaves) or leaves[0]: len(joints) for joints, leaves in tips.items()}
+    ends = _branchings(tree, base, {*tips, *others}) | ends
+    listed = [f"{link} ({count} joint{'s' * (count > 1)})" for link, count in ends.items()]
+    raise ModelError(f"{tree.path}: chains end at {_listed(listed, 600)}; choose one (tip)")
 
 
 def _check_moving(tree: UrdfTree, joints: Sequence[UrdfJoint], base: str, tip: str) -> None:
@@ -297,6 +334,8 @@ def _notes(
     concerned = {joint.name for joint in joints}
     kept = {link for group in groups for link in group}
     notes = [note for note in tree.warnings if _concerns(note, concerned, kept)]
+    if len(notes) > MAX_NOTES:
+        notes = [*notes[:MAX_NOTES], f"and {len(notes) - MAX_NOTES} more notes of this kind"]
     beside = [
         joint.name
         for joint in tree.joints.values()
@@ -307,6 +346,9 @@ def _notes(
     ]
     if beside and side == "freeze":
         notes.append(f"joints off the chain stand at zero, their links carried along: {_listed(beside, 300)}")
+    for joint in tree.joints.values():
+        if joint.mimics in concerned and joint.child in kept and joint.name not in concerned:
+            notes.append(f"joint {joint.name!r} follows {joint.mimics!r} in the file; here it stands at zero")
     if dropped:
         notes.append(f"links behind joints off the chain left out: {_listed(sorted(dropped), 300)}")
     if base != tree.root:
@@ -336,7 +378,7 @@ def _readable(chain: Chain) -> Element:
         if child_name(joint, "child") in dropped:
             robot.remove(joint)
         elif joint.get("name") in chain.names:
-            _make_movable(joint)
+            _make_movable(joint, chain.tree.joints[joint.get("name", "")].axis)
         else:
             joint.set("type", "fixed")
             for tag in ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"):
@@ -356,8 +398,13 @@ def _readable(chain: Chain) -> Element:
     return robot
 
 
-def _make_movable(joint: Element) -> None:
-    """Give a joint of the chain one entry in Pinocchio's configuration, and limits, which it demands."""
+def _make_movable(joint: Element, axis: Array) -> None:
+    """Give a joint of the chain one entry in Pinocchio's configuration, limits, which it demands, and a unit axis."""
+    given = joint.find("axis")
+    if given is not None and not math.isclose(
+        math.hypot(*map(float, given.get("xyz", "1 0 0").split())), 1, rel_tol=0.01
+    ):
+        given.set("xyz", " ".join(repr(float(x)) for x in axis))  # squares of long ones overflow in other readers
     if joint.get("type") == "continuous":
         joint.set("type", "revolute")
     for element in [*joint.findall("limit"), *joint.findall("safety_controller"), *joint.findall("calibration")]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +28,16 @@ MOVING = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
 SAME_LENGTH = 1e-6
 """Relative: an axis whose length differs more from 1 was hardly meant as a unit vector, and is said."""
-SMALL_RAD = 1e-5
-"""rad: 1.5708 misses a right angle by 3.7e-6, and so do the zeros that are computed from it."""
+SAME_TURN = 1e-4
+"""How far a quaternion's length may be from 1: it is normalised."""
+FAR = 1e6
+"""m: nothing that is to be seen is larger or farther away."""
+OWN = "dhkit:"
+"""Beginning of the names that dhkit adds for other readers."""
+LEAST_DIGITS = 3
+"""Significant digits of a decimal that is taken for a rounded multiple of 15 degrees."""
+DECIMALS = range(3, 10)
+"""Decimals of the rounded right angles whose misses are read as 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +238,7 @@ class _Reader:
             joints=joints,
             parent_joint={link: joints[name] for link, name in parents.items()},
             root=root,
-            warnings=tuple(self.warnings),
+            warnings=tuple(dict.fromkeys(self.warnings)),
             changes=tuple(self.changes),
         )
 
@@ -239,7 +249,7 @@ class _Reader:
         named: dict[str, Element] = {}
         for element in elements:
             name = element.get("name", "")
-            if not name or not name.isprintable():
+            if not name or not name.isprintable() or name.startswith(OWN):
                 raise ModelError(f"{self.path}: a {tag} has the name {name[:60]!r}; expected text")
             if name in named:
                 raise ModelError(f"{self.path}: two {tag}s have the name {name[:60]!r}")
@@ -249,7 +259,7 @@ class _Reader:
     def _parents(self, links: Mapping[str, Element], joints: Mapping[str, Element]) -> dict[str, str]:
         """Return each link's joint to its parent."""
         if not links:
-            raise ModelError(f"{self.path}: no links; expected a robot")
+            raise ModelError(f"{self.path}: no links; expected a robot (of a xacro file: what xacro makes of it)")
         parents: dict[str, str] = {}
         for name, joint in joints.items():
             child, parent = child_name(joint, "child"), child_name(joint, "parent")
@@ -290,6 +300,8 @@ class _Reader:
         damping, friction = (
             (numbers(where, dynamics, key, 1) or [0.0])[0] if moving else 0.0 for key in ("damping", "friction")
         )
+        if damping < 0 or friction < 0:
+            raise ModelError(f"{where}: damping {damping:g}, friction {friction:g}; expected none below 0")
         velocity, effort = (self._largest(name, joint, key) if moving else None for key in ("velocity", "effort"))
         return UrdfJoint(
             name=name,
@@ -301,15 +313,22 @@ class _Reader:
             limits=self._limits(name, joint) if moving else None,
             velocity=velocity,
             effort=effort,
-            damping=max(damping, 0.0),
-            friction=max(friction, 0.0),
+            damping=damping,
+            friction=friction,
             mimics=None if mimic is None else mimic.get("joint", ""),
         )
 
     def _origin(self, what: str, origin: Element | None) -> Array:
         """Return a pose from xyz and rpy; what is missing is 0."""
-        xyz = numbers(f"{self.path}: {what}", origin, "xyz", 3) or [0.0] * 3
-        rpy = numbers(f"{self.path}: {what}", origin, "rpy", 3) or [0.0] * 3
+        where = f"{self.path}: {what}"
+        xyz = numbers(where, origin, "xyz", 3) or [0.0] * 3
+        if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
+            if origin is not None and origin.get("rpy") is not None:
+                raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")
+            if abs(math.hypot(*quaternion) - 1) > SAME_TURN:
+                raise ModelError(f"{where}: <origin quat_xyzw>: found length {math.hypot(*quaternion):.4g}; expected 1")
+            return pose(xyz, quat=quaternion)
+        rpy = numbers(where, origin, "rpy", 3) or [0.0] * 3
         if self.as_designed and origin is not None and any(rpy):
             rpy = [
                 self._designed_angle(what, word, value)
@@ -324,15 +343,18 @@ class _Reader:
         return designed
 
     def _axis(self, name: str, joint: Element) -> Array:
-        axis = np.array(numbers(f"{self.path}: joint {name!r}", joint.find("axis"), "xyz", 3) or [1.0, 0.0, 0.0])
-        length = float(np.linalg.norm(axis))
-        if not length > 0 or not math.isfinite(length):
+        given = numbers(f"{self.path}: joint {name!r}", joint.find("axis"), "xyz", 3) or [1.0, 0.0, 0.0]
+        largest = max(map(abs, given))
+        if not largest > 0:
             raise ModelError(f"{self.path}: joint {name!r}: <axis xyz>: found 0 0 0; expected a direction")
-        if abs(length - 1) > SAME_LENGTH:
-            self.warnings.append(f"joint {name!r}: axis has length {length:.6g}; read as a direction")
+        axis = np.array(given) / largest  # first, since squares of 1e200 overflow
+        length = float(np.linalg.norm(axis))
+        if not 1 - SAME_LENGTH < length * largest < 1 + SAME_LENGTH:
+            self.warnings.append(f"joint {name!r}: axis has length {length * largest:.6g}; read as a direction")
         axis = axis / length
         nearest = np.round(axis)
-        if self.as_designed and 0 < np.abs(axis - nearest).max() < SMALL_RAD:
+        small = axis[nearest == 0]
+        if self.as_designed and small.any() and all(_is_rounding_of_zero(float(x)) for x in small):
             self.changes.append(f"joint {name!r}: axis read as {' '.join(f'{x:g}' for x in nearest)}")
             return np.asarray(nearest)
         return axis
@@ -354,7 +376,11 @@ class _Reader:
         return low, high
 
     def _largest(self, name: str, joint: Element, key: str) -> float | None:
-        found = numbers(f"{self.path}: joint {name!r}", joint.find("limit"), key, 1)
+        limit = joint.find("limit")
+        if limit is not None and limit.get(key, "").strip().lower() in ("inf", "+inf", "infinity"):
+            self.warnings.append(f"joint {name!r}: {key} {limit.get(key)}; read as unlimited")
+            return None
+        found = numbers(f"{self.path}: joint {name!r}", limit, key, 1)
         if found and found[0] < 0:
             raise ModelError(f"{self.path}: joint {name!r}: {key} is {found[0]:g}; expected none below 0")
         if found and found[0] == 0:
@@ -397,6 +423,8 @@ class _Reader:
             shape = None if geometry is None else self._geometry(what, geometry, T, color)
             if shape is None:
                 self.warnings.append(f"{what} has no geometry that dhkit knows; left out")
+            elif max(*map(abs, shape.sizes), np.abs(T[:3, 3]).max()) > FAR:
+                self.warnings.append(f"{what} is larger than {FAR:g} m or farther away; left out")
             else:
                 yield shape
 
@@ -433,20 +461,35 @@ class _Reader:
 
 
 def _rounded_from(word: str, value: float) -> float:
-    """Return the multiple of 15 degrees that a decimal rounds or cuts, or the value itself.
+    """Return the multiple of 15 degrees that a decimal of at least three digits rounds or cuts, or the value itself.
 
-    At least three digits must agree; 1.57 and 3.14 pass for right angles. What is below 1e-5 rad is taken for 0.
+    A miss of a rounded right angle, such as 3.6732e-06, is read as 0.
     """
-    if abs(value) < SMALL_RAD:
+    if _is_rounding_of_zero(value):
         return 0.0
     step = round(value * 12 / math.pi) * math.pi / 12
-    mantissa = word.lower().partition("e")[0]
-    digits = len(mantissa.partition(".")[2])
-    exponent = int(word.lower().partition("e")[2] or 0)
-    unit = 10.0 ** (exponent - digits)
-    right = math.isclose(step % (math.pi / 2), 0, abs_tol=1e-9) or math.isclose(step % (math.pi / 2), math.pi / 2)
-    coarsest = 0.011 if right else 1.1e-3
-    return step if abs(value - step) < min(unit, coarsest) or abs(value - step) < SMALL_RAD else value
+    number = Decimal(word)
+    digits, exponent = number.as_tuple().digits, number.as_tuple().exponent
+    if len(digits) < LEAST_DIGITS or not isinstance(exponent, int) or abs(step) > 2 * math.pi + 1e-9 or exponent > 0:
+        return value
+    unit = Decimal(1).scaleb(exponent)
+    exact = Decimal(step)
+    nearest = (exact.quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
+    return step if number in nearest and step else value
+
+
+def _is_rounding_of_zero(value: float) -> bool:
+    """Return whether a small number is what is left of a right angle that was rounded: 1.5708 - pi/2 = 3.67e-6."""
+    return abs(value) < 1e-12 or any(math.isclose(abs(value), miss, rel_tol=1e-3) for miss in _misses())
+
+
+@lru_cache(maxsize=1)
+def _misses() -> tuple[float, ...]:
+    """Return how far right angles are from their decimals, rounded and cut, rad."""
+    rights = [k * math.pi / 2 for k in range(1, 5)]
+    misses = {abs(round(right, k) - right) for right in rights for k in DECIMALS}
+    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in rights for k in DECIMALS}
+    return tuple(miss for miss in misses | cut if miss < 2e-4)
 
 
 def _listed(names: Sequence[str]) -> str:

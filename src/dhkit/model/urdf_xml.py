@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import stat
 from pathlib import Path
 from xml.etree import ElementTree
@@ -18,6 +19,7 @@ MAX_BYTES = 5_000_000
 MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 """A humanoid with hands has 5,000."""
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
 MAX_ATTRIBUTE = 1_000
 """Characters of a name, a path or a list of numbers."""
 
@@ -50,10 +52,19 @@ def parsed(path: Path) -> Element:
         _check_size(path, text)
         robot = ElementTree.fromstring(text.encode())  # noqa: S314 - no entities, bounded
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise ModelError(f"{path}: no XML: {error}") from None
+        raise ModelError(f"{path}: no XML: {error}{_hint(text, str(error))}") from None
     if robot.tag != "robot":
         raise ModelError(f"{path}: found <{robot.tag[:40]}>; expected <robot>")
     return robot
+
+
+def _hint(text: str, error: str) -> str:
+    """Say what usually causes an error of the XML parser."""
+    if "unbound prefix" in error:
+        declared = {"xml", *re.findall(r"xmlns:(\w+)", text)}
+        prefix = next((name for name in re.findall(r"</?(\w+):", text) if name not in declared), None)
+        return f"; no xmlns declares {prefix}:" if prefix else ""
+    return "; expected the output of xacro" if "xacro:" in text else ""
 
 
 def _check_size(path: Path, text: str) -> None:
@@ -94,13 +105,12 @@ def numbers(where: str, element: Element | None, key: str, count: int) -> list[f
     if element is None or text is None:
         return []
     values = []
-    for word in text.split():
-        try:
-            values.append(float(word) if "_" not in word else math.nan)
-        except ValueError:
-            values.append(math.nan)
-        if not math.isfinite(values[-1]):
-            raise ModelError(f"{where}: <{element.tag} {key}>: found {word[:40]!r}; expected a finite number")
+    for word in re.split(r"[ \t\r\n]+", text.strip(" \t\r\n")):
+        value = float(word) if NUMBER.fullmatch(word) else math.nan
+        if not math.isfinite(value):
+            hint = " (run xacro first)" if "${" in word else ""
+            raise ModelError(f"{where}: <{element.tag} {key}>: found {word[:40]!r}; expected a finite number{hint}")
+        values.append(value)
     if len(values) != count:
         raise ModelError(f"{where}: <{element.tag} {key}> has {len(values)} numbers; expected {count}")
     return values

@@ -76,8 +76,7 @@ def verify_urdf(
             f" {description.name}'s table; another tip may end another chain"
         )
     model = chain_model(chain)
-    R_root_base = chain.tree.zero_poses()[chain.base][:3, :3]
-    model.gravity.linear = R_root_base @ description.numbers.gravity
+    model.gravity.linear = np.array(description.numbers.gravity)
     model.armature = np.array(description.numbers.armature)
     motion = random_motions(description, samples, seed)
     reference = Reference(model, motion)

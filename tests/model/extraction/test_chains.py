@@ -130,7 +130,8 @@ def test_limits_friction_and_shapes_are_the_files(tree):
 
 def test_several_tips_are_listed_and_none_is_taken_in_silence(tree):
     with pytest.raises(
-        ModelError, match=r"chains end at thumb \(5 joints\), head \(2 joints\), camera \(3 joints\), left"
+        ModelError,
+        match=r"chains end at torso \(1 joint\), thumb \(5 joints\), head \(2 joints\), camera \(3 joints\), left",
     ):
         extract_dh(tree)
     with pytest.raises(ModelError, match=r"choose one \(tip\)"):
@@ -145,8 +146,10 @@ def test_several_tips_are_listed_and_none_is_taken_in_silence(tree):
 def test_wrong_links_are_said(tree):
     with pytest.raises(ModelError, match="tip: no link 'x'; it has pelvis, torso"):
         extract_dh(tree, tip="x")
-    with pytest.raises(ModelError, match="link 'head' is not between the root and link 'hand'"):
+    with pytest.raises(ModelError, match="base 'head' is not on the way from the root to tip 'hand'"):
         extract_dh(tree, "head", "hand")
+    with pytest.raises(ModelError, match="tip 'torso'; swap base and tip"):
+        extract_dh(tree, "hand", "torso")
     with pytest.raises(ModelError, match="no moving joints from link 'fore' to link 'camera'"):
         extract_dh(tree, "fore", "camera")
     with pytest.raises(ModelError, match="side is 'x'; expected 'freeze' or 'drop'"):

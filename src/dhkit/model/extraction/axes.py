@@ -29,10 +29,12 @@ OBLIQUE, STRAIGHT, NEGATIVE = 20.0, 2.0, 1.0
 """Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
 EARLY = 0.1
 """Extra cost of an offset d for each row that comes after it: parallel axes share one offset, the last takes it."""
+NEAR = 1e-9
+"""Distance from an axis at which a point counts as on it, of the arm's size."""
 ZERO = 1e-10
-"""m or rad: what is smaller counts as zero when tables are compared."""
-KEPT = 48
-"""Partial tables that are followed up, per axis."""
+"""Of the arm's size, or rad: what is smaller counts as zero when tables are compared."""
+KEPT = 336
+"""Partial tables that are followed up from axis to axis, over the number of joints: 48 of seven joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +49,12 @@ class Axes:
         Whether each joint is; shape (n,).
     T_base_tip
         The tip's pose, shape (4, 4).
-    named_points, named_directions
-        Points, m, and unit vectors of the URDF's own frames, from which free choices are taken; shape (k, 3).
+    frames
+        Unit vectors of the joints' frames, shape (n, 3, 3), one a row.
+    feet
+        Where skew neighbouring axes are nearest to each other, m, shape (k, 3).
+    normals
+        Directions of their common normals, shape (k, 3).
     parallel_below
         Sine of the largest angle between two neighbouring axes that are treated as parallel.
     """
@@ -57,14 +63,37 @@ class Axes:
     directions: Array
     prismatic: Sequence[bool]
     T_base_tip: Array
-    named_points: Array
-    named_directions: Array
+    frames: Array
+    feet: Array
+    normals: Array
     parallel_below: float = 1e-10
 
     @property
     def n(self) -> int:
         """The number of joints."""
         return len(self.points)
+
+    def heights(self, i: int, on_axis: Array) -> Array:
+        """Return points where a normal may begin on axis i (from 0), m, shape (k, 3): frames nearby, and feet."""
+        z = self.directions[i]
+        feet = (
+            self.feet[np.linalg.norm(np.cross(self.feet - on_axis, z), axis=1) < NEAR] if len(self.feet) else self.feet
+        )
+        return np.vstack(
+            [on_axis[None], self.points[max(i - 1, 0) : i + 3], np.zeros((1, 3)), self.T_base_tip[None, :3, 3], feet]
+        )
+
+    def lines(self, i: int, on_axis: Array | None) -> Array:
+        """Return points that the axis of a prismatic joint i (from 0) may go through, m, shape (k, 3)."""
+        own = self.points[i : i + 2]
+        before = own[:0] if on_axis is None else on_axis[None]
+        return _distinct(np.vstack([own, before, np.zeros((1, 3)), self.T_base_tip[None, :3, 3]]))
+
+    def crosswise(self, i: int, before: Array | None) -> Array:
+        """Return directions that a normal between coincident axes i and i + 1 may have, shape (k, 3)."""
+        nearby = self.frames[i : i + 3].reshape(-1, 3)
+        named = [np.eye(3), self.T_base_tip[:3, :3].T, nearby, self.normals]
+        return np.vstack(named if before is None else [before[None], *named])
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,16 +155,16 @@ def tidiest_normals(
     """
     first = _normals_after(axes, 0, axes.points[0], None)
     if axes.prismatic[0]:  # the first axis may lie anywhere parallel to itself
-        lines = _distinct(np.vstack([axes.points[:1], axes.named_points]))
-        first = [normal for point in lines for normal in _normals_after(axes, 0, point, None)]
+        first = [normal for point in axes.lines(0, None) for normal in _normals_after(axes, 0, point, None)]
     paths = []
     for normal in first:
         cost, start = begin(normal)
         row = length_costs(np.array([_along(normal)]))[0] + angle_costs(np.array([_bend(axes, 0, normal)]))[0]
         paths.append(Path((normal,), cost + float(row), start))
-    paths = _cheapest(paths)
+    kept = max(6, KEPT // axes.n)
+    paths = _cheapest(paths, kept)
     for i in range(1, axes.n - 1):
-        paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)])
+        paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)], kept)
     best: tuple[Path, Any] | None = None
     for path in paths:
         if best is not None and path.cost >= best[0].cost:
@@ -174,13 +203,15 @@ def _bend(axes: Axes, i: int, normal: Normal) -> float:
     return float(turn_about(normal.x, axes.directions[i], axes.directions[i + 1]))
 
 
-def _cheapest(paths: list[Path]) -> list[Path]:
+def _cheapest(paths: list[Path], kept: int) -> list[Path]:
     """Return the best paths, one for each last normal, cheapest first."""
     best: dict[tuple[float, ...], Path] = {}
     for path in sorted(paths, key=lambda one: one.cost):
         last = path.normals[-1]
         best.setdefault(tuple(np.round([*last.x, *last.end], 7).tolist()), path)
-    return list(best.values())[:KEPT]
+        if len(best) == kept:
+            break
+    return list(best.values())
 
 
 def _normals_after(axes: Axes, i: int, on_axis: Array, before: Array | None) -> list[Normal]:
@@ -194,9 +225,7 @@ def _normals_after(axes: Axes, i: int, on_axis: Array, before: Array | None) -> 
         The unit vector of the normal before, if there is one.
     """
     z, z_next = axes.directions[i], axes.directions[i + 1]
-    lines = axes.points[i + 1][None]
-    if axes.prismatic[i + 1]:
-        lines = _distinct(np.vstack([lines, on_axis[None], axes.named_points]))
+    lines = axes.lines(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
     normals = []
@@ -206,7 +235,7 @@ def _normals_after(axes: Axes, i: int, on_axis: Array, before: Array | None) -> 
             point = on_axis if axes.prismatic[i] else axes.points[i]
             normals += _skew(z, z_next, cross / sine, point, line)
         else:
-            normals += _parallel(axes, z, on_axis, line, before)
+            normals += _parallel(axes, i, on_axis, line, before)
     return normals
 
 
@@ -228,31 +257,25 @@ def _skew(z: Array, z_next: Array, x: Array, on_axis: Array, line: Array) -> lis
     return [Normal(sign * x, start, end) for sign in (1.0, -1.0)]
 
 
-def _parallel(axes: Axes, z: Array, on_axis: Array, line: Array, before: Array | None) -> list[Normal]:
+def _parallel(axes: Axes, i: int, on_axis: Array, line: Array, before: Array | None) -> list[Normal]:
     """Return normals between parallel axes, at named points' heights; of coincident ones in named directions."""
-    gap = line - on_axis
+    z, gap = axes.directions[i], line - on_axis
     gap = gap - (gap @ z) * z
     length = float(np.linalg.norm(gap))
     if length > ZERO:
         directions = np.array([gap / length, -gap / length])
     else:
         gap = np.zeros(3)
-        directions = _perpendicular(axes, z, before)
-    heights = np.unique(np.round(np.append((axes.named_points - on_axis) @ z, 0.0), 11))
-    heights = np.concatenate([[0.0], heights[np.abs(heights) > ZERO]])
-    exact = (axes.named_points - on_axis) @ z
-    normals = []
-    for height in heights:
-        # rounding is for telling heights apart, the height itself is taken as it is
-        near = exact[np.abs(exact - height) < 1e-10]
-        start = on_axis + (near[0] if height and len(near) else height) * z
-        normals += [Normal(x, start, start + gap) for x in directions]
-    return normals
+        directions = _perpendicular(axes.crosswise(i, before), z)
+    heights = (axes.heights(i, on_axis) - on_axis) @ z
+    heights[0] = 0.0
+    _, places = np.unique(np.round(heights, 10), return_index=True)
+    starts = [on_axis + heights[place] * z for place in np.sort(places)]
+    return [Normal(x, start, start + gap) for start in starts for x in directions]
 
 
-def _perpendicular(axes: Axes, z: Array, before: Array | None) -> Array:
-    """Return the named directions' parts perpendicular to an axis, each with its opposite; shape (k, 3)."""
-    named = axes.named_directions if before is None else np.vstack([before[None], axes.named_directions])
+def _perpendicular(named: Array, z: Array) -> Array:
+    """Return directions' parts perpendicular to an axis, each with its opposite; shape (k, 3)."""
     flat = named - (named @ z)[:, None] * z
     lengths = np.linalg.norm(flat, axis=1)
     flat = flat[lengths > 1e-3] / lengths[lengths > 1e-3, None]

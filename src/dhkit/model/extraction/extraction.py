@@ -30,8 +30,9 @@ from dhkit.description import (
     Tool,
     world_to_frames,
 )
+from dhkit.description.validation import MAX_JOINTS
 from dhkit.errors import DhkitError, ModelError
-from dhkit.expressions import ZERO, exact
+from dhkit.expressions import ZERO, Expression, exact
 from dhkit.model.extraction import numbers
 from dhkit.model.extraction.residual import Original, Residual
 from dhkit.model.extraction.table import Table, chain_axes, near_parallel, tidiest_table
@@ -53,6 +54,10 @@ MAX_SHAPES = 200
 LISTED = 5
 """Meshes that are left out are named one by one up to this many."""
 MAX_NAME = 64
+MAX_NOTES = 20_000
+"""Characters of notes that a robot file holds."""
+BEYOND = 1e-6
+"""Share of the arm's size by which no table may be off: tilts that doubles do not hold leave 3e-8."""
 SHOWN = 12
 """Decimals of where shapes stand, m and rad: they are only seen."""
 RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
@@ -121,7 +126,12 @@ def extract_dh(
     ModelError
         The file is refused, or has no such chain.
     """
+    known = [one.value for one in Convention]
+    if convention not in known:
+        raise ModelError(f"convention is {convention!r}; expected one of {', '.join(known)}")
     chain = read_chain(path, base, tip, side=side, as_designed=as_designed)
+    if chain.tree.changes:  # what is changed on request must not hide that the file is read wrongly
+        Original(read_chain(path, chain.base, chain.tip, side=side)).check_reading()
     return extracted(chain, convention=Convention(convention), package_dirs=package_dirs, name=name)
 
 
@@ -139,8 +149,12 @@ def extracted(
     ModelError
         The chain makes no description.
     """
+    if not 1 <= len(chain.joints) <= MAX_JOINTS:
+        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {MAX_JOINTS}")
     notes = [*chain.notes]
     original = Original(chain)
+    if not chain.tree.changes:
+        original.check_reading()
     meshes = MeshFinder(chain.path, package_dirs)
     shapes = _shapes(chain, meshes, notes)
     draft = _Draft(chain, convention, shapes, meshes.mesh_folder, name or _robot_name(chain), notes)
@@ -155,7 +169,7 @@ def extracted(
         notes.append(f"read as designed: {len(chain.tree.changes)} numbers; the file as written differs by {residual}")
     else:
         notes.append(f"differs from the file by {residual}")
-    description = replace(description, notes="\n".join(notes))
+    description = replace(description, notes="\n".join(notes)[:MAX_NOTES])
     return Extraction(description, residual, tuple(notes), chain.tree.changes, decimals)
 
 
@@ -206,7 +220,8 @@ class _Draft:
             ),
             gravity=numbers.vector(gravity, None if decimals is None else GRAVITY_DECIMALS),
             base=Base(numbers.placement(table.T_base_first, decimals)),
-            configurations=Named({"zero": (ZERO,) * len(chain.joints)}),
+            configurations=_configurations(chain),
+            drawn=not any(self.shapes),
             source=f"{chain.path.name}, link {chain.base} to link {chain.tip}",
             mesh_folder=self.mesh_folder,
         )
@@ -239,6 +254,16 @@ class _Draft:
         )
 
 
+def _configurations(chain: Chain) -> Named[tuple[Expression, ...]]:
+    """Return the zero configuration; ``middle`` of the limits where zero is outside them."""
+    limits = [joint.limits for joint in chain.joints]
+    outside = [limit for limit in limits if limit is not None and not limit[0] <= 0 <= limit[1]]
+    if not outside:
+        return Named({"zero": (ZERO,) * len(limits)})
+    middle = ((exact(limit[0]) + exact(limit[1])) / 2 if limit in outside and limit else ZERO for limit in limits)
+    return Named({"middle": tuple(middle)})
+
+
 def _best_table(chain: Chain, convention: Convention, draft: _Draft, original: Original, notes: list[str]) -> Table:
     """Return the tidiest table; of nearly parallel axes take the treatment that is nearer to the file."""
     poses = np.array([chain.zero_poses[joint.child] for joint in chain.joints])
@@ -254,10 +279,14 @@ def _best_table(chain: Chain, convention: Convention, draft: _Draft, original: O
     for _, sine in nearly:
         other = tidiest_table(replace(axes, parallel_below=2 * sine), convention)
         tried.append((original.residual(draft.description(other, None)).tool, 2 * sine, other))
-    error, below, table = min(tried, key=lambda one: one[0])
+    tried.sort(key=lambda one: one[0])
+    (error, below, table), *others = tried
+    beside = f"; otherwise {others[0][0]:.1e}" if others else ""
     for i, sine in nearly:
         taken = "as parallel" if sine <= below else "with their own common normal"
-        notes.append(f"axes {i} and {i + 1} are {sine:.2g} rad from parallel; taken {taken}: tool within {error:.1e}")
+        notes.append(
+            f"axes {i} and {i + 1} are {sine:.2g} rad from parallel; taken {taken}: tool within {error:.1e}{beside}"
+        )
     return table
 
 
@@ -266,9 +295,14 @@ def _rounded(draft: _Draft, table: Table, original: Original) -> tuple[Descripti
     kept = draft.description(table, None)
     unrounded = original.residual(kept)
     # what is read as designed, or has nearly parallel axes, is not that near: then rounding may add no more than that
+    if not original.chain.tree.changes and unrounded.tool > BEYOND * max(original.size, 1.0):
+        raise ModelError(f"no table within {BEYOND:g} of the file: the tool differs by {unrounded.tool:.2g}")
     most_tool, most = (
         bound + (seen if seen > bound else 0.0)
-        for bound, seen in ((AGREED_TOOL, unrounded.tool), (AGREED, unrounded.largest))
+        for bound, seen in (
+            (AGREED_TOOL * min(original.size, 1.0), unrounded.tool),
+            (AGREED * max(original.size, 1.0), unrounded.largest),
+        )
     )
     for decimals in numbers.ROUNDINGS[:-1]:
         description = draft.description(table, decimals)
@@ -350,7 +384,7 @@ def _group_shapes(
 
 def _without_folder(message: str, folder: Path) -> str:
     """Shorten paths: notes go into robot files, which others read."""
-    return message.replace(f"{folder}/", "").replace(str(folder), folder.name)
+    return message if folder == folder.parent else message.replace(f"{folder}/", "").replace(str(folder), folder.name)
 
 
 def _robot_name(chain: Chain) -> str:
@@ -367,8 +401,10 @@ def _joint_names(names: Sequence[str]) -> list[str]:
         plain = _plain(name, f"joint{number}")
         if RESERVED.fullmatch(plain):
             plain = f"{plain}_joint"
-        if plain in taken:
-            plain = f"{plain[: MAX_NAME - 4]}_{number}"
+        own, count = plain, 1
+        while plain in taken:
+            count += 1
+            plain = f"{own[: MAX_NAME - 4]}_{count}"
         taken.append(plain)
     return taken
 

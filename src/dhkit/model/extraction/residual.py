@@ -14,10 +14,12 @@ from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
 
 __all__ = ["Original", "Residual"]
 
-STATES = 40
+STATES = 100
 """Random states that a residual is taken over."""
 STROKE = 1.0
 """m: range of a prismatic joint without limits."""
+SAME_READING = 1e-9
+"""Share of the arm's size that our reading of the file and Pinocchio's may differ by."""
 SMALL_GRAVITY = 1e-6
 """Share of weight times reach that gravity torques are compared with at least: roundings are 1e-16 of that product."""
 
@@ -69,7 +71,24 @@ class Original:
                 raise
             self.model = None
         self.tool = np.array(list(self._tools()))
+        self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *(_lengths(chain)))
         self.M, self.g = _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
+
+    def check_reading(self) -> None:
+        """Refuse a file that Pinocchio reads as another robot than dhkit.
+
+        Raises
+        ------
+        ModelError
+            The tool is elsewhere: the file has something that one of both does not know.
+        """
+        own = np.array([self._product(q) for q in self.q])
+        apart = np.abs(own - self.tool)
+        apart[:, :3, 3] /= max(self.size, 1.0)
+        if apart.max() > SAME_READING:
+            raise ModelError(
+                f"{self.chain.path}: Pinocchio puts the tool {apart.max():.2g} away from where dhkit reads it"
+            )
 
     def residual(self, description: Description) -> Residual:
         """Return how far a description's tool, M and g are from the URDF's."""
@@ -118,13 +137,17 @@ class Original:
         return T
 
 
+def _lengths(chain: Chain) -> list[float]:
+    """Return the lengths of the chain's steps from joint to joint, m."""
+    return [float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in chain.joints]
+
+
 def _states(chain: Chain, count: int, seed: int) -> Array:
-    """Return the zero state and random ones inside the limits, shape (count, n), rad and m."""
+    """Return the zero state and random ones, shape (count, n), rad and m: whole turns, strokes inside the limits."""
     rng = np.random.default_rng(seed)
-    ends = []
-    for joint in chain.joints:
-        free = STROKE if joint.kind == "prismatic" else np.pi
-        ends.append(np.clip(joint.limits or (-free, free), -2 * free, 2 * free))
+    ends = [
+        (-np.pi, np.pi) if joint.kind != "prismatic" else joint.limits or (-STROKE, STROKE) for joint in chain.joints
+    ]
     low, high = np.array(ends).T
     q = rng.uniform(low, high, (count, len(ends)))
     q[0] = 0.0

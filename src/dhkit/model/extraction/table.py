@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,8 @@ from dhkit.model.extraction.ends import FirstRow, LastRow, Tip, first_row, frame
 
 __all__ = ["Table", "chain_axes", "near_parallel", "tidiest_table"]
 
+OBLIQUE = 1e-6
+"""Sine of the angle between axes whose common normal may serve other axes: that of others is far away."""
 NEAR = (1e-13, 1e-5)
 """Sine of the angle between two neighbouring axes: below, they are parallel; in between both tables are tried."""
 
@@ -48,7 +51,7 @@ class Table:
 def chain_axes(
     poses: Array, directions: Array, prismatic: list[bool], T_base_tip: Array, *, parallel_below: float = 1e-10
 ) -> Axes:
-    """Return the axes of joints in the base, with the points and directions that the URDF names.
+    """Return the axes of joints in the base, with the points and directions that free choices are taken from.
 
     Parameters
     ----------
@@ -64,28 +67,24 @@ def chain_axes(
         Sine of the largest angle between axes that are treated as parallel.
     """
     origins = poses[:, :3, 3]
-    axes = Axes(
+    feet: list[Array] = []
+    normals: list[Array] = []
+    for i in range(len(poses) - 1):
+        cross = np.cross(directions[i], directions[i + 1])
+        sine = float(np.linalg.norm(cross))
+        if sine > OBLIQUE:
+            feet += nearest_points(origins[i], directions[i], origins[i + 1], directions[i + 1])
+            normals.append(cross / sine)
+    return Axes(
         points=origins,
         directions=directions,
         prismatic=prismatic,
         T_base_tip=T_base_tip,
-        named_points=np.vstack([np.zeros((1, 3)), origins, T_base_tip[None, :3, 3]]),
-        named_directions=np.vstack([np.eye(3), *(pose[:3, :3].T for pose in poses), T_base_tip[:3, :3].T, directions]),
+        frames=np.swapaxes(poses[:, :3, :3], 1, 2),
+        feet=np.array(feet).reshape(-1, 3),
+        normals=np.array(normals).reshape(-1, 3),
         parallel_below=parallel_below,
     )
-    feet: list[Array] = []
-    normals: list[Array] = []
-    for i in range(axes.n - 1):
-        cross = np.cross(directions[i], directions[i + 1])
-        sine = float(np.linalg.norm(cross))
-        if sine <= 1e-6:
-            continue
-        feet += nearest_points(origins[i], directions[i], origins[i + 1], directions[i + 1])
-        normals.append(cross / sine)
-    near = [foot for foot in feet if np.abs(foot).max() < 1e3]
-    points = np.vstack([axes.named_points, *near]) if near else axes.named_points
-    turned = np.vstack([axes.named_directions, *normals]) if normals else axes.named_directions
-    return replace(axes, named_points=_first_of_each(points), named_directions=_first_of_each(_half(turned)))
 
 
 def near_parallel(axes: Axes) -> list[tuple[int, float]]:
@@ -96,6 +95,28 @@ def near_parallel(axes: Axes) -> list[tuple[int, float]]:
 
 def tidiest_table(axes: Axes, convention: Convention) -> Table:
     """Return the table with the fewest nonzero entries through these axes."""
+    extent = max(float(np.abs(axes.points).max()), float(np.abs(axes.T_base_tip[:3, 3]).max()))
+    # powers of two change no digit; what counts as zero is then a share of the arm's size
+    unit = 2.0 ** round(math.log2(extent)) if extent > 0 else 1.0
+    table = _tidiest(_scaled(axes, 1 / unit), convention)
+    rows, first = table.rows * [1.0, unit, unit, 1.0], _stretched(table.T_base_first, unit)
+    table = Table(convention, rows, first, np.eye(4))
+    return replace(table, T_last_tip=np.linalg.inv(table.frames()[-1]) @ axes.T_base_tip)
+
+
+def _scaled(axes: Axes, factor: float) -> Axes:
+    tip = _stretched(axes.T_base_tip, factor)
+    return replace(axes, points=axes.points * factor, feet=axes.feet * factor, T_base_tip=tip)
+
+
+def _stretched(T: Array, factor: float) -> Array:
+    stretched = T.copy()
+    stretched[:3, 3] *= factor
+    return stretched
+
+
+def _tidiest(axes: Axes, convention: Convention) -> Table:
+    """Return the table of an arm whose size is about 1; its tool is open."""
     z = axes.directions
     if axes.n == 1:
         path, start, end = _single(axes, convention)
@@ -111,8 +132,7 @@ def tidiest_table(axes: Axes, convention: Convention) -> Table:
     T = frame(first.x, z[0], first.start) @ np.linalg.inv(screw(2, start.theta, start.d))
     if convention is Convention.MODIFIED:
         T = T @ np.linalg.inv(screw(0, start.alpha, start.a))
-    table = Table(convention, rows, T, np.eye(4))
-    return replace(table, T_last_tip=np.linalg.inv(table.frames()[-1]) @ axes.T_base_tip)
+    return Table(convention, rows, T, np.eye(4))
 
 
 def _rows(axes: Axes, convention: Convention, normals: tuple[Normal, ...], start: FirstRow, end: LastRow) -> Array:
@@ -126,6 +146,8 @@ def _rows(axes: Axes, convention: Convention, normals: tuple[Normal, ...], start
     for i, normal in enumerate(inner, start=1):
         a = float((normal.end - normal.start) @ normal.x)
         across[i] = a, float(turn_about(normal.x, z[i - 1], z[i]))
+        if float(np.linalg.norm(np.cross(z[i - 1], z[i]))) <= axes.parallel_below:
+            across[i, 1] = 0.0 if z[i - 1] @ z[i] > 0 else np.pi
         if i > 1:
             before = normals[i - 2]
             along[i - 1] = (
@@ -140,11 +162,12 @@ def _single(axes: Axes, convention: Convention) -> tuple[Path, FirstRow, LastRow
     """Return the cheapest table of one joint: a normal of length zero at a named height in a named direction."""
     z = axes.directions[0]
     best: tuple[float, Path, FirstRow, LastRow] | None = None
-    flat = axes.named_directions - (axes.named_directions @ z)[:, None] * z
+    named = axes.crosswise(0, None)
+    flat = named - (named @ z)[:, None] * z
     lengths = np.linalg.norm(flat, axis=1)
     directions = flat[lengths > 1e-3] / lengths[lengths > 1e-3, None]
     for x in (*directions, *-directions):
-        for point in axes.named_points:
+        for point in axes.heights(0, axes.points[0]):
             at = point if axes.prismatic[0] else axes.points[0] + ((point - axes.points[0]) @ z) * z
             normal = Normal(x, at, at)
             begun, start = first_row(convention, normal, z)
@@ -155,16 +178,3 @@ def _single(axes: Axes, convention: Convention) -> tuple[Path, FirstRow, LastRow
         raise AssertionError("no table of one joint")
     _, path, start, end = best
     return path, start, replace(end, theta=start.theta, d=start.d)
-
-
-def _half(directions: Array) -> Array:
-    """Return unit vectors with the sign that makes their first nonzero coordinate positive: both signs are tried."""
-    rounded = np.round(directions, 9)
-    first = np.argmax(rounded != 0, axis=1)
-    signs = np.where(rounded[np.arange(len(rounded)), first] < 0, -1.0, 1.0)
-    return np.asarray(directions * signs[:, None])
-
-
-def _first_of_each(rows: Array) -> Array:
-    _, places = np.unique(np.round(rows, 9) + 0.0, axis=0, return_index=True)
-    return np.asarray(rows[np.sort(places)])
