@@ -138,3 +138,14 @@ def test_bad_input_is_one_line_and_status_2(dhkit, arguments, complaint, tmp_pat
     assert err.count("\n") == 1
     assert complaint in err
     assert not list(tmp_path.iterdir())
+
+
+def test_reach_is_the_tools_and_the_sum_of_lengths_has_its_own_name(capsys):
+    import json
+
+    for command in (["info", "puma560", "--json"], ["workspace", "puma560", "--samples", "2000", "--json"]):
+        with pytest.raises(SystemExit):
+            main(command)
+        facts = json.loads(capsys.readouterr().out.splitlines()[-1])
+        assert facts["reach_m"] == pytest.approx(0.88, abs=0.02)
+        assert facts["length_sum_m"] == pytest.approx(1.70578)

@@ -14,7 +14,7 @@ from dhkit.cli.output import print_json, print_table, say
 from dhkit.description import Description, Joint, pose_parts, robots
 from dhkit.description.parameters import resolved
 from dhkit.expressions import substitute
-from dhkit.kinematics import classify
+from dhkit.kinematics import classify, tool_reach
 
 __all__ = ["forward", "list_robots", "show"]
 
@@ -26,7 +26,7 @@ def list_robots(json: bool) -> None:
         keys = ("name", "n", "source")
         print_json([{key: getattr(arm, key) for key in keys} | {"kinds": arm.kinds} for arm in arms])
         return
-    rows = [(arm.name, arm.kinds, arm.convention.value, f"{arm.reach:.2f}", _first(arm.source)) for arm in arms]
+    rows = [(arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _first(arm.source)) for arm in arms]
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
 
 
@@ -36,7 +36,8 @@ def show(arm: Arm, json: bool) -> None:
         print_json(_facts(arm))
         return
     description, numbers = arm.description, arm.description.numbers
-    say(f"{arm.name}: {description.kinds}, {description.convention.value} DH, reach {description.reach:.4g} m", "bold")
+    reach = f"reach {tool_reach(description):.3g} m (tool from axis 1)"
+    say(f"{arm.name}: {description.kinds}, {description.convention.value} DH, {reach}", "bold")
     if description.source:
         say(f"source: {description.source}")
     say(f"\n{arm.dh}\n")
@@ -148,7 +149,8 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "n": arm.n,
         "kinds": description.kinds,
         "convention": description.convention.value,
-        "reach": description.reach,
+        "reach_m": tool_reach(description),
+        "length_sum_m": description.reach,
         "inverse_kinematics": str(arm.family),
         "branches": [] if fit is None else list(fit.branches),
         "gravity": numbers.gravity.tolist(),

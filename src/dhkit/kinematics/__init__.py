@@ -28,7 +28,7 @@ from dhkit.kinematics.singularities import (
     singularities,
 )
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
-from dhkit.kinematics.workspace import Estimate, Grid, Workspace, workspace
+from dhkit.kinematics.workspace import Estimate, Grid, Workspace, tool_reach, workspace
 
 __all__ = [
     "Boundary",
@@ -66,6 +66,7 @@ __all__ = [
     "singular_values",
     "singularities",
     "solve_numerically",
+    "tool_reach",
     "velocity_ellipsoid",
     "workspace",
 ]

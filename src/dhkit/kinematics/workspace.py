@@ -14,8 +14,9 @@ from dhkit.description.robot import takes_robot
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
 
-__all__ = ["Estimate", "Grid", "Progress", "Workspace", "first_axis", "occupancy", "workspace"]
+__all__ = ["Estimate", "Grid", "Progress", "Workspace", "first_axis", "occupancy", "tool_reach", "workspace"]
 
+STATES_FOR_REACH = 5_000
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with how many samples are done and how many there will be."""
 
@@ -133,6 +134,15 @@ class Workspace:
         if self.grid is None or self.grid.counts.ndim > self.freedoms:
             return None
         return self.grid.estimate
+
+
+@takes_robot
+def tool_reach(description: Description) -> float:
+    """Return the tool's greatest distance from the first joint's axis inside the limits, m, over 5,000 random states.
+
+    ``description.reach`` is an upper bound of another distance: the sum of all lengths.
+    """
+    return float(workspace(description, STATES_FOR_REACH).radii[1])
 
 
 @takes_robot
