@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import dhkit
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
 from dhkit.viewer import plot, plot_arm, plot_motion
 from dhkit.viewer.scene import first_configuration
@@ -76,3 +77,15 @@ def test_a_figure_needs_no_display():
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
     assert done.stdout.strip() == "False"
+
+
+def test_a_figure_shows_itself_in_a_notebook_and_an_arm_at_joint_values():
+    arm = dhkit.Arm.load("puma560")
+    figure = dhkit.plot(arm, q="nominal")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert dhkit.plot(arm, q=arm.configurations["nominal"])._repr_png_() == figure._repr_png_()
+    assert dhkit.plot(arm)._repr_png_() != figure._repr_png_()
+    with pytest.raises(ValueError, match="puma560 has no configuration 'up'"):
+        dhkit.plot(arm, q="up")
+    with pytest.raises(TypeError, match="unexpected keyword argument 'q'"):
+        dhkit.plot(arm.quintic("zero", "nominal", 1.0), q="zero")

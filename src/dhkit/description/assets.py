@@ -54,6 +54,10 @@ def inside(folder: Path | None, path: str, where: str) -> Path | None:
     if folder is None:
         return None
     file = folder / parts
-    if not file.resolve().is_relative_to(folder.resolve()):
+    try:
+        leaves = not file.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # a loop of links, or a name that no file can have
+        raise DescriptionError(f"{where}.mesh is {path[:80]!r}, which cannot be found") from None
+    if leaves:
         raise DescriptionError(f"{where}.mesh is {path[:80]!r}, a link that leaves the robot's folder")
     return file

@@ -13,6 +13,7 @@ from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
 from dhkit.description.numbers import Array
 from dhkit.description.robot import takes_robot
 from dhkit.viewer.motion import check_motion
+from dhkit.viewer.notebook_figure import new_figure
 from dhkit.viewer.scene import first_configuration, frame_labels, scene_size
 
 if TYPE_CHECKING:
@@ -37,8 +38,11 @@ ZOOM = 0.86
 
 
 @singledispatch
-def plot(value: object) -> Figure:
-    """Return a figure of a value: an arm, or its description, is drawn in its ``ready`` configuration, or at zero.
+def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
+    """Return a figure of a value; a notebook shows it.
+
+    An arm, or its description, is drawn at joint values ``q``, shape (n,) or a configuration's name; in its ``ready``
+    configuration, or at zero, unless given. Other values take no ``q``.
 
     Raises
     ------
@@ -53,14 +57,14 @@ def plot(value: object) -> Figure:
     """
     description = getattr(value, "description", None)  # an Arm, which this folder does not know
     if isinstance(description, Description):
-        return plot(description)
+        return plot(description, q=q)
     known = sorted(kind.__name__ for kind in plot.registry if kind is not object)
     raise TypeError(f"no figure of {type(value).__name__}; expected one of {', '.join(known)}")
 
 
 @plot.register(Description)
-def _(value: Description) -> Figure:
-    return plot_arm(value, first_configuration(value))
+def _(value: Description, *, q: ArrayLike | None = None) -> Figure:
+    return plot_arm(value, first_configuration(value) if q is None else q)
 
 
 @takes_robot
@@ -79,12 +83,10 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     ValueError
         Another shape.
     """
-    from matplotlib.figure import Figure
-
     q = joint_array(description, q)
     if q.ndim != 1:
         raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
-    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
     axes = space(figure, 111)
     frames = world_to_frames(description, q)
     tool = world_to_tool(description, q)
@@ -114,13 +116,11 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
     ValueError
         Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
     """
-    from matplotlib.figure import Figure
-
     times, q = check_motion(description, times, q)
     prismatic = description.numbers.prismatic
     kinds = [(~prismatic, 180 / np.pi, "angle [deg]"), (prismatic, 1.0, "offset [m]")]
     kinds = [kind for kind in kinds if kind[0].any()]
-    figure = Figure(figsize=(11, 4.8), layout="constrained")
+    figure = new_figure(figsize=(11, 4.8), layout="constrained")
     figure.suptitle(description.name, fontsize=13, fontweight="bold")
     grid = figure.add_gridspec(len(kinds), 2, width_ratios=(1.25, 1))
     for row, (chosen, unit, label) in enumerate(kinds):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dhkit.control import Comparison, SimulationResult
 from dhkit.description import Array, Description
 from dhkit.viewer.figures import PATH_COLOR, plot
+from dhkit.viewer.notebook_figure import new_figure
 from dhkit.viewer.panels import (
     LIMIT_STYLE,
     SHARED_COLOR,
@@ -75,11 +76,9 @@ def plot_simulation(result: SimulationResult) -> Figure:
     result
         The simulation.
     """
-    from matplotlib.figure import Figure
-
     description, kinds = result.description, kinds_of_joints(result.description)
     rows = len(kinds) + 1
-    figure = Figure(figsize=(11.5, 1.6 + 2.2 * rows), layout="constrained")
+    figure = new_figure(figsize=(11.5, 1.6 + 2.2 * rows), layout="constrained")
     under = f"{result.controller}, " if result.controller else ""
     figure.suptitle(f"{description.name}: {under}{result.t[-1]:.3g} s simulated", fontsize=13, fontweight="bold")
     grid = figure.subplots(rows, 2, sharex=True, squeeze=False)
@@ -110,7 +109,6 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     ValueError
         No result, or arms with other joints.
     """
-    from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     if not results:
@@ -120,7 +118,7 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
         if result.description.kinds != first.kinds:
             raise ValueError(f"{name} has joints {result.description.kinds}; expected {first.kinds}")
     layout = ConstrainedLayoutEngine(w_pad=BETWEEN)
-    figure = Figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
+    figure = new_figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
     text = title or f"{first.name}: errors of {len(results)} controllers"
     figure.suptitle(text, fontsize=13, fontweight="bold")
     curves, bars = figure.subplots(1, 2, width_ratios=(1.5, 1))

@@ -9,6 +9,7 @@ import numpy as np
 
 from dhkit.trajectories import Samples, Trajectory
 from dhkit.viewer.figures import draw_path, plot, space
+from dhkit.viewer.notebook_figure import new_figure
 from dhkit.viewer.panels import (
     LIMIT_STYLE,
     SHARED_COLOR,
@@ -47,12 +48,10 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
     trajectory
         The motion.
     """
-    from matplotlib.figure import Figure
-
     description = trajectory.description
     samples = _samples(trajectory)
     panels = _panels(trajectory, samples)
-    figure = Figure(figsize=(11.5, 1.6 + 1.75 * len(panels)), layout="constrained")
+    figure = new_figure(figsize=(11.5, 1.6 + 1.75 * len(panels)), layout="constrained")
     figure.suptitle(f"{description.name}: {trajectory.duration:.3g} s", fontsize=13, fontweight="bold")
     grid = figure.add_gridspec(len(panels), 3, width_ratios=(1.3, 1, EDGE))
     first = None
@@ -83,8 +82,6 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     DescriptionError
         Motions of different robots, or a link without a body.
     """
-    from matplotlib.figure import Figure
-
     if not motions:
         raise ValueError("motions is empty; expected trajectories by their names")
     description = next(iter(motions.values())).description
@@ -93,7 +90,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
         if not np.isfinite(limits).all():
             name = description.joints[int(np.argmin(np.isfinite(limits)))].name
             raise ValueError(f"joint {name} has no {what} limit; expected one of each joint")
-    figure = Figure(figsize=(11.5, 1.1 + 2.4 * len(motions)), layout="constrained")
+    figure = new_figure(figsize=(11.5, 1.1 + 2.4 * len(motions)), layout="constrained")
     figure.suptitle(f"{description.name}: what motions use of the limits", fontsize=13, fontweight="bold")
     grid = figure.subplots(len(motions), 2, sharex=True, sharey=True, squeeze=False)
     for row, (name, motion) in zip(grid, motions.items(), strict=True):

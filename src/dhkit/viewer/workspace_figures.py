@@ -14,6 +14,7 @@ from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
 from dhkit.viewer.figures import GRID_COLOR, LINK_COLOR, frame_space, plot, skeleton, space
+from dhkit.viewer.notebook_figure import new_figure
 from dhkit.viewer.scene import first_configuration, scene_size
 
 if TYPE_CHECKING:
@@ -106,8 +107,6 @@ def plot_workspace(workspace: Workspace) -> Figure:
     how far the arm would reach without limits of its turning joints, where that has a closed form
     (:func:`dhkit.kinematics.boundaries.boundaries`).
     """
-    from matplotlib.figure import Figure
-
     description = workspace.description
     reaches = [_reach(plane, workspace) for plane in _planes(workspace)]
     line = _arm_in_pieces(description, first_configuration(description))
@@ -119,7 +118,7 @@ def plot_workspace(workspace: Workspace) -> Figure:
     columns = scale * widths + BESIDE_TICKS
     rows = (len(borders) + 1) // 2
     size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + LEGEND_ROW * rows
-    figure = Figure(figsize=size, layout="constrained")
+    figure = new_figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
     for ax, reach in zip(axes, reaches, strict=True):
         image = reach.draw(ax, float(workspace.manipulability.max()))
@@ -153,8 +152,6 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     ValueError
         Another shape, or values that are not finite.
     """
-    from matplotlib.figure import Figure
-
     q = joint_array(description, q)
     if q.ndim != 1:
         raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
@@ -162,7 +159,7 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
         raise ValueError(f"q is {q.tolist()}; expected finite values")
     ellipsoid = velocity_ellipsoid(description, q)
     longest = float(ellipsoid.lengths[0])
-    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
     axes = space(figure, 111)
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
     axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85)
@@ -180,14 +177,13 @@ def _(value: Workspace) -> Figure:
 
 @plot.register(Ellipsoid)
 def _(value: Ellipsoid) -> Figure:
-    from matplotlib.figure import Figure
 
     centers, axes = value.center.reshape(-1, 3), value.axes.reshape(-1, 3, 3)
     surfaces = [_surface(Ellipsoid(*one), 1.0) for one in zip(centers, axes, value.lengths.reshape(-1, 3), strict=True)]
     surfaces = [surface for surface in surfaces if np.isfinite(surface).all()]
     if not surfaces:
         raise ValueError("no ellipsoid is finite: expected one to draw")
-    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
     room = space(figure, 111)
     for surface in surfaces:
         _draw_surface(room, surface)
