@@ -34,7 +34,7 @@ REFUSED = {
     "a share of it": (row(a='"1e-9/(sin(1)^2 + cos(1)^2 - 1)"'), "divides by zero, to rounding"),
     "a cycle": (CYCLE + row(a='"p0"'), "p0 -> p1 -> p2 -> ... -> p149 -> p0 is a cycle"),
     "a long mesh name": (row(f'shape = {{ mesh = "{"x" * 5000}.stl" }}\n'), "expected a relative path"),
-    "a long component": (row(f'shape = {{ mesh = "{"x" * 400}.stl" }}\n'), "cannot be found"),
+    "a long component": (row(f'shape = {{ mesh = "{"x" * 400}.stl" }}\n'), "expected a relative path"),
     "a loop of links": (row('shape = { mesh = "loop.stl" }\n'), "'loop.stl', which cannot be found"),
 }
 

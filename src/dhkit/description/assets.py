@@ -12,6 +12,8 @@ MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
 
 MAX_PATH = 500
 """Characters of a mesh's path."""
+MAX_NAME = 120
+"""Characters of a file or folder in it: names of 255 bytes are the longest that a file can have."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CHECKOUT = PACKAGE.parents[1]
@@ -45,6 +47,7 @@ def inside(folder: Path | None, path: str, where: str) -> Path | None:
     if (
         not path
         or len(path) > MAX_PATH
+        or max(map(len, parts.parts), default=0) > MAX_NAME
         or not path.isprintable()
         or ":" in path
         or parts.is_absolute()
