@@ -210,6 +210,14 @@ def test_mesh_names_that_no_file_has_are_left_out(name, file, tmp_path):
     assert any(note.startswith("link 'b': mesh") and note.endswith("left out") for note in extraction.notes)
 
 
+def test_mesh_names_that_a_robot_file_does_not_take_are_left_out(file, tmp_path):
+    for name in ("a:b.stl", "n" * 200 + ".stl"):
+        (tmp_path / name).write_bytes(b"\0" * 84)
+        visual = f'<visual><geometry><mesh filename="./{name}"/></geometry></visual>'
+        extraction = extract_dh(file(robot(link("a"), link("b", visual), joint("j", "a", "b"))))
+        assert any(note.endswith("left out") for note in extraction.notes)
+
+
 @pytest.mark.parametrize(
     "shape",
     [

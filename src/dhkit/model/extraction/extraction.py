@@ -366,6 +366,7 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
 def _group_shapes(
     chain: Chain, group: Sequence[str], meshes: MeshFinder, left_out: list[str], *, visible: bool
 ) -> Iterator[tuple[UrdfShape, str, Array]]:
+    from dhkit.description.assets import inside
     from dhkit.description.mesh_files import check_mesh_file
 
     for name in group:
@@ -375,6 +376,7 @@ def _group_shapes(
             if shape.kind == "mesh":
                 try:
                     path = meshes.path(shape.file)
+                    inside(meshes.mesh_folder, path, "shape")
                     check_mesh_file(meshes.mesh_folder / path)
                 except DhkitError as error:
                     left_out.append(f"link {name!r}: {_without_folder(str(error), meshes.mesh_folder)}; left out")
