@@ -10,7 +10,8 @@ from pathlib import Path
 
 from dhkit.errors import ModelError
 from dhkit.model.urdf_chain import chain_tips, only_tip, tool_frame
-from dhkit.model.urdf_tree import UrdfJoint, UrdfTree, read_urdf
+from dhkit.model.urdf_reader import read_urdf
+from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 
 __all__ = ["ExampleChain", "example_chains", "example_robots", "example_urdf", "urdf_source"]
 

@@ -15,7 +15,8 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import ModelError
 from dhkit.model.reference import PinocchioModel
-from dhkit.model.urdf_tree import UrdfJoint, UrdfTree, read_urdf
+from dhkit.model.urdf_reader import read_urdf
+from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name
 
 __all__ = [
@@ -114,7 +115,7 @@ def read_chain(
     Parameters
     ----------
     path
-        The file; read by :func:`dhkit.model.urdf_tree.read_urdf`.
+        The file; read by :func:`dhkit.model.urdf_reader.read_urdf`.
     base
         The chain's first link, which becomes the world; the root if not given.
     tip

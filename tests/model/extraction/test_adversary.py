@@ -11,7 +11,7 @@ from dhkit import Arm
 from dhkit.description import write_robot
 from dhkit.errors import DhkitError, ModelError
 from dhkit.model import extract_dh, link_parts
-from dhkit.model.urdf_tree import read_urdf
+from dhkit.model.urdf_reader import read_urdf
 from dhkit.verification import verify_urdf
 
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'

@@ -14,7 +14,7 @@ from dhkit.errors import ModelError
 from dhkit.model import example_chains, example_robots, example_urdf
 from dhkit.model.extraction import extracted
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, chain_model, chain_of
-from dhkit.model.urdf_tree import read_urdf
+from dhkit.model.urdf_reader import read_urdf
 
 try:
     INSTALLED = version("example-robot-data")
