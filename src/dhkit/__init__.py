@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from dhkit.grading import GradeReport, grade
     from dhkit.kinematics import Classification, IKFlag, IKPath, IKSolutions, IKStatus, Singularities, Workspace
     from dhkit.planning import (
+        Certificate,
         Distances,
         Effort,
         Energy,
@@ -73,6 +74,7 @@ __all__ = [
     "BaseParameters",
     "BatchResult",
     "CasadiFunctions",
+    "Certificate",
     "Classification",
     "Comparison",
     "ComputedTorque",
@@ -163,6 +165,7 @@ __getattr__, __dir__ = lazy_names(
             "DHTable",
         ),
         "dhkit.planning": (
+            "Certificate",
             "Effort",
             "Energy",
             "Floor",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
-    from dhkit.planning import Constraint, Distances, ObjectiveLike, Payload, Planner, Scene
+    from dhkit.planning import Certificate, Constraint, Distances, ObjectiveLike, Payload, Planner, Scene
     from dhkit.planning.solver import ProgressCall
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
@@ -856,6 +856,19 @@ class Arm:
             time_limit=time_limit,
             progress=progress,
         )
+
+    def certify(
+        self,
+        motion: Trajectory,
+        limits: Limits | None = None,
+        friction: bool | Friction = False,
+        payload: Payload | None = None,
+    ) -> Certificate:
+        """Check a motion against limits, the arm's own unless given; see :func:`dhkit.planning.certify`."""
+        from dhkit.dynamics import Friction
+        from dhkit.planning import certify
+
+        return certify(self._description, motion, limits, Friction.chosen(friction), payload)
 
     def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
         """Return how far the links are from obstacles, and from each other; see :func:`dhkit.planning.distance`."""

@@ -1,6 +1,7 @@
 """Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
 
 from dhkit.planning.along import along_path
+from dhkit.planning.certificate import Certificate, certify
 from dhkit.planning.constraints import Constraint, MotorPower, TorqueSpeedLine
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
@@ -12,6 +13,7 @@ from dhkit.planning.tool_constraints import ToolAcceleration, ToolDirection, Too
 
 __all__ = [
     "BranchReport",
+    "Certificate",
     "Constraint",
     "Distances",
     "Effort",
@@ -34,5 +36,6 @@ __all__ = [
     "ToolSpeed",
     "TorqueSpeedLine",
     "along_path",
+    "certify",
     "distance",
 ]

@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.robot import takes_robot
 from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.payload import Payload
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
+from dhkit.trajectories.timing import default_limits
 
-__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker", "position_sizes"]
+__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker", "certify", "position_sizes"]
 
 POINTS = 24
 """States an interval, both its ends included: more than anybody will ask for."""
@@ -66,6 +69,47 @@ class Certificate:
     def worst(self) -> Check | None:
         """The check that comes nearest to its limit, or exceeds it most; None where nothing is limited."""
         return max(self.checks, key=lambda check: check.excess, default=None)
+
+
+@takes_robot
+def certify(
+    description: Description,
+    motion: Trajectory,
+    limits: Limits | None = None,
+    friction: Friction | None = None,
+    payload: Payload | None = None,
+) -> Certificate:
+    """Check a motion that comes from anywhere against limits, as planned motions are.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    motion
+        A motion of it.
+    limits
+        Of position, velocity, acceleration, jerk and torque; the robot's own unless given.
+    friction
+        Torques of friction that drives must supply too; none unless given.
+    payload
+        What the tool carries.
+
+    Raises
+    ------
+    DescriptionError
+        A motion of another robot.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import quintic
+    >>> arm = library_robot("planar2r")
+    >>> certify(arm, quintic(arm, [0, 0], [1.0, 0.5])).ok
+    True
+    """
+    motion.require(description)
+    loaded = description if payload is None else payload.carried(description)
+    return Checker(loaded, limits or default_limits(description), friction=friction).check(motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +181,8 @@ class Checker:
         states = self.states(trajectory) if states is None else states
         checks, active, anywhere = [], [], np.zeros(len(states.times), dtype=bool)
         share = _time_shares(trajectory, states)
+        if (jump := _largest_jump(trajectory, self.limits)) is not None:
+            checks.append(jump)
         excess = self.positions(states)
         if np.isfinite(excess).any():
             checks.append(_check("position", excess, states.times))
@@ -199,6 +245,25 @@ def _rises(use: Array, points: int) -> Array:
 def _check(what: str, excess: Array, times: Array) -> Check:
     k, i = np.unravel_index(int(np.nanargmax(excess)), excess.shape)
     return Check(what, float(excess[k, i]), int(i), float(times[k]))
+
+
+def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
+    """Return where a motion's positions or velocities jump most between its pieces; None where they do not."""
+    inner = trajectory.breaks[1:-1]
+    if not len(inner):
+        return None
+    found = []
+    speeds = np.abs(trajectory.qd(trajectory.breaks)).max(axis=0)
+    fastest = np.where(np.isfinite(limits.velocity), limits.velocity, np.maximum(speeds, 1e-3))
+    for what, values, size in (
+        ("jump of position", trajectory.q, position_sizes(limits)),
+        ("jump of velocity", trajectory.qd, fastest),
+    ):
+        jumps = np.abs(values(inner, "right") - values(inner, "left")) / size
+        k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
+        found.append(Check(what, float(jumps[k, i]), int(i), float(inner[k])))
+    worst = max(found, key=lambda check: check.excess)
+    return worst if worst.excess > ACCEPTED else None
 
 
 def _jerks(trajectory: Trajectory) -> Array:
