@@ -13,7 +13,7 @@ from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic
 from dhkit.trajectories.archives import mat_bytes, npz_bytes
 from file_checks import check_damaged, check_refused
-from trajectories_reference import random_motion
+from trajectories_reference import continuous_motion
 
 ARM, PUMA = library_robot("planar2r"), library_robot("puma560")
 TABLES = (".csv", ".yaml", ".yml")
@@ -23,7 +23,7 @@ BETWEEN = 1e-11  # rad and m: quintics through samples of a smooth motion, every
 @pytest.mark.parametrize("suffix", [".npz", ".mat"])
 @pytest.mark.parametrize("name", robots())
 def test_archives_hold_every_bit_and_the_robot(name, suffix, tmp_path):
-    motion = random_motion(library_robot(name))
+    motion = continuous_motion(library_robot(name))
     path = motion.save(tmp_path / f"motion{suffix}")
     again = Trajectory.load(path)
     assert again == motion
@@ -39,7 +39,7 @@ def test_archives_hold_robots_that_nobody_knows(kinds, suffix, tmp_path):
     arm = from_dh([(0, 0.3, 0.1, "pi/7")] * len(kinds), kinds=kinds, name="mine")
     arm = with_payload(library_robot("pan_tilt"), 0.1) if kinds == "PR" else arm
     for pieces in (1, 3):
-        motion = random_motion(arm, pieces)
+        motion = continuous_motion(arm, pieces)
         again = Trajectory.load(motion.save(tmp_path / f"motion{suffix}"))
         assert again == motion
         assert again.description == arm
@@ -48,7 +48,7 @@ def test_archives_hold_robots_that_nobody_knows(kinds, suffix, tmp_path):
 def test_numpy_and_scipy_read_the_archives(tmp_path):
     from scipy.io import loadmat
 
-    motion = random_motion(PUMA)
+    motion = continuous_motion(PUMA)
     with np.load(motion.save(tmp_path / "motion.npz"), allow_pickle=False) as archive:
         assert np.array_equal(archive["coefficients"], motion.coefficients)
         assert str(archive["robot"]) == "puma560"
@@ -61,7 +61,7 @@ def test_what_matlab_saves_again_is_read(tmp_path):
     """MATLAB compresses what it saves."""
     from scipy.io import loadmat, savemat
 
-    motion = random_motion(PUMA)
+    motion = continuous_motion(PUMA)
     path = motion.save(tmp_path / "motion.mat")
     values = {key: value for key, value in loadmat(path).items() if not key.startswith("__")}
     savemat(path, {"extra": np.zeros(3), **values}, do_compression=True)
@@ -94,7 +94,7 @@ def test_a_table_begins_as_promised(tmp_path):
 
 def test_pyyaml_reads_what_is_written(tmp_path):
     yaml = pytest.importorskip("yaml")
-    motion = random_motion(PUMA)
+    motion = continuous_motion(PUMA)
     message = yaml.safe_load(motion.save(tmp_path / "motion.yaml", rate=100).read_text())
     assert message["joint_names"] == [joint.name for joint in PUMA.joints]
     samples = motion.sample(rate=100)
@@ -109,7 +109,7 @@ def test_pyyaml_reads_what_is_written(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".npz", ".mat", *TABLES])
 def test_another_robots_file_is_refused_and_leaves_no_trace(suffix, tmp_path):
-    path = random_motion(PUMA).save(tmp_path / f"motion{suffix}")
+    path = continuous_motion(PUMA).save(tmp_path / f"motion{suffix}")
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     with pytest.raises(
         DescriptionError, match=rf"one of puma560 \({PUMA.digest}\)|of puma560 \({PUMA.digest}\)"
@@ -219,7 +219,7 @@ def test_no_file_and_no_trajectory_are_named(suffix, tmp_path):
 
 
 def test_other_suffixes_are_named(tmp_path):
-    motion = random_motion(ARM)
+    motion = continuous_motion(ARM)
     with pytest.raises(ValueError, match=r"found suffix '.json'; expected one of .npz, .mat, .csv, .yaml, .yml"):
         motion.save(tmp_path / "motion.json")
     refused(tmp_path / "motion", r"found suffix ''")
@@ -231,9 +231,20 @@ def test_other_suffixes_are_named(tmp_path):
 @given(data=st.data())
 def test_no_damaged_byte_leads_anywhere_else(data, suffix, tmp_path_factory):
     folder = tmp_path_factory.mktemp("damaged")
-    path = random_motion(ARM, pieces=2, duration=0.02).save(folder / f"motion{suffix}")
+    path = continuous_motion(ARM, pieces=2, duration=0.02).save(folder / f"motion{suffix}")
     check_damaged(data.draw, Trajectory.load, path)
 
 
 def refused(path, complaint):
     check_refused(Trajectory.load, path, complaint)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat"])
+@pytest.mark.parametrize(("order", "what"), [(0, "value"), (1, "speed")])
+def test_a_file_whose_motion_jumps_is_refused(suffix, order, what, tmp_path):
+    arm = library_robot("planar2r")
+    coefficients = np.zeros((2, 4, 2))
+    coefficients[1, order, 1] = 1e-3
+    Trajectory(arm, [0.0, 1.0, 2.0], coefficients).save(tmp_path / f"jump{suffix}")
+    with pytest.raises(DescriptionError, match=rf"jump\{suffix}: joint 2: its {what} jumps from 0 to 0.001 at 1 s"):
+        Trajectory.load(tmp_path / f"jump{suffix}")

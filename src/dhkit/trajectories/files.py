@@ -43,6 +43,8 @@ MOST_COEFFICIENTS = 65
 """Of a joint's polynomial on an interval: the time that one of a motion takes grows with them."""
 RATE = 1000.0
 """Samples a second where none are asked for."""
+JUMP = 1e-6
+"""How far joint values, rad or m, and speeds may jump between pieces of a motion, absolute and relative."""
 SECOND = 1_000_000_000
 """In ns."""
 
@@ -239,7 +241,29 @@ def _from_archive(values: dict[str, Any], description: Description | None) -> Tr
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
         breaks = breaks.ravel()
-    return Trajectory(robot, breaks, coefficients)
+    motion = Trajectory(robot, breaks, coefficients)
+    _require_continuous(motion)
+    return motion
+
+
+def _require_continuous(motion: Trajectory) -> None:
+    """Refuse a motion whose joint values or speeds jump between its pieces: no arm can follow it.
+
+    Raises
+    ------
+    DescriptionError
+        It jumps; names joint and time.
+    """
+    inner = motion.breaks[1:-1]
+    for what, values in (("value", motion.q), ("speed", motion.qd)):
+        before, after = values(inner, "left"), values(inner, "right")
+        if not len(inner):
+            return
+        jumps = np.abs(after - before) / (1 + np.abs(before))
+        k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
+        if jumps[k, i] > JUMP:
+            jump = f"jumps from {before[k, i]:.6g} to {after[k, i]:.6g} at {inner[k]:.6g} s"
+            raise DescriptionError(f"joint {i + 1}: its {what} {jump}; the file is damaged")
 
 
 def _csv(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
