@@ -149,3 +149,17 @@ def test_reach_is_the_tools_and_the_sum_of_lengths_has_its_own_name(capsys):
         facts = json.loads(capsys.readouterr().out.splitlines()[-1])
         assert facts["reach_m"] == pytest.approx(0.88, abs=0.02)
         assert facts["length_sum_m"] == pytest.approx(1.70578)
+
+
+@pytest.mark.parametrize(
+    ("words", "position", "completed"), [("dhkit ext", 1, "extract"), ("dhkit extract --pa", 2, "--package-dir")]
+)
+def test_a_shell_completes_commands_and_options(words, position, completed):
+    import os
+    import subprocess
+    import sys
+
+    asked = {"_DHKIT_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(position)}
+    command = [sys.executable, "-c", "import sys; sys.argv[0] = 'dhkit'; from dhkit.cli import main; main()"]
+    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=False)
+    assert completed in done.stdout.split(), done

@@ -26,7 +26,7 @@ app = typer.Typer(
     name="dhkit",
     help="Robot arms from their Denavit-Hartenberg table.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
