@@ -60,6 +60,15 @@ def test_masses_maps_and_poses_as_json(dhkit, parts, tmp_path):
     assert [joint.body and float(joint.body.mass) for joint in description.joints] == pytest.approx([3.2, 1.5, None])
 
 
+def test_a_part_is_left_out_by_a_map_to_no_link(dhkit, parts, tmp_path):
+    (parts / "gripper.stl").write_bytes((parts / "arm assembly - link3-1.STL").read_bytes())
+    status, _, err = dhkit("import-cad", parts, "--table", TABLE, "-o", tmp_path / "arm")
+    assert status == 2 and "for a part of no link" in err
+    status, out, err = dhkit("import-cad", parts, "--table", TABLE, "--map", "-=gripper.stl", "-o", tmp_path / "arm")
+    assert (status, err) == (0, "") and "left out: gripper.stl" in out
+    assert "pose of the export: the configuration ready: q = 0, 1.047, -1.047" in out
+
+
 def test_links_without_masses_are_named(dhkit, parts, tmp_path):
     status, out, _ = dhkit("import-cad", parts, "--table", TABLE, "-o", tmp_path / "arm")
     assert status == 0

@@ -231,7 +231,7 @@ BAD = {
     "a rate of 0": ({"rate": 0}, "rate is 0"),
     "no threads": ({"threads": 0}, "threads is 0"),
     "more than fits": ({"keep": "all", "duration": 9000.0, "q0": np.zeros((1000, 2))}, "all states are 576 GB"),
-    "a reference that is a word": ({"reference": "ready"}, "reference"),
+    "a reference that is a word": ({"reference": "raedy"}, "no configuration 'raedy'"),
 }
 
 

@@ -218,7 +218,7 @@ def test_tiers_give_the_same_inverse_kinematics_bit_for_bit(name, monkeypatch):
     T = world_to_tool(arm, q)
     T[3, 0, 0], T[4, :3, 3], T[5, 0, 3] = np.nan, 1e3, np.inf
     one, other = both(monkeypatch, lambda: inverse_kinematics(arm, T))
-    for key in ("q", "valid", "flags", "status_code", "distance", "within"):
+    for key in ("q", "valid", "flags", "status_code", "distance", "allowed"):
         ours, theirs = getattr(one, key), getattr(other, key)
         assert np.array_equal(ours, theirs, equal_nan=ours.dtype == float), key
 

@@ -16,7 +16,7 @@ from dhkit.model.mesh_reader import read_mesh
 from dhkit.model.shape_inertia import shape_inertia
 from dhkit.model.shapes import link_parts
 from dhkit.model.stl import ascii_stl, binary_stl
-from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 from mesh_shapes import box, dae, prism, sphere
 
 SINGLE = 1e-6
@@ -144,6 +144,10 @@ def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):
     for i, mesh in enumerate(meshes):
         array[0, i] = tuple(np.array(value) for value in fields(mesh, "").values())
     kinds["array"] = {"s": array}
+    words = {"F": "faces", "V": "Vertices", "C": "facevertexcdata"}
+    kinds["patches"] = {
+        f"s{i}": {words[k]: v for k, v in fields(mesh, "").items()} for i, mesh in enumerate(meshes, start=1)
+    }
     for name, content in kinds.items():
         for compressed in (True, False):
             savemat(tmp_path / f"{name}.mat", content, do_compression=compressed)
@@ -226,8 +230,73 @@ def test_collada_states_its_own_unit(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "link1.dae").write_text(text)
     found = import_cad(tmp_path / "parts", arm, q=[0.0])
-    assert found.notes[2] == "unit: as the files state it"
+    across = "the assembly is 0.3082 m across, the arm 0.3 m long"
+    assert found.notes[2] == f"unit: 0.001 m, as the files state it: {across}"
     assert found.meshes[1].bounds[:, 0] == pytest.approx([-0.3, 0.0], abs=1e-12)
+
+
+def collada_arm(folder, unit):
+    """Files of the planar arm in mm whose unit is stated as given, or not at all."""
+    arm, q = planar(), np.zeros(3)
+    folder.mkdir()
+    for i, (mesh, T) in enumerate(zip(links(arm), world_to_frames(arm, q), strict=True)):
+        points = 1000 * mesh.moved(T).vertices
+        text = dae(" ".join(map(repr, points.ravel().tolist())), " ".join(map(str, mesh.faces.ravel())), unit=unit)
+        (folder / f"link{i}.dae").write_text(text.replace('<unit meter=""/>', ""))
+    return arm, links(arm)
+
+
+def test_collada_without_a_unit_is_judged_by_size_and_a_stated_unit_is_held_against_the_arm(tmp_path):
+    arm, expected = collada_arm(tmp_path / "none", "")
+    found = import_cad(tmp_path / "none", arm)
+    assert "unit: mm, found by size" in found.notes[2]
+    assert apart(found.meshes[3], expected[3]) < IN_MEMORY
+    collada_arm(tmp_path / "metres", "1")  # mm, of which the files say m
+    with pytest.raises(
+        ModelError, match=r"by the unit that the files state the assembly is [0-9.]+ m across.*--unit mm"
+    ):
+        import_cad(tmp_path / "metres", arm)
+    forced = import_cad(tmp_path / "metres", arm, unit="mm")
+    assert "unit: mm, as stated, for all files in place of the 1 m that files state" in forced.notes[2]
+    assert apart(forced.meshes[3], expected[3]) < IN_MEMORY
+    collada_arm(tmp_path / "inches", "0.0254")
+    with pytest.raises(ModelError, match="state the unit of all files"):
+        import_cad(tmp_path / "inches", arm)
+
+
+def planar_small(length):
+    """An arm of two links in a plane above a base, whose axes stand upright."""
+    return from_dh([(0, 0, length / 2, 0), (0, 0, length / 2, 0)], name="small")
+
+
+class UnitNotClearError(Exception):
+    """An import was refused with a hint to state the unit."""
+
+
+def imported_if_clear(folder, arm):
+    try:
+        return import_cad(folder, arm, q=np.zeros(arm.n))
+    except ModelError as error:
+        raise (UnitNotClearError if "--unit" in str(error) else AssertionError)(error) from None
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm", "in"])
+@pytest.mark.parametrize(
+    ("length", "extra"),
+    [(0.1, ("base", 1.0)), (0.2, ("base", 0.8)), (0.2, ("tool", 2.0)), (0.1, ("tool", 1.0)), (0.2, ("base", 1.2))],
+)
+def test_a_small_arm_with_a_large_base_or_tool_is_never_taken_in_a_wrong_unit(tmp_path, length, extra, unit):
+    where, size = extra
+    for arm in (planar_small(length), from_dh([(0, 0, length / 2, 0), (0, 0, length / 2, "pi/2"), (0, 0, 0, 0)])):
+        meshes = links(arm)
+        if where == "base":
+            meshes[0] = box((0.3 * size, 0.3 * size, size), (0, 0, -size / 2))
+        else:
+            meshes[-1] = joined_meshes([meshes[-1], box((size, 0.02, 0.02), (size / 2 - 0.01, 0, 0))])
+        folder = export(tmp_path / f"{arm.n}", arm, meshes, np.zeros(arm.n), unit)
+        with contextlib.suppress(UnitNotClearError):
+            assert f"unit: {unit}," in imported_if_clear(folder, arm).notes[2]
+        assert import_cad(folder, arm, q=np.zeros(arm.n), unit=unit).meshes[1].size > 0
 
 
 def test_parts_moved_into_positive_space_are_recognised(tmp_path):
@@ -266,6 +335,77 @@ def test_masses_from_reports_masses_and_density(tmp_path):
     report.write_text(report.read_text().replace("link2,", "link1,"))
     elsewhere = import_cad(folder, arm, reports=[report])
     assert any("outside the link; was the report made in the coordinates" in note for note in elsewhere.notes)
+
+
+def report_of(path, link, mass, moments):
+    heading = "link,mass [kg],com_x [mm],com_y [mm],com_z [mm]," + ",".join(
+        f"I{k} [kg m^2]" for k in ("xx", "yy", "zz", "xy", "yz", "xz")
+    )
+    path.write_text(f"{heading}\n{link},{mass},450,0,200," + ",".join(map(str, moments)) + ",0,0,0\n")
+    return path
+
+
+def test_impossible_moments_of_a_report_are_warned_of(tmp_path):
+    arm = planar()
+    folder = export(tmp_path / "parts", arm, links(arm), np.zeros(3))
+
+    def notes(*moments):
+        report = report_of(tmp_path / "masses.csv", "link3", 1.0, moments)
+        return import_cad(folder, arm, reports=[report]).notes[-1]
+
+    assert "warning" not in notes(0.001, 0.004, 0.004) and "the report of 'link3'" in notes(0.001, 0.004, 0.004)
+    assert "no body has its principal moments 0.001, 0.002, 0.009 kg m^2" in notes(0.001, 0.002, 0.009)
+    assert "its largest moment is 40 kg m^2, a body of its mass" in notes(40, 40, 40)
+
+
+def test_hidden_files_are_not_seen_and_parts_can_be_left_out(tmp_path):
+    arm = planar()
+    folder = export(tmp_path / "parts", arm, links(arm), np.zeros(3))
+    (folder / "._Assem1 - link2-1.STL").write_bytes(b"a fork of resources")
+    assert sorted(import_cad(folder, arm).meshes) == [0, 1, 2, 3]
+    for name in ("gripper.stl", "cover link2.stl"):
+        (folder / name).write_bytes(binary_stl("x", box().corners))
+    with pytest.raises(ModelError, match=r'--map "-=Assem1'):
+        import_cad(folder, arm)
+    with pytest.raises(ModelError, match=r'--map "2=Assem1 - link2-1.STL,cover link2.stl"'):
+        import_cad(folder, arm, files={-1: ["gripper.stl"]})
+    found = import_cad(folder, arm, files={-1: ["gripper.stl", "cover link2.stl"]})
+    assert found.notes[0] == "parts by the numbers in their names; left out: gripper.stl, cover link2.stl"
+    assert len(found.meshes[2].faces) == 12
+
+
+def test_overlaps_and_cavities_are_found_across_the_files_of_a_link(tmp_path):
+    arm, frames = planar(), world_to_frames(planar(), np.zeros(3))
+    folder = export(tmp_path / "parts", arm, links(arm), np.zeros(3))
+    files = {3: ["Assem1 - link3-1.STL", "second.stl"]}
+
+    def with_second(mesh):
+        (folder / "second.stl").write_bytes(binary_stl("x", mesh.moved(frames[3]).scaled(1000).corners))
+        found = import_cad(folder, arm, files=files, density=1000.0)
+        return float(found.description.joints[2].body.mass), found.notes[-1]
+
+    whole = 1000 * shape_inertia(links(arm)[3], density=1.0).volume
+    mass, note = with_second(links(arm)[3])
+    assert mass == pytest.approx(2 * whole, rel=1e-5) and "counts twice" in note
+    mass, note = with_second(box((0.02, 0.02, 0.02), (-0.1, 0, 0)).turned())
+    assert mass == pytest.approx(whole - 0.008, rel=1e-4) and "1 cavity inside" in note and "warning" not in note
+
+
+def test_odd_densities_and_enormous_bodies_say_what_may_be_meant(tmp_path):
+    arm = planar()
+    folder = export(tmp_path / "parts", arm, links(arm), np.zeros(3))
+    for density, hint in ((2.7, "g/cm^3 meant"), (2.7e6, "steel has 7850")):
+        notes = import_cad(folder, arm, density=density).notes
+        assert any(note.startswith("warning: the density is") and hint in note for note in notes)
+    assert not any("density is" in note for note in import_cad(folder, arm, density=2700.0).notes)
+    with pytest.raises(ModelError, match=r"expected at most 1e\+12 \(unit: m, as stated: "):
+        import_cad(folder, arm, density=7.8e6, unit="m")
+
+
+def test_the_pose_is_printed(tmp_path):
+    arm = planar()
+    folder = export(tmp_path / "parts", arm, links(arm), np.array([0.1, 0.0, -1.0]))
+    assert import_cad(folder, arm, q=[0.1, 0, -1]).notes[1] == "pose of the export: as given: q = 0.1, 0, -1"
 
 
 def stated(**options):

@@ -146,6 +146,32 @@ def test_two_decimal_places_as_solidworks_prints_them(tmp_path, sign):
         read(tmp_path, coarse)
 
 
+def test_masses_and_centres_with_too_few_digits_are_refused_or_warned_of(tmp_path):
+    text = solidworks_text(body(), units=("kilograms", "meters"))
+
+    def with_numbers(mass, x):
+        changed = re.sub(r"Mass = \S+", f"Mass = {mass}", text)
+        return re.sub(
+            r"\tX = \S+", f"\tX = {x}", re.sub(r"(?s)\nMoments of inertia[^M]*\nTaken at the output.*", "", changed)
+        )
+
+    with pytest.raises(ModelError, match=r"line 7: its mass has too few digits, 50 %; choose smaller units or more"):
+        read(tmp_path, with_numbers("0.01", 0.03))
+    with pytest.raises(ModelError, match=r"its centre of mass has too few digits, \d+ % of its radius of gyration"):
+        read(tmp_path, with_numbers("27.0000", "0.0"))
+    rounded = read(tmp_path, with_numbers("27.0", "0.030"))
+    assert "warning: its mass is rounded to 0.2 %" in rounded.notes
+    assert any("warning: its centre of mass is rounded to" in note for note in rounded.notes)
+
+
+@pytest.mark.parametrize(
+    "title", ["Mass properties of robot.SLDASM", "Mass properties of robot\n( Assembly Configuration - Default )"]
+)
+def test_a_report_of_an_assembly_is_refused(tmp_path, title):
+    with pytest.raises(ModelError, match=r"line [12]: a report of an assembly; expected one of the part of a link"):
+        read(tmp_path, solidworks_text(body()).replace("Mass properties of Part2", title))
+
+
 def test_without_other_blocks_the_stated_notation_or_the_default_counts(tmp_path):
     found = body()
     default = read(tmp_path, solidworks_text(found, 1, principal=False, origin=False))

@@ -81,6 +81,44 @@ def test_polygons_of_obj_and_indices_from_the_end(tmp_path):
     assert read_mesh(path).faces.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 1]]
 
 
+L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+"""Area 3; a fan about its fourth corner alone would cover it."""
+
+
+def area(mesh):
+    a, b, c = np.moveaxis(mesh.corners, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize("first", range(6))
+def test_concave_polygons_keep_their_area_and_their_side(tmp_path, first):
+    T = pose(np.random.default_rng(4))
+    ring = np.roll(np.column_stack([L_SHAPE, np.zeros(6)]), -first, axis=0) @ T[:3, :3].T + T[:3, 3]
+    square = np.array([(5, 5, 0), (6, 5, 0), (6, 6, 0), (5, 6, 0)])
+    points = np.concatenate([ring, square])
+    text = "".join(f"v {x:.15g} {y:.15g} {z:.15g}\n" for x, y, z in points)
+    (tmp_path / "a.obj").write_text(text + "f 7 8 9 10\nf 1 2 3 4 5 6\n")
+    listed = " ".join(f"{x:.15g}" for x in points.ravel())
+    whole = dae(listed, "0 1 2")
+    old = whole[whole.index("<triangles") : whole.index("</triangles>") + len("</triangles>")]
+    vertex = '<input semantic="VERTEX" source="#v" offset="0"/>'
+    lists = f'<polylist count="2" material="paint">{vertex}<vcount>4 6</vcount><p>6 7 8 9 0 1 2 3 4 5</p></polylist>'
+    loose = f'<polygons count="2" material="paint">{vertex}<p>6 7 8 9</p><p>0 1 2 3 4 5</p></polygons>'
+    (tmp_path / "a.dae").write_text(whole.replace(old, lists))
+    (tmp_path / "b.dae").write_text(whole.replace(old, loose))
+    for name in ("a.obj", "a.dae", "b.dae"):
+        mesh = read_mesh(tmp_path / name)
+        assert len(mesh.faces) == 6 and area(mesh) == pytest.approx(4.0)
+        assert mesh.faces[:2].tolist() == [[6, 7, 8], [6, 8, 9]]
+        a, b, c = np.moveaxis(mesh.corners[2:], 1, 0)
+        assert (np.cross(b - a, c - a) @ T[:3, 2] > 0).all()
+
+
+def test_a_path_may_be_a_string(tmp_path):
+    (tmp_path / "a.stl").write_bytes(binary_stl("box", box().corners))
+    assert len(read_mesh(str(tmp_path / "a.stl")).faces) == 12
+
+
 def test_colours_of_ply_are_read(tmp_path):
     coloured = trimesh.Trimesh(box().vertices, box().faces, process=False)
     coloured.visual.face_colors = [255, 128, 0, 255]

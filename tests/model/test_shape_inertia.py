@@ -1,5 +1,7 @@
 """Inertia from shape: closed forms, invariance, hollow, inverted, open and hopeless meshes."""
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -109,6 +111,93 @@ def test_inverted_and_mixed_faces_are_turned_and_it_is_said():
     assert "reach into others" in crossed.notes[0]
     apart = shape_inertia(joined_meshes([box(), box(centre=(1, 0, 0))]), density=1.0)
     assert apart.notes == () and apart.mass == pytest.approx(12.0)
+
+
+def bars():
+    """Two bars of volume 0.1 that cross in a cube of volume 0.001, no corner of one inside the other."""
+    return box((10.0, 0.1, 0.1)), box((0.1, 10.0, 0.1))
+
+
+def test_shells_that_share_volume_are_warned_of_with_its_share():
+    one, other = bars()
+    for scale in (1e-3, 1.0):
+        for found in (joined_meshes([one, other]), [one, other]):
+            meshes = [found] if isinstance(found, TriangleMesh) else found
+            crossed = shape_inertia([mesh.scaled(scale) for mesh in meshes], density=1.0)
+            assert len(crossed.notes) == 1
+            assert "where the material counts twice (0.5 % of the volume)" in crossed.notes[0]
+    raised = other.moved(np.block([[np.eye(3), np.array([[0], [0], [0.1]])], [np.zeros(3), np.ones(1)]]))
+    assert shape_inertia([one, raised], density=1.0).notes == ()  # they touch
+
+
+def test_parts_of_one_body_are_judged_together():
+    twice = shape_inertia([box(), box()], density=1.0)
+    assert twice.mass == pytest.approx(12.0) and "2 of 2 shells" in twice.notes[0] and "50 %" in twice.notes[0]
+    end = shape_inertia([box((4, 1, 1)), box((1, 1, 1), (2, 0.3, 0))], density=1.0)
+    assert "counts twice" in end.notes[0]
+    within = shape_inertia([box((0.2, 0.2, 0.2)), box()], density=1.0)
+    assert "1 of 2 shells" in within.notes[0]
+    hollow = shape_inertia([box((2, 2, 2)), box((1, 1, 1)).turned()], density=1.0)
+    assert hollow.mass == pytest.approx(7.0) and hollow.notes == ("1 cavity inside",)
+    beside = shape_inertia([box(), box((1, 1, 1), (9, 0, 0)).turned()], density=1.0)
+    assert beside.mass == pytest.approx(7.0) and "1 of 2 shells were inside out" in beside.notes[0]
+    bowl = TriangleMesh(box().vertices, box().faces[2:])
+    mixed = shape_inertia([bowl, box(centre=(5, 0, 0))], density=1.0)
+    assert mixed.method is InertiaMethod.HULL and mixed.mass == pytest.approx(12.0)
+
+
+def test_triangles_written_twice_count_once():
+    mesh = box()
+    rng = np.random.default_rng(1)
+    doubled = np.concatenate([mesh.faces, np.roll(mesh.faces, 1, axis=1)])[rng.permutation(24)]
+    both_ways = np.concatenate([mesh.faces, mesh.faces[:, ::-1]])
+    one_more = np.concatenate([mesh.faces, mesh.faces[3:4]])
+    one_back = np.concatenate([mesh.faces, mesh.faces[3:4, ::-1]])
+    for faces, dropped in ((doubled, 12), (both_ways, 12), (one_more, 1), (one_back, 1)):
+        for made in (TriangleMesh(mesh.vertices, faces), TriangleMesh.of_corners(mesh.vertices[faces])):
+            found = shape_inertia(made, density=1.0)
+            assert found.method is InertiaMethod.CLOSED and found.mass == pytest.approx(6.0)
+            assert f"{dropped} triangle" in found.notes[0] and "written more than once" in found.notes[0]
+
+
+def test_cavities_that_touch_stay_and_one_that_reaches_out_is_warned_of():
+    block = box((6, 6, 6))
+    first, second = box((1, 1, 1), (-0.5, 0, 0)).turned(), box((1, 1, 1), (0.5, 0, 0)).turned()
+    for cavities in ((first, second), (second, first), (first.scaled(1.0), box((1, 2, 1), (0.5, 0, 0)).turned())):
+        found = shape_inertia(joined_meshes([block, *cavities]), density=1.0)
+        lacking = sum(abs(shape_inertia(cavity, density=1.0).volume) for cavity in cavities)
+        assert found.mass == pytest.approx(216 - lacking) and found.notes == ("2 cavities inside",)
+    poking = shape_inertia(joined_meshes([block, box((1, 1, 1), (2.9, 0, 0)).turned()]), density=1.0)
+    assert poking.notes[0] == "1 cavity inside" and "a cavity reaches out of the material" in poking.notes[1]
+    island = shape_inertia(joined_meshes([block, box((4, 4, 4)).turned(), box((2, 2, 2))]), density=1.0)
+    assert island.mass == pytest.approx(216 - 64 + 8) and island.notes == ("1 cavity inside",)
+    touching = shape_inertia(joined_meshes([block, box((2, 2, 2), (4, 0, 0)).turned()]), density=1.0)
+    assert touching.mass == pytest.approx(224) and "1 of 2 shells were inside out" in touching.notes[0]
+
+
+def test_only_a_mesh_that_is_turned_as_a_whole_is_called_inside_out():
+    large, small = box((2, 2, 2)).turned(), box((1, 1, 1), (9, 0, 0))
+    found = shape_inertia(joined_meshes([large, small]), density=1.0)
+    assert found.mass == pytest.approx(9.0) and found.notes == ("1 of 2 shells were inside out and were turned",)
+    three = shape_inertia(joined_meshes([box(), small.turned(), box((0.5, 0.5, 0.5), (9, 0, 0))]), density=1.0)
+    assert "1 of 3 shells were inside out" in three.notes[0] and "1 of 3 shells lie in" in three.notes[1]
+    both = shape_inertia(joined_meshes([large, small.turned()]), density=1.0)
+    assert both.notes == ("inside out: all triangles were turned",)
+
+
+@pytest.mark.parametrize("place", [lambda k: (2 * k, 0, 0), lambda k: (0.8 * k, 0.8 * k, 0.8 * k)])
+def test_hundreds_of_shells_take_little_time(place, law):
+    balls = joined_meshes([sphere(12, 16, 0.6).moved(shifted(place(k))) for k in range(250)])
+    start = time.process_time()
+    found = shape_inertia(balls, density=1.0)
+    law.takes("250 shells, s", time.process_time() - start, 2)
+    assert found.notes == () and found.mass == pytest.approx(250 * shape_inertia(sphere(12, 16, 0.6), density=1.0).mass)
+
+
+def shifted(centre):
+    T = np.eye(4)
+    T[:3, 3] = centre
+    return T
 
 
 def test_open_meshes_are_capped_or_judged_by_their_hull():

@@ -15,7 +15,7 @@ from rich.console import Console
 from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
-from dhkit.errors import AnswerError
+from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import (
@@ -71,7 +71,10 @@ def check_output(output: Path | None, form: str, several: bool) -> None:
         if output.exists() or output.suffix:
             raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
     else:
-        check_place(output)
+        try:
+            check_place(output)
+        except DescriptionError as error:
+            raise AnswerError(str(error)) from None
 
 
 def deliver(

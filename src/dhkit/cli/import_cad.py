@@ -11,10 +11,13 @@ from dhkit.cli.arguments import joint_values
 from dhkit.cli.output import print_json, say
 from dhkit.errors import DescriptionError
 from dhkit.model.cad_assembly import import_cad
+from dhkit.model.cad_files import LEFT_OUT
 
 __all__ = ["run"]
 
 PAIR = re.compile(r"\s*(?:link\s*)?(\d{1,3})\s*=\s*(.*?)\s*", re.IGNORECASE | re.DOTALL)
+
+WITHOUT = re.compile(r"\s*-\s*=\s*(.*?)\s*", re.DOTALL)
 
 
 def run(
@@ -93,5 +96,14 @@ def _mass(link: int, text: str) -> float:
 
 
 def _files(mapping: Sequence[str]) -> dict[int, list[str]] | None:
-    pairs = _pairs(mapping, "--map", '"3=forearm.stl"')
-    return {link: [name.strip() for name in text.split(",") if name.strip()] for link, text in pairs.items()} or None
+    """Read --map: the files of links, and after "-=" those of none."""
+    out = [found[1] for word in mapping if (found := WITHOUT.fullmatch(word))]
+    pairs = _pairs([word for word in mapping if not WITHOUT.fullmatch(word)], "--map", '"3=forearm.stl"')
+    files = {link: _names(text) for link, text in pairs.items()}
+    if out:
+        files[LEFT_OUT] = _names(",".join(out))
+    return files or None
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]

@@ -20,6 +20,7 @@ from dhkit.description import (
     Base,
     Description,
     Joint,
+    JointType,
     Mesh,
     Shape,
     joint_vector,
@@ -30,10 +31,10 @@ from dhkit.description import (
 )
 from dhkit.description.assets import inside
 from dhkit.description.robot import Robot, description_of
-from dhkit.errors import ModelError
+from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
-from dhkit.model.cad_units import UNITS, check_positions, far_from_axes, unit_of
+from dhkit.model.cad_units import UNITS, check_positions, check_size, far_from_axes, size_of, unit_of
 from dhkit.model.shape_inertia import convex_hull
 from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
@@ -168,7 +169,7 @@ def import_cad(
     simplify
         Triangles that a part keeps at most; masses are those of the whole part.
     files
-        Names of files by link, where their names do not say it.
+        Names of files by link, where their names do not say it; by -1 those that are left out.
 
     Raises
     ------
@@ -183,13 +184,9 @@ def import_cad(
     frames = world_to_frames(description, pose)
     parts, found_notes = cad_parts(folder, description.n, files=files, simplify=simplify)
     check_positions({part.name: part.mesh for several in parts.values() for part in several}, str(folder))
-    metres, unit_note = _metres(folder, description, frames, parts, unit)
-    notes = [*found_notes, pose_note, unit_note]
+    standing, unit_note = _in_metres(folder, description, frames, parts, unit)
+    notes = [*found_notes, pose_note, unit_note, *stated.notes]
 
-    standing = {
-        link: [part.mesh.scaled(1.0 if part.in_metres else metres) for part in several]
-        for link, several in parts.items()
-    }
     notes += far_from_axes(description, frames, standing)
 
     meshes, bodies = {}, {}
@@ -205,16 +202,27 @@ def import_cad(
         if link in stated.masses:
             raise ModelError(f"{folder}: a mass of link {link}, which has no part")
         bodies[link] = stated.body(link, [], _inverse(frames[link]))
-    return CadImport(_with_parts(description, meshes, bodies), meshes, tuple(notes))
+    try:
+        made = _with_parts(description, meshes, bodies)
+    except DescriptionError as error:
+        raise ModelError(f"{folder}: {error} ({unit_note.removeprefix('warning: ')})") from None
+    return CadImport(made, meshes, tuple(notes))
 
 
 def _pose(description: Description, q: ArrayLike | None) -> tuple[Array, str]:
     if q is not None:
-        return joint_vector(description, q), "pose of the export: as given"
+        given = joint_vector(description, q)
+        return given, f"pose of the export: as given{_joint_values(description, given)}"
     ready = description.numbers.configurations.get("ready")
     if ready is not None:
-        return ready, "pose of the export: the configuration ready"
+        return ready, f"pose of the export: the configuration ready{_joint_values(description, ready)}"
     return np.zeros(description.n), "pose of the export: all joint values 0 (the table has no configuration ready)"
+
+
+def _joint_values(description: Description, q: Array) -> str:
+    kinds = zip(description.joints, q.tolist(), strict=True)
+    values = ", ".join(f"{x:.4g} m" if joint.type is JointType.PRISMATIC else f"{x:.4g}" for joint, x in kinds)
+    return f": q = {values}"
 
 
 def _inverse(T: Array) -> Array:
@@ -224,27 +232,32 @@ def _inverse(T: Array) -> Array:
     return inverse
 
 
-def _metres(
+def _in_metres(
     folder: Path,
     description: Description,
     frames: Array,
     parts: Mapping[int, Sequence[CadPart]],
     unit: str | None,
-) -> tuple[float, str]:
-    """Return what takes the coordinates of files without a unit to m, and how that was found."""
-    own = {i: [part.mesh for part in several if not part.in_metres] for i, several in parts.items()}
-    own = {i: meshes for i, meshes in own.items() if meshes}
-    if not own:
-        return 1.0, "unit: as the files state it"
-    bounds = np.array([mesh.bounds for meshes in own.values() for mesh in meshes])
-    size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
-    found = unit or unit_of(description, frames, own, str(folder))
-    across = f"the assembly is {size * UNITS[found]:.4g} m across, the arm {description.reach:.4g} m long"
+) -> tuple[dict[int, list[TriangleMesh]], str]:
+    """Return the meshes of each link in m, where they stand, and how their unit was found."""
+    without = {i: [part.mesh for part in several if part.unit is None] for i, several in parts.items()}
+    without = {i: meshes for i, meshes in without.items() if meshes}
+    stated = sorted({part.unit for several in parts.values() for part in several if part.unit is not None})
+    found = unit or (unit_of(description, frames, without, str(folder)) if without else "m")
+    standing = {i: [part.metres(unit, UNITS[found]) for part in several] for i, several in parts.items()}
+    listed = " and ".join(f"{one:g} m" for one in stated)
+    if unit is None and stated:
+        across = check_size(description, frames, standing, str(folder))
+        others = f"; {found} for the other files, found by size" if without else ""
+        return standing, f"unit: {listed}, as the files state it{others}: {across}"
+    size = size_of(standing)
+    across = f"the assembly is {size:.4g} m across, the arm {description.reach:.4g} m long"
     if unit is None:
-        return UNITS[found], f"unit: {found}, found by size: {across}"
+        return standing, f"unit: {found}, found by size: {across}"
     low, high = (share * description.reach for share in FOREIGN_SIZE)
-    odd = "" if low <= size * UNITS[found] <= high else "warning: "
-    return UNITS[found], f"{odd}unit: {found}, as stated: {across}"
+    odd = "" if low <= size <= high else "warning: "
+    over = f", for all files in place of the {listed} that files state" if any(o != UNITS[unit] for o in stated) else ""
+    return standing, f"{odd}unit: {unit}, as stated{over}: {across}"
 
 
 def _link_note(link: int, parts: Sequence[CadPart], mesh: TriangleMesh, body: LinkBody | None) -> str:

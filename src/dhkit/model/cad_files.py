@@ -10,8 +10,10 @@ from pathlib import Path
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.errors import DescriptionError, ModelError
 
-__all__ = ["Assignment", "assigned", "link_number", "mesh_files"]
+__all__ = ["LEFT_OUT", "Assignment", "assigned", "file_inside", "link_number", "mat_file", "mesh_files"]
 
+LEFT_OUT = -1
+"""The link that stands for none, where parts are mapped."""
 MOST_FILES = 500
 SHOWN = 12
 """Names that a message lists."""
@@ -31,7 +33,7 @@ class Assignment:
 
 
 def mesh_files(folder: Path) -> tuple[str, ...]:
-    """Return the names of a folder's mesh files, sorted; files in folders within are not looked at.
+    """Return the names of a folder's mesh files, sorted; hidden files and folders within are not looked at.
 
     Raises
     ------
@@ -41,7 +43,7 @@ def mesh_files(folder: Path) -> tuple[str, ...]:
     try:
         if not folder.is_dir():
             raise ModelError(f"{folder}: {'not a folder' if folder.exists() else 'no such folder'}")
-        names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in MESH_FORMATS)
+        names = sorted(path.name for path in folder.iterdir() if _is_seen(path) and path.suffix.lower() in MESH_FORMATS)
     except OSError as error:
         raise ModelError(f"{folder}: {error.strerror or error}") from None
     if len(names) > MOST_FILES:
@@ -49,6 +51,25 @@ def mesh_files(folder: Path) -> tuple[str, ...]:
     for name in names:
         file_inside(folder, name)
     return tuple(names)
+
+
+def _is_seen(path: Path) -> bool:
+    """Return whether a file is not hidden: macOS writes ._link1.stl beside link1.stl on foreign disks."""
+    return not path.name.startswith(".")
+
+
+def mat_file(folder: Path) -> Path | None:
+    """Return the only MAT file of a folder that has no mesh files; None where there is none or several.
+
+    Raises
+    ------
+    ModelError
+        A link that leaves the folder.
+    """
+    if not folder.is_dir() or mesh_files(folder):
+        return None
+    found = sorted(path for path in folder.iterdir() if _is_seen(path) and path.suffix.lower() == ".mat")
+    return file_inside(folder, found[0].name) if len(found) == 1 else None
 
 
 def file_inside(folder: Path, name: str) -> Path:
@@ -102,7 +123,8 @@ def assigned(
     links
         Number of joints n.
     stated
-        Names of parts by link, as the user maps them; an empty list for a link without a part.
+        Names of parts by link, as the user maps them; an empty list for a link without a part, and
+        :data:`LEFT_OUT` for parts of no link.
     where
         Folder or file, for messages.
     suffixes
@@ -113,8 +135,10 @@ def assigned(
     ModelError
         A name without a number, two of one number, or a link without a part; lists what was found.
     """
-    stated = stated or {}
+    stated = dict(stated or {})
     _check_stated(stated, names, links, where)
+    left_out = tuple(stated.pop(LEFT_OUT, ()))
+    names = [name for name in names if name not in left_out]
     taken = {name for several in stated.values() for name in several}
     numbers: dict[int, list[str]] = {}
     nameless = []
@@ -126,11 +150,17 @@ def assigned(
             nameless.append(name)
         else:
             numbers.setdefault(number, []).append(name)
-    hint = f'; found {_listed(names)}; say which by a mapping, such as --map "3={names[0] if names else "forearm.stl"}"'
+    first = names[0] if names else "forearm.stl"
+    found_names = f"; found {_listed(names)}; "
+    hint = f'{found_names}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
     if nameless:
         raise ModelError(f"{where}: no single link number in {_listed(nameless)}{hint}")
-    if doubled := next((several for several in numbers.values() if len(several) > 1), None):
-        raise ModelError(f"{where}: {_listed(doubled)} have the same link number{hint}")
+    for number, doubled in numbers.items():
+        if len(doubled) > 1:
+            raise ModelError(
+                f"{where}: {_listed(doubled)} have the same link number{found_names}if all are of that link, "
+                f'--map "{number}={",".join(doubled[:SHOWN])}"; --map "-={doubled[-1]}" leaves a part out'
+            )
     note = "parts by the numbers in their names"
     if 0 not in numbers and not stated and set(numbers) == set(range(1, links + 2)):
         numbers = {number - 1: several for number, several in numbers.items()}
@@ -147,13 +177,15 @@ def assigned(
         raise ModelError(f"{where}: no part for link{'s' * (len(missing) > 1)} {', '.join(map(str, missing))}{hint}")
     if not found.get(0):
         note += "; no base part"
+    if left_out:
+        note += f"; left out: {_listed(left_out)}"
     return Assignment({number: parts for number, parts in sorted(found.items()) if parts}, note)
 
 
 def _check_stated(stated: Mapping[int, Sequence[str]], names: Sequence[str], links: int, where: str) -> None:
     seen: set[str] = set()
     for number, several in stated.items():
-        if not 0 <= number <= links:
+        if number != LEFT_OUT and not 0 <= number <= links:
             raise ModelError(f"{where}: the mapping names link {number}; the table has links 0 to {links}")
         for name in several:
             if name not in names:

@@ -12,13 +12,17 @@ from dhkit.description import Array
 from dhkit.errors import ModelError
 from dhkit.model.cad_files import link_number
 from dhkit.model.mass_report import ReportedMass, read_mass_report
-from dhkit.model.shape_inertia import InertiaMethod, MassProperties, shape_inertia
+from dhkit.model.shape_inertia import MassProperties, shape_inertia
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["LinkBody", "StatedMasses", "combined"]
+__all__ = ["LinkBody", "StatedMasses"]
 
 ROUNDING = 1e-13
 """Coordinates and products below this share of a link's size and moments are 0: integrals are exact to some 1e-15."""
+IMPOSSIBLE = 0.01
+"""How far moments may be beyond what is possible, as a share: reports are rounded."""
+USUAL = (20.0, 25_000.0)
+"""kg/m^3: foam, and platinum metals; a density beyond is probably in another unit."""
 OUTSIDE = 0.1
 """How far a reported centre of mass may lie outside the box around its link, as a share of the link's size."""
 
@@ -81,6 +85,14 @@ class StatedMasses:
             )
         return cls(density, masses, found)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A warning about a density that no material of arms has."""
+        if self.density is None or USUAL[0] <= self.density <= USUAL[1]:
+            return ()
+        hint = "g/cm^3 meant? then times 1000" if self.density < USUAL[0] else "steel has 7850"
+        return (f"warning: the density is {self.density:g} kg/m^3; {hint}",)
+
     def body(self, link: int, meshes: Sequence[TriangleMesh], T_frame_world: Array) -> LinkBody | None:
         """Return the body of a link, None where nothing is stated about it.
 
@@ -103,26 +115,23 @@ class StatedMasses:
         if link not in self.masses and self.density is None:
             return None
         try:
-            shapes = [shape_inertia(mesh, density=1.0) for mesh in meshes]
+            one = shape_inertia(meshes, density=1.0)
         except ModelError as error:
             raise ModelError(f"link {link}: {error}") from None
-        one, volume = combined(shapes), sum(shape.volume for shape in shapes)
         stated = self.masses.get(link)
-        density = self.density if stated is None else stated / volume
+        density = self.density if stated is None else stated / one.volume
         if density is None:
             raise ModelError(f"link {link}: neither a density nor a mass")
         size = max(mesh.size for mesh in meshes)
         properties = _without_rounding(MassProperties(density * one.mass, one.com, density * one.inertia), size)
         basis = f"{density:.6g} kg/m^3" if stated is None else f"{stated:.6g} kg"
-        methods = {shape.method for shape in shapes}
-        worst = next(method for method in reversed(InertiaMethod) if method in methods)
-        notes = tuple(dict.fromkeys(note for shape in shapes for note in shape.notes))
-        return LinkBody(properties, (f"body from {worst.value} and {basis}", *notes))
+        return LinkBody(properties, (f"body from {one.method.value} and {basis}", *one.notes))
 
     @staticmethod
     def _reported(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame_world: Array) -> LinkBody:
         properties = report.properties.moved(T_frame_world)
-        notes = [f"body from {report.source}", *report.notes]
+        notes = [f"body from the report of {report.part[:60]!r}, {report.source}", *report.notes]
+        notes += _impossible(properties, meshes)
         if meshes:
             low = np.min([mesh.bounds[0] for mesh in meshes], axis=0)
             high = np.max([mesh.bounds[1] for mesh in meshes], axis=0)
@@ -135,19 +144,28 @@ class StatedMasses:
         return LinkBody(properties, tuple(notes))
 
 
+def _impossible(body: MassProperties, meshes: Sequence[TriangleMesh]) -> list[str]:
+    """Return warnings about moments that no body has, or none that fits into the box around the link."""
+    moments, notes = np.linalg.eigvalsh(body.inertia), []
+    if moments[0] + moments[1] < (1 - IMPOSSIBLE) * moments[2]:
+        listed = ", ".join(f"{moment:.3g}" for moment in moments)
+        notes.append(
+            f"warning: no body has its principal moments {listed} kg m^2: one is larger than the sum of the others"
+        )
+    if meshes:
+        # Points within an extent of s have a variance of s^2/4 at most (Popoviciu 1935).
+        extent = np.ptp(np.concatenate([mesh.bounds for mesh in meshes]), axis=0)
+        most = body.mass * float(extent @ extent) / 4
+        if moments[2] > (1 + IMPOSSIBLE) * most:
+            notes.append(
+                f"warning: its largest moment is {moments[2]:.3g} kg m^2, a body of its mass within the link's box has "
+                f"{most:.3g} at most; are the units of the report right?"
+            )
+    return notes
+
+
 def _without_rounding(body: MassProperties, size: float) -> MassProperties:
     """Return mass properties with 0 for coordinates and products that are rounding alone: people read the file."""
     com = np.where(np.abs(body.com) < ROUNDING * size, 0.0, body.com)
     products = (np.abs(body.inertia) < ROUNDING * np.trace(body.inertia)) & ~np.eye(3, dtype=bool)
     return MassProperties(body.mass, com, np.where(products, 0.0, body.inertia))
-
-
-def combined(bodies: Sequence[MassProperties]) -> MassProperties:
-    """Return rigid bodies of one frame as one, by Steiner's theorem about the common centre of mass."""
-    mass = sum(body.mass for body in bodies)
-    com = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
-    inertia = np.zeros((3, 3))
-    for body in bodies:
-        r = body.com - com
-        inertia += body.inertia + body.mass * (r @ r * np.eye(3) - np.outer(r, r))
-    return MassProperties(float(mass), com, inertia)

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.errors import ModelError
-from dhkit.model.cad_files import assigned, file_inside, mesh_files
+from dhkit.model.cad_files import assigned, file_inside, mat_file, mesh_files
+from dhkit.model.cad_units import UNITS
+from dhkit.model.collada import collada_unit
 from dhkit.model.mat_parts import mat_parts
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
@@ -35,8 +37,14 @@ class CadPart:
     name: str
     """The file's, or the variable's of a MAT file."""
     mesh: TriangleMesh
-    in_metres: bool
-    """Whether its format states the unit, as COLLADA does; then its coordinates are in m."""
+    unit: float | None = None
+    """What its file states as its unit, m, as COLLADA files can; then the mesh is in m. None: in the file's unit."""
+
+    def metres(self, unit: str | None, found: float) -> TriangleMesh:
+        """Return the mesh in m: by the unit that the user states for all files, by its own, or by the one found."""
+        if unit is not None:
+            return self.mesh.scaled(UNITS[unit] / (self.unit or 1.0))
+        return self.mesh.scaled(found if self.unit is None else 1.0)
 
 
 def cad_parts(
@@ -68,13 +76,14 @@ def cad_parts(
     """
     if simplify is not None and simplify < FEWEST:
         raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {FEWEST} at least")
-    mat = _mat_file(folder)
+    named = folder.suffix.lower() == ".mat" and not folder.is_dir()
+    mat = folder if named else mat_file(folder)
     if mat is not None:
         meshes = mat_parts(mat)
         found = assigned(tuple(meshes), links, files, str(mat), suffixes=False)
         for name, mesh in meshes.items():
             _check_budget(f"{mat}: {name}", len(mesh.faces), simplify)
-        parts = {i: tuple(CadPart(name, meshes[name], False) for name in names) for i, names in found.parts.items()}
+        parts = {i: tuple(CadPart(name, meshes[name]) for name in names) for i, names in found.parts.items()}
         return parts, (found.note,)
     names = mesh_files(folder)
     if not names:
@@ -84,17 +93,8 @@ def cad_parts(
     for path in chosen.values():  # all headers before the first file is read
         _check_budget(str(path), mesh_header(path, MAX_CAD_BYTES).triangles or 0, simplify)
     most = MAX_CAD_TRIANGLES if simplify is None else MAX_READ_TRIANGLES
-    read = {name: CadPart(name, _read(path, most), path.suffix.lower() == ".dae") for name, path in chosen.items()}
+    read = {name: CadPart(name, _read(path, most), _unit(path)) for name, path in chosen.items()}
     return {i: tuple(read[name] for name in several) for i, several in found.parts.items()}, (found.note,)
-
-
-def _mat_file(folder: Path) -> Path | None:
-    if folder.suffix.lower() == ".mat" and not folder.is_dir():
-        return folder
-    if not folder.is_dir() or mesh_files(folder):
-        return None
-    found = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".mat")
-    return file_inside(folder, found[0].name) if len(found) == 1 else None
 
 
 def _check_budget(where: str, count: int, simplify: int | None) -> None:
@@ -105,6 +105,11 @@ def _check_budget(where: str, count: int, simplify: int | None) -> None:
         )
     if count > MAX_READ_TRIANGLES:
         raise ModelError(f"{where}: {count} triangles; expected at most {MAX_READ_TRIANGLES}, even to simplify")
+
+
+def _unit(path: Path) -> float | None:
+    """Return the unit that a file which was read states, m; of all formats only COLLADA can."""
+    return collada_unit(path.read_bytes()) if path.suffix.lower() == ".dae" else None
 
 
 def _read(path: Path, most: int) -> TriangleMesh:

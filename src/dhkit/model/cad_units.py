@@ -11,7 +11,7 @@ from dhkit.description.frames import carrying
 from dhkit.errors import ModelError
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["UNITS", "check_positions", "far_from_axes", "unit_of"]
+__all__ = ["UNITS", "arm_length", "check_positions", "check_size", "far_from_axes", "size_of", "unit_of"]
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 SMALLEST, LARGEST = 0.25, 6.0
@@ -22,6 +22,8 @@ NEAR = 0.05
 """How far the axes of the joints pass the boxes around their links, on average, as a share of the arm's length."""
 CLEARER = 2.0
 """The second best unit must miss the axes by this factor more."""
+WIDEST = (0.05, 40.0)
+"""Sizes as for SMALLEST and LARGEST, of a small arm on a large base too, at which the axes can speak for a unit."""
 FAR = 0.1
 """How far a joint's axis may pass the box around a link of it without a warning, as a share of the arm's length."""
 FEWEST_AXES = 2
@@ -68,16 +70,14 @@ def unit_of(description: Description, frames: Array, links: Mapping[int, Sequenc
     ModelError
         No unit fits, or more than one; names the option that states it.
     """
-    # A sliding joint without limits is not in the reach, and may stand far out.
-    length = max(description.reach, float(np.linalg.norm(np.diff(frames[:, :3, 3], axis=0), axis=1).sum()))
-    bounds = np.array([mesh.bounds for meshes in links.values() for mesh in meshes])
-    size = float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    length, size = arm_length(description, frames), size_of(links)
     if length == 0:
         raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
     fitting = [unit for unit, metres in UNITS.items() if SMALLEST <= size * metres / length <= LARGEST]
-    if len(fitting) == 1:
-        return fitting[0]
     found = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
+    if len(fitting) == 1:
+        _check_others(description, frames, links, fitting[0], f"{where}: {found}")
+        return fitting[0]
     if not fitting:
         raise ModelError(f"{where}: {found}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
     missed = {unit: _missed(description, frames, links, UNITS[unit]) / length for unit in fitting}
@@ -90,6 +90,53 @@ def unit_of(description: Description, frames: Array, links: Mapping[int, Sequenc
     if description.n < FEWEST_AXES or missed[second] < CLEARER * missed[best] + NEAR / 5:
         raise ModelError(f"{where}: {found}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
     return best
+
+
+def _check_others(
+    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], unit: str, found: str
+) -> None:
+    """Refuse the only unit that fits by size where the parts lie beside the axes in it, and not in another one.
+
+    So it is with a small arm on a large base, or with a large tool, which is taken for a large arm in a smaller unit.
+    """
+    length, size = arm_length(description, frames), size_of(links)
+    if description.n < FEWEST_AXES or _missed(description, frames, links, UNITS[unit]) <= NEAR * length:
+        return
+    possible = [u for u in UNITS if u != unit and WIDEST[0] <= size * UNITS[u] / length <= WIDEST[1]]
+    others = [u for u in possible if _missed(description, frames, links, UNITS[u]) <= NEAR * length]
+    if others:
+        raise ModelError(
+            f"{found}: {unit} fits by size, but in it the parts lie beside the joints' axes, and in "
+            f"{' and '.join(others)} they do not; state the unit, such as --unit {others[0]}"
+        )
+
+
+def arm_length(description: Description, frames: Array) -> float:
+    """Return the length of an arm in a pose, m; a sliding joint without limits may stand far beyond the reach."""
+    return max(description.reach, float(np.linalg.norm(np.diff(frames[:, :3, 3], axis=0), axis=1).sum()))
+
+
+def size_of(links: Mapping[int, Sequence[TriangleMesh]]) -> float:
+    """Return the diagonal of the box around all meshes, in their unit."""
+    bounds = np.array([mesh.bounds for meshes in links.values() for mesh in meshes])
+    return float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+
+
+def check_size(description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], where: str) -> str:
+    """Return the sizes of an assembly whose files state their unit, meshes in m, and of the arm, in words.
+
+    Raises
+    ------
+    ModelError
+        The assembly is far smaller or larger than the arm; names the option that states the unit.
+    """
+    length, size = arm_length(description, frames), size_of(links)
+    if length and not SMALLEST <= size / length <= LARGEST:
+        raise ModelError(
+            f"{where}: by the unit that the files state the assembly is {size:.4g} m across, the arm of the table "
+            f"{length:.4g} m long; is it the same arm? else state the unit of all files, such as --unit mm"
+        )
+    return f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
 
 
 def far_from_axes(
@@ -111,7 +158,7 @@ def far_from_axes(
     missed = {key: miss for key, miss in _misses(description, frames, links, 1.0).items() if miss > allowed}
     return tuple(
         f"warning: link {link}: its part lies {miss:.3g} m beside the axis of joint {joint}; is the pose of the export "
-        "the table's, and the assembly's origin frame 0?"
+        "the table's, the assembly's origin frame 0, and the unit right?"
         for (joint, link), miss in missed.items()
     )
 

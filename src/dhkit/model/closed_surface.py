@@ -14,22 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.model.shells import Shells
+from dhkit.model.triangle_mesh import TriangleMesh, same_vertices
 
-__all__ = ["Surface", "closed_surface", "is_closed", "signed_volume", "tetrahedra"]
+__all__ = ["FLAT", "Surface", "is_closed", "outwards", "repaired", "signed_volume", "tetrahedra"]
 
 NEAR = 1e-6
 """Vertices nearer than this share of a mesh's size are joined where the mesh is open: files round each corner alone."""
 LARGEST_CAP = 0.02
 """Area of the caps over all holes, at most, as a share of the whole area: beyond it the shape is not known."""
 MOST_SHELLS = 400
-"""Shells whose place inside others is looked at: each is held against all triangles."""
-BEHIND = 1e-6
-"""How far behind a triangle a point is looked at, as a share of the mesh's size."""
-OVERLAP_POINTS = 16
-"""Middles of triangles of a shell that are looked at: shells that overlap by a few triangles alone are not found."""
-INSIDE = 0.75
-"""Winding number of a point, above which it is inside: 1 inside a shell, 0 outside, up to rounding."""
+"""Shells whose place inside others is looked at."""
+FLAT = 1e-13
+"""Volume below which a mesh encloses nothing, as a share of its size cubed: a wire of 1 m and 1 um has 1e-12."""
+INVERTED = "inside out: all triangles were turned"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,40 +42,68 @@ class Surface:
     """What was changed, in words."""
 
 
-def closed_surface(mesh: TriangleMesh) -> Surface:
-    """Return a mesh as a closed surface that goes round counterclockwise seen from outside, if it can be made one."""
-    notes: list[str] = []
-    if not is_closed(mesh):
-        mesh, is_filled, repairs = _repaired(mesh)
-        notes += repairs
-        if is_filled is None:
-            return Surface(mesh, False, False, tuple(notes))
-    else:
-        is_filled = False
-    outside, said = _outwards(mesh)
-    return Surface(outside, True, is_filled, (*notes, *said))
-
-
-def _repaired(mesh: TriangleMesh) -> tuple[TriangleMesh, bool | None, list[str]]:
-    """Return a mesh made closed, whether holes were capped for it, None where that fails, and what was changed."""
+def repaired(mesh: TriangleMesh) -> Surface:
+    """Return a mesh as a closed surface, if it can be made one; :func:`outwards` turns its shells."""
+    if is_closed(mesh):
+        single, notes = _single(mesh)
+        return Surface(single, True, False, notes)
     one = mesh.merged()
-    if is_closed(one):
-        return one, False, []
     if not len(one.faces):
-        return one, None, []
-    notes: list[str] = []
+        return Surface(one, False, False, ())
+    if is_closed(one):
+        one, notes = _single(one)
+        return Surface(one, True, False, notes)
     near = _joined_nearby(mesh)
     if is_closed(near):
-        return near, False, [f"vertices nearer than {NEAR:g} of the size were joined"]
-    one, turned = _consistent(one)
+        near, notes = _single(near)
+        return Surface(near, True, False, (f"vertices nearer than {NEAR:g} of the size were joined", *notes))
+    for way_matters in (True, False):
+        fewer, notes = _without_copies(one, way_matters=way_matters)
+        if notes and is_closed(fewer := _consistent(fewer)[0]):
+            return Surface(fewer, True, False, notes)
+    return _capped_surface(*_without_copies(one, way_matters=True))
+
+
+def _single(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Return a closed mesh without copies of triangles, and, where each is there both ways round, with one of both."""
+    fewer, notes = _without_copies(mesh, way_matters=True)
+    if notes and is_closed(fewer):
+        return fewer, notes
+    if abs(signed_volume(mesh)) <= FLAT * mesh.size**3:
+        fewer, notes = _without_copies(mesh, way_matters=False)
+        if notes and is_closed(fewer := _consistent(fewer)[0]):
+            return fewer, notes
+    return mesh, ()
+
+
+def _without_copies(mesh: TriangleMesh, *, way_matters: bool) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Return a mesh with one of each triangle, told by its vertices and perhaps its way round, and what was dropped."""
+    if way_matters:
+        start = np.argmin(mesh.faces, axis=1)
+        rows = np.take_along_axis(mesh.faces, (start[:, None] + np.arange(3)) % 3, axis=1)
+    else:
+        rows = np.sort(mesh.faces, axis=1)
+    first, _ = same_vertices(rows.astype(np.float64))
+    if len(first) == len(mesh.faces):
+        return mesh, ()
+    kept = np.sort(first)
+    colours = None if mesh.colours is None else mesh.colours[kept]
+    dropped = len(mesh.faces) - len(kept)
+    said = f"{dropped} triangle{'s' * (dropped > 1)} written more than once {'were' if dropped > 1 else 'was'} dropped"
+    return TriangleMesh(mesh.vertices, mesh.faces[kept], colours), (said,)
+
+
+def _capped_surface(mesh: TriangleMesh, notes: tuple[str, ...]) -> Surface:
+    """Return an open mesh with its triangles turned alike and its holes capped, as far as that makes it closed."""
+    one, turned = _consistent(mesh)
     if turned:
-        notes.append(f"{turned} triangles were turned to go round as their neighbours do")
+        notes = (*notes, f"{turned} triangles were turned to go round as their neighbours do")
     if is_closed(one):
-        return one, False, notes
+        return Surface(one, True, False, notes)
     one, share = _capped(one)
     if is_closed(one):
-        return one, True, [*notes, f"open: holes were capped, {100 * share:.2g} % of the area"]
-    return one, None, notes
+        return Surface(one, True, True, (*notes, f"open: holes were capped, {100 * share:.2g} % of the area"))
+    return Surface(one, False, False, notes)
 
 
 def is_closed(mesh: TriangleMesh) -> bool:
@@ -198,73 +224,38 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     return (filled, share) if share <= LARGEST_CAP else (mesh, share)
 
 
-def _outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
+def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     """Return a closed mesh with its shells turned outwards, those of cavities inwards, and what was done."""
-    notes: list[str] = []
-    if signed_volume(mesh) < 0:
+    is_inverted = signed_volume(mesh) < 0
+    if is_inverted:
         mesh = mesh.turned()
-        notes.append("inside out: all triangles were turned")
-    shells = _shells(mesh)
-    count = int(shells.max()) + 1
-    if count == 1:
-        return mesh, tuple(notes)
-    if count > MOST_SHELLS:
-        return mesh, (*notes, f"{count} shells: which of them lie in others was not looked at")
-    volume = np.bincount(shells, _volumes(mesh), minlength=count)
-    inside = np.array([_winding(mesh, shells != k, _inner_points(mesh, shells == k)[0]) for k in range(count)])
+    shells = Shells(mesh)
+    if shells.count > MOST_SHELLS:
+        said = (INVERTED,) if is_inverted else ()
+        return mesh, (*said, f"{shells.count} shells: which of them lie in others was not looked at")
+    if shells.count == 1:
+        return mesh, (INVERTED,) if is_inverted else ()
     # A cavity lies where the shells around it count 1; a shell elsewhere has its triangles the wrong way round.
-    wrong = (volume < 0) & (inside < INSIDE)
-    if wrong.any():
-        faces = np.where(wrong[shells][:, None], mesh.faces[:, ::-1], mesh.faces)
-        mesh = TriangleMesh(mesh.vertices, faces, mesh.colours)
-        notes.append(f"{int(wrong.sum())} of {count} shells were inside out and were turned")
-    if cavities := int(((volume < 0) & ~wrong).sum()):
+    shells.turn(shells.inside_out())
+    flipped = shells.flipped ^ is_inverted
+    notes = []
+    if flipped.all():
+        notes.append(INVERTED)
+    elif flipped.any():
+        notes.append(f"{int(flipped.sum())} of {shells.count} shells were inside out and were turned")
+    return shells.mesh, (*notes, *_shell_notes(shells))
+
+
+def _shell_notes(shells: Shells) -> list[str]:
+    notes = []
+    if cavities := int((shells.volume < 0).sum()):
         notes.append(f"{cavities} cavit{'y' if cavities == 1 else 'ies'} inside")
-    if doubled := sum(_overlaps(mesh, shells, k) for k in np.flatnonzero(volume > 0).tolist()):
-        notes.append(
-            f"warning: {doubled} of {count} shells lie in or reach into others, where the material counts twice"
-        )
-    return mesh, tuple(notes)
-
-
-def _overlaps(mesh: TriangleMesh, shells: NDArray[np.intp], k: int) -> bool:
-    """Return whether a few points of a shell lie inside others."""
-    points = _inner_points(mesh, shells == k)
-    chosen = points[:: max(1, len(points) // OVERLAP_POINTS)][:OVERLAP_POINTS]
-    return any(_winding(mesh, shells != k, point) > INSIDE for point in chosen)
-
-
-def _inner_points(mesh: TriangleMesh, chosen: NDArray[np.bool_]) -> Array:
-    """Return points just behind triangles' middles: on a face that two shells share the winding number is undecided."""
-    corners = mesh.corners[chosen]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    unit = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    points: Array = corners.mean(axis=1) - BEHIND * mesh.size * unit
-    return points
-
-
-def _shells(mesh: TriangleMesh) -> NDArray[np.intp]:
-    """Return the number of the connected piece that each triangle belongs to, shape (m,)."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    # Two edges join the three vertices of a triangle.
-    first, middle, last = mesh.faces.astype(np.int32).T
-    ends = np.concatenate([first, middle]), np.concatenate([middle, last])
-    graph = coo_array((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(len(mesh.vertices),) * 2)
-    _, label = connected_components(graph, directed=False)
-    if not label[mesh.faces[:, 0]].any():
-        return np.zeros(len(mesh.faces), dtype=np.intp)
-    _, shells = np.unique(label[mesh.faces[:, 0]], return_inverse=True)
-    return shells.reshape(-1)
-
-
-def _winding(mesh: TriangleMesh, chosen: NDArray[np.bool_], point: Array) -> float:
-    """Return how often triangles go round a point: the solid angles over 4 pi (Van Oosterom, Strackee 1983)."""
-    a, b, c = np.moveaxis(mesh.corners[chosen] - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
-    angle = 2 * np.arctan2(triple, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return float(angle.sum() / (4 * np.pi))
+    doubled, (twice, reaching) = shells.doubled(), shells.shared()
+    share = f" ({100 * twice / float(shells.volume.sum()):.2g} % of the volume)" if twice else ""
+    if doubled or twice:
+        which = f"{doubled} of {shells.count}" if doubled else "some"
+        notes.append(f"warning: {which} shells lie in or reach into others, where the material counts twice{share}")
+    if reaching:
+        which = "a cavity reaches" if reaching == 1 else f"{reaching} cavities reach"
+        notes.append(f"warning: {which} out of the material around, and takes volume away where there is none")
+    return notes

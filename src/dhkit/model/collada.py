@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
-__all__ = ["collada_mesh"]
+__all__ = ["collada_mesh", "collada_unit"]
 
 Element = ElementTree.Element
 MOST_PIECES = 5_000
@@ -42,6 +43,27 @@ def collada_mesh(content: bytes) -> TriangleMesh:
         A reference to nothing, a number that is none, or more pieces than :data:`MOST_PIECES`.
     """
     return _Document(content).mesh()
+
+
+def collada_unit(content: bytes) -> float | None:
+    """Return the unit that a COLLADA file states for the whole of it, m; None where it has none.
+
+    Raises
+    ------
+    ModelError
+        No XML, or a unit that is no positive number.
+    """
+    return _stated_unit(_Document(content).root)
+
+
+def _stated_unit(root: Element) -> float | None:
+    unit = root.find("asset/unit")
+    if unit is None or unit.get("meter") is None:
+        return None
+    found = _numbers(unit.get("meter", ""))
+    if len(found) != 1 or not (np.isfinite(found[0]) and found[0] > 0):
+        raise ModelError(f"<unit meter> is {unit.get('meter', '')[:20]}; expected a positive number")
+    return float(found[0])
 
 
 class _Document:
@@ -76,10 +98,7 @@ class _Document:
             raise ModelError("no triangles")
         coloured = all(piece.colours is not None for piece in pieces)
         mesh = joined_meshes(pieces if coloured else [TriangleMesh(piece.vertices, piece.faces) for piece in pieces])
-        metres = self.root.find("asset/unit")
-        scale = _numbers(metres.get("meter", "1"))[0] if metres is not None else 1.0
-        if not (np.isfinite(scale) and scale > 0):
-            raise ModelError(f"<unit meter> is {scale:g}; expected a positive number")
+        scale = _stated_unit(self.root) or 1.0
         up = (self.root.findtext("asset/up_axis") or "Y_UP").strip()
         if up not in TO_Z_UP:
             raise ModelError(f"<up_axis> is {up[:20]!r}; expected X_UP, Y_UP or Z_UP")
@@ -146,10 +165,10 @@ class _Document:
         offsets = [_whole(one.get("offset", "0")) for one in inputs]
         stride, offset = max(offsets) + 1, _whole(places["VERTEX"].get("offset", "0"))
         vertices = self._positions(self._named(places["VERTEX"]))
-        faces = _triangles(element, stride, offset)
-        if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
-            raise ModelError(f"a face with vertex {faces.max()}; the file has vertices 0 to {len(vertices) - 1}")
-        return TriangleMesh(vertices, faces)
+        corners, counts = _corners(element, stride, offset)
+        if len(corners) and (corners.min() < 0 or corners.max() >= len(vertices)):
+            raise ModelError(f"a face with vertex {corners.max()}; the file has vertices 0 to {len(vertices) - 1}")
+        return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
     def _positions(self, vertices: Element) -> Array:
         position = next((one for one in vertices.findall("input") if one.get("semantic") == "POSITION"), None)
@@ -164,8 +183,8 @@ class _Document:
         return numbers.reshape(-1, stride)[:, :3]
 
 
-def _triangles(element: Element, stride: int, offset: int) -> NDArray[np.intp]:
-    """Return an element's polygons as triangles of vertex numbers, shape (m, 3)."""
+def _corners(element: Element, stride: int, offset: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the vertex numbers of an element's polygons, one after the other, and how many each polygon has."""
     lists = [_numbers(p.text or "").astype(np.intp) for p in element.findall("p")]
     if any(len(p) % stride for p in lists):
         raise ModelError(f"<{element.tag}> with an incomplete list of indices")
@@ -179,12 +198,7 @@ def _triangles(element: Element, stride: int, offset: int) -> NDArray[np.intp]:
     indices = np.concatenate([np.zeros(0, dtype=np.intp), *corners])
     if len(indices) != counts.sum() or (counts < 0).any():
         raise ModelError(f"<{element.tag}> with {len(indices)} corners; its counts say {counts.sum()}")
-    starts = np.cumsum(counts) - counts
-    fans = np.maximum(counts - 2, 0)
-    first = np.repeat(starts, fans)
-    step = np.arange(int(fans.sum())) - np.repeat(np.cumsum(fans) - fans, fans)
-    triangles: NDArray[np.intp] = indices[np.stack([first, first + step + 1, first + step + 2], axis=1)]
-    return triangles
+    return indices, counts
 
 
 def _transform(element: Element) -> Array:

@@ -1,7 +1,8 @@
 """Parts of an assembly from a MAT file of faces, vertices and colours, as the course's Robot_CAD2MAT stores them.
 
 A struct a part, ``s1`` with fields F1, V1, C1, or one struct ``s`` with fields F1, V1, C1, F2 ..., or an array of
-structs ``s`` with fields F, V, C. Vertices are (k, 3), or (k, 4) with a column of ones; faces count vertices from 1.
+structs ``s`` with fields F, V, C; or faces, vertices, facevertexcdata as MATLAB's patch has them. Vertices are (k, 3),
+or (k, 4) with a column of ones; faces count vertices from 1.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from dhkit.description.files import read_bounded
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.mesh_reader import odd_coordinates
+from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh
 
 __all__ = ["mat_parts"]
@@ -32,7 +34,8 @@ MAX_PARTS = 100
 MAX_POLYGON = 16
 """Columns of a list of faces."""
 HEADER, MATRIX, COMPRESSED = 128, 14, 15
-FIELD = re.compile(r"([FVC])(\d{0,3})")
+FIELD = re.compile(r"([FVC]|faces|vertices|facevertexcdata)(\d{0,3})", re.IGNORECASE)
+"""The course's names, and those of MATLAB's patch and isosurface."""
 VARIABLE = re.compile(r"[A-Za-z]\w*?(\d{0,3})")
 
 
@@ -134,8 +137,9 @@ def _parts(variables: dict[str, Any]) -> Iterator[tuple[str, TriangleMesh]]:
             continue
         records = value.reshape(-1)
         for k, record in enumerate(records, start=1):
-            fields = {field: record[field] for field in value.dtype.names if FIELD.fullmatch(field)}
-            numbers = sorted({FIELD.fullmatch(field)[2] for field in fields}, key=lambda text: int(text or 0))  # type: ignore[index]
+            found_names = [(FIELD.fullmatch(field), field) for field in value.dtype.names]
+            fields = {_short(match) + match[2]: record[field] for match, field in found_names if match}
+            numbers = sorted({field[1:] for field in fields}, key=lambda text: int(text or 0))
             for number in numbers:
                 if f"F{number}" not in fields or f"V{number}" not in fields:
                     continue
@@ -146,6 +150,11 @@ def _parts(variables: dict[str, Any]) -> Iterator[tuple[str, TriangleMesh]]:
                 many = len(numbers) > 1 or len(records) > 1
                 part = f"{name}{number or k}" if many else name
                 yield part, _mesh(part, fields[f"F{number}"], fields[f"V{number}"], fields.get(f"C{number}"))
+
+
+def _short(match: re.Match[str]) -> str:
+    """Return F, V or C for the name of a field."""
+    return "C" if match[1].lower() == "facevertexcdata" else match[1][0].upper()
 
 
 def _mesh(part: str, faces: Any, vertices: Any, colours: Any) -> TriangleMesh:
@@ -163,8 +172,8 @@ def _mesh(part: str, faces: Any, vertices: Any, colours: Any) -> TriangleMesh:
         raise ModelError(f"{part}: faces that are no whole numbers")
     if np.any((wide[~ragged] < 1) | (wide[~ragged] > len(points))):
         raise ModelError(f"{part}: a face with a vertex that is none of 1 to {len(points)}")
-    fans = [wide[:, [0, k, k + 1]] for k in range(1, wide.shape[1] - 1)]
-    triangles = np.concatenate([fan[np.isfinite(fan).all(axis=1)] for fan in fans]).astype(np.intp) - 1
+    corners, counts = wide[~ragged].astype(np.intp) - 1, (~ragged).sum(axis=1)
+    triangles = triangles_of(points, corners, counts)
     mesh = TriangleMesh(points, triangles, _colours(colours, len(triangles)))
     if wrong := odd_coordinates(mesh):
         raise ModelError(f"{part}: {wrong}")

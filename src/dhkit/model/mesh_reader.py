@@ -39,10 +39,21 @@ def mesh_header(path: Path, most: int = MAX_MESH_BYTES) -> MeshHeader:
     try:
         return check_mesh_file(path, most)
     except DescriptionError as error:
-        raise ModelError(str(error)) from None
+        raise ModelError(f"{error}{_mark(path)}") from None
 
 
-def read_mesh(path: Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int = MAX_MESH_BYTES) -> TriangleMesh:
+def _mark(path: Path) -> str:
+    """Return a hint where a refused STL begins with a byte order mark."""
+    if path.suffix.lower() != ".stl" or not path.is_file():
+        return ""
+    with path.open("rb") as file:
+        marked = file.read(3)
+    if not marked.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
+        return ""
+    return "; it begins with a byte order mark: save the text as ASCII, or as UTF-8 without BOM"
+
+
+def read_mesh(path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int = MAX_MESH_BYTES) -> TriangleMesh:
     """Return the triangles of an STL, OBJ, PLY or COLLADA file.
 
     Coordinates are in the file's units; those of COLLADA, which states its unit and its up axis, in metres with z up.
@@ -61,6 +72,7 @@ def read_mesh(path: Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int 
         It is no mesh, too large, has no triangles, coordinates that are not finite, or indices of no vertex: one line
         that begins with the path.
     """
+    path = Path(path)
     header = mesh_header(path, max_bytes)
     if header.triangles is not None:
         _check_count(path, header.triangles, max_triangles)

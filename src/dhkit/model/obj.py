@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from dhkit.errors import ModelError
+from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh
 
 __all__ = ["obj_mesh"]
@@ -18,7 +19,7 @@ MOST_CORNERS = 1_000
 
 
 def obj_mesh(content: bytes) -> TriangleMesh:
-    """Return an OBJ file's faces as triangles, polygons cut into fans, in the file's units.
+    """Return an OBJ file's faces as triangles, in the file's units.
 
     Raises
     ------
@@ -28,15 +29,17 @@ def obj_mesh(content: bytes) -> TriangleMesh:
     content = content.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
     try:
         vertices = np.array(VERTEX.findall(content), dtype="S40").astype(np.float64).reshape(-1, 3)
-        faces = _faces(content, len(vertices))
+        polygons = _polygons(content, len(vertices))
     except ValueError as error:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
-    return TriangleMesh(vertices, np.array(faces, dtype=np.intp).reshape(-1, 3))
+    corners = np.array([corner for polygon in polygons for corner in polygon], dtype=np.intp)
+    counts = np.array([len(polygon) for polygon in polygons], dtype=np.intp)
+    return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
 
-def _faces(content: bytes, count: int) -> list[tuple[int, int, int]]:
-    """Return triangles of vertex numbers from 0; an index below 0 counts back from the vertices read so far."""
-    faces: list[tuple[int, int, int]] = []
+def _polygons(content: bytes, count: int) -> list[list[int]]:
+    """Return the vertex numbers of each face from 0; an index below 0 counts back from the vertices read so far."""
+    faces: list[list[int]] = []
     seen = 0
     for line in FACE.finditer(content):
         if line.group().lstrip().startswith(b"v"):
@@ -50,5 +53,5 @@ def _faces(content: bytes, count: int) -> list[tuple[int, int, int]]:
         if 0 in found or min(corners) < 0 or max(corners) >= count:
             wrong = next(i for i, k in zip(found, corners, strict=True) if i == 0 or not 0 <= k < count)
             raise ModelError(f"a face with vertex {wrong}; the file has vertices 1 to {count}")
-        faces += [(corners[0], corners[k], corners[k + 1]) for k in range(1, len(corners) - 1)]
+        faces.append(corners)
     return faces

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -11,13 +12,10 @@ from numpy.typing import ArrayLike
 from dhkit.description import INERTIA_PLACES, Array, Body, Inertia
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
-from dhkit.model.closed_surface import closed_surface, tetrahedra
-from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.model.closed_surface import FLAT, outwards, repaired, signed_volume, tetrahedra
+from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
 __all__ = ["InertiaMethod", "MassProperties", "ShapeInertia", "convex_hull", "shape_inertia"]
-
-FLAT = 1e-13
-"""Volume below which a mesh encloses nothing, as a share of its size cubed: a wire of 1 m and 1 um has 1e-12."""
 
 
 class InertiaMethod(Enum):
@@ -64,7 +62,9 @@ class ShapeInertia(MassProperties):
     """What was changed on the mesh, in words."""
 
 
-def shape_inertia(mesh: TriangleMesh, *, density: float | None = None, mass: float | None = None) -> ShapeInertia:
+def shape_inertia(
+    mesh: TriangleMesh | Sequence[TriangleMesh], *, density: float | None = None, mass: float | None = None
+) -> ShapeInertia:
     """Return mass, centre of mass and inertia of a homogeneous body of a mesh's shape.
 
     Integrals over a closed mesh are exact: the body is a sum of signed tetrahedra between its triangles and its middle,
@@ -74,7 +74,8 @@ def shape_inertia(mesh: TriangleMesh, *, density: float | None = None, mass: flo
     Parameters
     ----------
     mesh
-        In the frame that is asked about, m. Where it is open, its holes are capped if that adds little area, and
+        In the frame that is asked about, m; several are parts of one body, and a part can be the inner wall of
+        another. Where one is open, its holes are capped if that adds little area, and
         else its convex hull is taken; ``method`` and ``notes`` say so.
     density, mass
         kg/m^3, or kg; exactly one of them.
@@ -105,20 +106,32 @@ def shape_inertia(mesh: TriangleMesh, *, density: float | None = None, mass: flo
         raise ModelError(
             f"{name} is {value:g}; expected a positive number of {'kg/m^3' if name == 'density' else 'kg'}"
         )
-    if not np.isfinite(mesh.vertices).all():
-        raise ModelError("vertices that are not finite; expected numbers")
-    surface = closed_surface(mesh)
-    closed, notes = surface.mesh, surface.notes
-    method = InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED
-    if not surface.is_closed:
-        closed, method = convex_hull(mesh), InertiaMethod.HULL
-        notes = ("open: judged by its convex hull, which is no lighter than the link",)
-    volume, com, covariance = _moments(closed)
-    if volume <= FLAT * mesh.size**3:
+    several = [mesh] if isinstance(mesh, TriangleMesh) else list(mesh)
+    surfaces = [_closed(part) for part in several]
+    whole, turned = outwards(joined_meshes([closed for closed, _, _ in surfaces]))
+    methods = {method for _, method, _ in surfaces}
+    method = next(one for one in reversed(InertiaMethod) if one in methods)
+    notes = tuple(dict.fromkeys([*(note for _, _, said in surfaces for note in said), *turned]))
+    volume, com, covariance = _moments(whole)
+    if volume <= FLAT * whole.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
     rho = value if name == "density" else value / volume
     inertia = rho * (np.trace(covariance) * np.eye(3) - covariance)
     return ShapeInertia(rho * volume, com, inertia, volume, method, notes)
+
+
+def _closed(mesh: TriangleMesh) -> tuple[TriangleMesh, InertiaMethod, tuple[str, ...]]:
+    """Return a mesh made closed, how that was done, and what was changed."""
+    if not np.isfinite(mesh.vertices).all():
+        raise ModelError("vertices that are not finite; expected numbers")
+    surface = repaired(mesh)
+    if not surface.is_closed:
+        said = "open: judged by its convex hull, which is no lighter than the link"
+        return convex_hull(mesh), InertiaMethod.HULL, (said,)
+    volume = signed_volume(surface.mesh)
+    if abs(volume) <= FLAT * mesh.size**3:
+        raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
+    return surface.mesh, InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED, surface.notes
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:

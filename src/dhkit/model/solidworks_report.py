@@ -21,6 +21,7 @@ from dhkit.model.shape_inertia import MassProperties
 __all__ = ["REPORT", "SolidWorksReport"]
 
 REPORT = re.compile(r"^[ \t]*Mass properties of\b[ \t]*(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
+ASSEMBLY = re.compile(r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE)
 DECIMAL = r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?"
 MASS = re.compile(rf"^[ \t]*Mass[ \t]*=[ \t]*({DECIMAL})[ \t]*([a-z]+)", re.IGNORECASE | re.MULTILINE)
 CENTRE = re.compile(r"Cent(?:er|re) of mass:?[ \t]*\([ \t]*([a-z]+)[ \t]*\)", re.IGNORECASE)
@@ -37,7 +38,8 @@ NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
 CLEARER = 0.2
 """The sign is decided where one tensor misses the other blocks by less than this share of what the other one does."""
 ROUGH, COARSEST = 1e-3, 0.05
-"""Half a unit of the last decimal of moments, as a share of the largest: warned of, and refused."""
+"""Half a unit of the last decimal, as a share of the mass, the largest moment, the radius of gyration for the centre of
+mass: warned of, and refused."""
 ROUNDED = 4.0
 """Half units of the last decimals that blocks may differ by: several rounded numbers enter each comparison."""
 
@@ -94,12 +96,18 @@ class _Reader:
 
     def report(self) -> SolidWorksReport:
         title = REPORT.search(self.text)
+        if assembly := ASSEMBLY.search(self.text):
+            raise self._error(
+                "a report of an assembly; expected one of the part of a link: select the part alone in Mass Properties",
+                assembly,
+            )
         mass_at = self._found(MASS, "a line 'Mass = ... grams'")
         written = self._number(mass_at[1], mass_at)
         mass = written.value * self._unit(mass_at[2], MASS_UNITS, mass_at)
         if not mass > 0:
             raise self._error(f"mass is {mass_at[1]}; expected a positive number", mass_at)
         com, com_half = self._centre()
+        rounded = list(self._coarse("mass", written.half / written.value, "", mass_at))
         blocks = {self._kind(match): match for match in BLOCK.finditer(self.text)}
         if "centre" not in blocks:
             raise ModelError(
@@ -108,21 +116,26 @@ class _Reader:
             )
         listed, half = self._tensor(blocks["centre"], "L")
         coarse = float(half.max() / max(np.abs(listed).max(), np.finfo(float).tiny))
-        if coarse > COARSEST:
-            raise self._error(
-                f"its moments have too few digits, {100 * min(coarse, 1.0):.0f} % of the largest; choose smaller units "
-                "or more decimal places in the options of Mass Properties",
-                blocks["centre"],
-            )
+        rounded += self._coarse("moments", coarse, " of the largest", blocks["centre"])
+        gyration = np.sqrt(max(float(np.trace(listed)), np.finfo(float).tiny) / (2 * mass))
+        rounded += self._coarse("centre of mass", com_half / gyration, " of its radius of gyration", mass_at)
         centre = _Centre(mass, written.half / written.value, com, com_half)
         sign, said = self._sign(listed, half, centre, blocks)
         tensor = np.where(np.eye(3, dtype=bool), listed, -sign * listed)
         block = "block read: moments about the centre of mass, axes of the output coordinate system (Lxx ... Lzz)"
         part = title[1].strip() if title else ""
-        rounded = (
-            () if coarse < ROUGH else (f"warning: its moments are rounded to {100 * coarse:.1g} % of the largest",)
-        )
         return SolidWorksReport(part, MassProperties(mass, com, tensor), (block, said, *rounded))
+
+    def _coarse(self, what: str, share: float, of: str, at: re.Match[str]) -> tuple[str, ...]:
+        """Return a warning where half a unit of the last decimal is much of a quantity; refuse where it is too much."""
+        verb, are = ("have", "are") if what == "moments" else ("has", "is")
+        if share > COARSEST:
+            raise self._error(
+                f"its {what} {verb} too few digits, {100 * min(share, 1.0):.0f} %{of}; choose smaller units or more "
+                "decimal places in the options of Mass Properties",
+                at,
+            )
+        return (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if share > ROUGH else ()
 
     def _centre(self) -> tuple[Array, float]:
         at = self._found(CENTRE, "a line 'Center of mass: ( millimeters )'")

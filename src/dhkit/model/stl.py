@@ -16,6 +16,7 @@ HEADER = 84
 NORMAL_DECIMALS = 6
 """Decimals of the normals that are written: sines differ between machines far behind them."""
 VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 
 
@@ -48,6 +49,10 @@ def ascii_corners(content: bytes) -> Array:
     try:
         numbers = np.array(found, dtype="S40").astype(np.float64)
     except ValueError as error:
+        if comma := next((text for row in found for text in row if COMMA.fullmatch(text)), None):
+            raise ModelError(
+                f"found {comma[:20].decode()!r}: decimal commas are not read; export 1.5 for 1,5"
+            ) from None
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a coordinate") from None
     return numbers.reshape(-1, 3, 3)
 

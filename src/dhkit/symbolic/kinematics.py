@@ -95,7 +95,7 @@ class SymbolicKinematics:
     >>> from dhkit.description import library_robot
     >>> kinematics = symbolic_kinematics(library_robot("planar2r"))
     >>> print(kinematics.T[0, 3])
-    l1*c1 + l2*c1*c2 - l2*s1*s2
+    l1*c1 + l2*(c1*c2 - s1*s2)
     >>> print(kinematics.A(1).sympy()[0, 3])
     l1*cos(q1)
     """
