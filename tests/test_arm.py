@@ -91,6 +91,12 @@ def test_limits_names_and_files(tmp_path):
         arm.save(tmp_path / "puma.yaml")
 
 
+def test_an_arm_without_meshes_is_saved_as_one_file(tmp_path):
+    arm = Arm.from_dh([(0, 0.3, 0.5, "pi/2"), (0, 0, 0.4, 0)], name="bare")
+    assert arm.save(tmp_path / "new" / "bare.toml") == (tmp_path / "new" / "bare.toml",)
+    assert np.array_equal(Arm.load(tmp_path / "new" / "bare.toml").fk([0.1, 0.2]), arm.fk([0.1, 0.2]))
+
+
 def test_a_table_may_have_limits_and_bodies():
     rod = {"mass": "m", "com": ("-l/2", 0, 0), "inertia": ((0, 0, 0), (0, "m*l^2/12", 0), (0, 0, "m*l^2/12"))}
     arm = Arm.from_dh(

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 
 from dhkit.description.bodies import moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
-from dhkit.description.frames import number_array
+from dhkit.description.frames import one_each
 from dhkit.description.named import Named
-from dhkit.description.numbers import Array
 from dhkit.description.parameters import resolved
 from dhkit.description.poses import check_pose, pose_parts
 from dhkit.description.robot import Description, takes_robot
@@ -90,7 +89,7 @@ def with_limits(
     numbers, n = description.numbers, description.n
     own = {"lower": numbers.lower, "upper": numbers.upper, "velocity": numbers.velocity, "torque": numbers.effort}
     given = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
-    arrays = {name: own[name] if value is None else _each(value, name, n) for name, value in given.items()}
+    arrays = {name: own[name] if value is None else one_each(value, name, n) for name, value in given.items()}
     joints = []
     for i, joint in enumerate(description.joints):
         row = {name: float(array[i]) for name, array in arrays.items()}
@@ -99,7 +98,7 @@ def with_limits(
             raise DescriptionError(
                 f"{where}: limits [{row['lower']:g}, {row['upper']:g}]; expected two numbers, or both inf"
             )
-        changed = replace(joint)
+        changed = joint
         if lower is not None or upper is not None:
             changed = replace(
                 changed, limits=None if np.isinf(row["lower"]) else (exact(row["lower"]), exact(row["upper"]))
@@ -110,14 +109,6 @@ def with_limits(
             changed = replace(changed, effort=None if np.isinf(row["torque"]) else exact(row["torque"]))
         joints.append(changed)
     return replace(description, joints=tuple(joints))
-
-
-def _each(value: ArrayLike, name: str, n: int) -> Array:
-    """Return one number for each joint, shape (n,)."""
-    array = number_array(value, name, f"({n},) or ()")
-    if array.shape not in ((), (n,)):
-        raise ValueError(f"{name} has shape {array.shape}; expected ({n},) or one number")
-    return np.broadcast_to(array, (n,))
 
 
 @takes_robot

@@ -18,6 +18,7 @@ __all__ = [
     "joint_vector",
     "link_transforms",
     "number_array",
+    "one_each",
     "world_to_frames",
     "world_to_tool",
 ]
@@ -98,6 +99,22 @@ def number_array(value: ArrayLike, name: str, shape: str) -> Array:
     except (TypeError, ValueError):
         found = repr(value)[:60] if isinstance(value, str) else f"{type(value).__name__} of other things"
         raise TypeError(f"{name}: found {found}; expected numbers, shape {shape}") from None
+
+
+def one_each(value: ArrayLike, name: str, n: int) -> Array:
+    """Return a number for each joint, shape (n,): those given, or one number n times.
+
+    Raises
+    ------
+    ValueError
+        Another shape.
+    TypeError
+        Not numbers.
+    """
+    array = number_array(value, name, f"({n},) or ()")
+    if array.shape not in ((), (n,)):
+        raise ValueError(f"{name} has shape {array.shape}; expected ({n},) or one number")
+    return np.broadcast_to(array, (n,))
 
 
 @takes_robot

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array, Convention, Description
+from dhkit.description import Array, Convention, Description, world_to_tool
 from dhkit.description.robot import takes_robot
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
@@ -122,8 +122,7 @@ class Workspace:
     @property
     def radii(self) -> tuple[float, float]:
         """The least and the largest distance of the tool from the first joint's axis, m."""
-        T = first_axis(self.description)
-        return _extremes(np.linalg.norm((self.positions - T[:3, 3]) @ T[:3, :2], axis=1))
+        return _radii(self.description, self.positions)
 
     @property
     def estimate(self) -> Estimate | None:
@@ -142,7 +141,9 @@ def tool_reach(description: Description) -> float:
 
     ``description.reach`` is an upper bound of another distance: the sum of all lengths.
     """
-    return float(workspace(description, STATES_FOR_REACH).radii[1])
+    lower, upper, _ = _ranges(description)
+    q = lower + (upper - lower) * np.random.default_rng(0).random((STATES_FOR_REACH, description.n))
+    return _radii(description, world_to_tool(description, q)[:, :3, 3])[1]
 
 
 @takes_robot
@@ -313,6 +314,12 @@ def _without_border(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
         padded = np.moveaxis(np.pad(cells, width), axis, 0)
         cells = np.moveaxis(padded[:-2] & padded[1:-1] & padded[2:], 0, axis)
     return cells
+
+
+def _radii(description: Description, positions: Array) -> tuple[float, float]:
+    """Return the least and the largest distance of positions from the first joint's axis, m."""
+    T = first_axis(description)
+    return _extremes(np.linalg.norm((positions - T[:3, 3]) @ T[:3, :2], axis=1))
 
 
 def _extremes(values: Array) -> tuple[float, float]:

@@ -18,7 +18,29 @@ if TYPE_CHECKING:
 else:
     PinocchioModel: TypeAlias = Any
 
-__all__ = ["PinocchioModel", "pinocchio_model"]
+__all__ = ["NoPinocchioError", "PinocchioModel", "import_pinocchio", "pinocchio_model"]
+
+
+class NoPinocchioError(ModelError):
+    """Pinocchio is not installed; there is no wheel of it for Windows."""
+
+
+def import_pinocchio() -> Any:
+    """Return the module pinocchio.
+
+    Raises
+    ------
+    NoPinocchioError
+        It cannot be imported; says where to get it.
+    """
+    try:
+        import pinocchio
+    except ImportError as error:
+        raise NoPinocchioError(
+            f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS) or conda install pinocchio; "
+            "everything that needs no reference model works without it"
+        ) from None
+    return pinocchio
 
 
 @takes_robot
@@ -34,13 +56,7 @@ def pinocchio_model(description: Description) -> PinocchioModel:
     ModelError
         Pinocchio is not installed (there is no wheel of it for Windows), or refuses the model.
     """
-    try:
-        import pinocchio as pin
-    except ImportError as error:
-        raise ModelError(
-            f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS) or conda install pinocchio; "
-            "everything that needs no reference model works without it"
-        ) from None
+    pin = import_pinocchio()
     text = urdf_text(description)
     try:
         model = pin.buildModelFromXML(text)

@@ -27,15 +27,14 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
         A mesh cannot be read, or a file cannot be written.
     """
     path = Path(path)
-    if description.mesh_folder is None:
-        raise ModelError(f"{description.name}: where its meshes lie is not known")
-    names = _copies(description)
+    names, folder = _copies(description), description.mesh_folder
     written = [path]
     try:
         for source, name in names.items():
+            if folder is None:
+                raise ModelError(f"{description.name}: where its mesh {source!r} lies is not known")
             copy = path.parent / name
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(copy, (description.mesh_folder / source).read_bytes())
+            write_atomically(copy, (folder / source).read_bytes())
             written.append(copy)
         write_atomically(path, to_toml(_renamed(description, names)))
     except OSError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -14,7 +14,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
-from dhkit.model.reference import PinocchioModel
+from dhkit.model.reference import PinocchioModel, import_pinocchio
 from dhkit.model.urdf_reader import read_urdf
 from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name
@@ -85,6 +85,11 @@ class Chain:
     def path(self) -> Path:
         """The file."""
         return self.tree.path
+
+    @property
+    def T_base_root(self) -> Array:
+        """The URDF's root in the base with all joints at zero, shape (4, 4)."""
+        return self.zero_poses[self.tree.root]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -178,12 +183,9 @@ def chain_tips(tree: UrdfTree, base: str | None = None) -> dict[tuple[str, ...],
 
     Chains with joints that follow others, or that are neither revolute nor prismatic, are left out.
     """
-    inner = {joint.parent for joint in tree.joints.values()}
     tips: dict[tuple[str, ...], list[str]] = {}
-    for link in tree.links:
-        way = tree.joints_to(link, base) if link not in inner else None
-        moving = [joint for joint in way or () if joint.kind != "fixed"]
-        if moving and all(joint.is_moving and joint.mimics is None for joint in moving):
+    for link, moving in _moving_to_leaves(tree, base):
+        if all(joint.is_moving and joint.mimics is None for joint in moving):
             tips.setdefault(tuple(joint.name for joint in moving), []).append(link)
     return tips
 
@@ -216,12 +218,20 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
 
 def _other_chains(tree: UrdfTree, base: str) -> set[tuple[str, ...]]:
     """Return the moving joints to leaves that :func:`chain_tips` leaves out: fingers that follow others."""
-    inner = {joint.parent for joint in tree.joints.values()}
-    ways = [tree.joints_to(link, base) for link in tree.links if link not in inner]
-    moving = (tuple(joint for joint in way or () if joint.kind != "fixed") for way in ways)
     return {
-        tuple(joint.name for joint in joints) for joints in moving if any(joint.mimics is not None for joint in joints)
+        tuple(joint.name for joint in moving)
+        for _, moving in _moving_to_leaves(tree, base)
+        if any(joint.mimics is not None for joint in moving)
     }
+
+
+def _moving_to_leaves(tree: UrdfTree, base: str | None) -> Iterator[tuple[str, tuple[UrdfJoint, ...]]]:
+    """Yield the links that nothing hangs on, in the file's order, and the moving joints from a base to each."""
+    inner = {joint.parent for joint in tree.joints.values()}
+    for link in tree.links:
+        way = tree.joints_to(link, base) if link not in inner else None
+        if moving := tuple(joint for joint in way or () if joint.kind != "fixed"):
+            yield link, moving
 
 
 def _branchings(tree: UrdfTree, base: str, chains: Collection[tuple[str, ...]]) -> dict[str, int]:
@@ -246,17 +256,14 @@ def chain_model(chain: Chain) -> PinocchioModel:
     ModelError
         Pinocchio is not installed, or refuses the URDF.
     """
-    try:
-        import pinocchio as pin
-    except ImportError as error:
-        raise ModelError(f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS)") from None
+    pin = import_pinocchio()
     try:
         model = pin.buildModelFromXML(chain_text(chain))
     except (ValueError, RuntimeError) as error:
         raise ModelError(f"{chain.path}: Pinocchio refuses the URDF: {' '.join(str(error).split())[:200]}") from None
     if list(model.names[1:]) != list(chain.names):
         raise ModelError(f"{chain.path}: joints {', '.join(model.names[1:])}; expected {', '.join(chain.names)}")
-    root_in_base = pin.SE3(np.linalg.inv(chain.tree.zero_poses()[chain.base]))
+    root_in_base = pin.SE3(chain.T_base_root)
     model.jointPlacements[1] = root_in_base * model.jointPlacements[1]
     for frame in model.frames:
         if frame.parentJoint == 0:

@@ -142,10 +142,6 @@ class UrdfTree:
             link = joint.parent
         return tuple(along[::-1])
 
-    def children(self, link: str) -> tuple[UrdfJoint, ...]:
-        """Return the joints that hang on a link, in the file's order."""
-        return tuple(joint for joint in self.joints.values() if joint.parent == link)
-
     def zero_poses(self) -> dict[str, Array]:
         """Return all links in the root link, shape (4, 4) each, with every joint at zero."""
         poses: dict[str, Array] = {self.root: np.eye(4)}

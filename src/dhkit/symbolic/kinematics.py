@@ -123,8 +123,7 @@ class SymbolicKinematics:
     @property
     def constants(self) -> dict[str, float]:
         """The symbols as they are printed, and what they are worth, SI."""
-        names = notation(self.arm.ring).names
-        return {names.get(name, name): value for name, value in self.arm.parameters.items()}
+        return notation(self.arm.ring).printed(self.arm.parameters)
 
     def A(self, i: int) -> SymbolicMatrix:
         """Return the transform of link i, from 1: frame i in frame i - 1, m.

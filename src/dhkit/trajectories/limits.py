@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
-from dhkit.description.frames import number_array
+from dhkit.description.frames import number_array, one_each
 
 __all__ = ["Limits"]
 
@@ -101,7 +101,7 @@ class Limits:
             "torque": torque,
         }
         n = description.n
-        return cls(**{name: own[name] if value is None else _each(value, name, n) for name, value in given.items()})
+        return cls(**{name: own[name] if value is None else one_each(value, name, n) for name, value in given.items()})
 
     def scaled(
         self, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
@@ -123,10 +123,3 @@ class Limits:
 
     def __reduce__(self) -> tuple[type[Limits], tuple[Any, ...]]:
         return Limits, tuple(getattr(self, item.name) for item in fields(self))
-
-
-def _each(value: ArrayLike, name: str, n: int) -> Array:
-    array = number_array(value, name, f"({n},) or ()")
-    if array.shape not in ((), (n,)):
-        raise ValueError(f"{name} has shape {array.shape}; expected ({n},) or one number")
-    return np.broadcast_to(array, (n,))

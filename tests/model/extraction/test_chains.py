@@ -198,9 +198,10 @@ def test_a_robot_file_takes_its_meshes_along(tmp_path):
 
 def test_without_pinocchio_the_tool_is_held_to_the_files_own_transforms(tree, monkeypatch):
     from dhkit.model.extraction import residual
+    from dhkit.model.reference import NoPinocchioError
 
     def missing(chain):
-        raise ModelError("Pinocchio cannot be imported (blocked)")
+        raise NoPinocchioError("Pinocchio cannot be imported (blocked)")
 
     monkeypatch.setattr(residual, "chain_model", missing)
     extraction = extract_dh(tree, tip="hand")

@@ -157,7 +157,7 @@ def extracted(
         original.check_reading()
     meshes = MeshFinder(chain.path, package_dirs)
     shapes = _shapes(chain, meshes, notes)
-    draft = _Draft(chain, convention, shapes, meshes.mesh_folder, name or _robot_name(chain), notes)
+    draft = _Draft(chain, convention, shapes, meshes.mesh_folder, name or _robot_name(chain))
     try:
         table = _best_table(chain, convention, draft, original, notes)
         description, residual, decimals = _rounded(draft, table, original)
@@ -183,7 +183,6 @@ class _Draft:
     """Of each group: shapes, the mesh's path, and the shape in the base at zero."""
     mesh_folder: Path
     name: str
-    notes: list[str]
 
     def description(self, table: Table, decimals: int | None) -> Description:
         """Return the description of a table, its numbers rounded."""
@@ -209,8 +208,7 @@ class _Draft:
         """Return the description without bodies, shapes and tool."""
         chain = self.chain
         names = _joint_names(chain.names)
-        T_root_base = chain.tree.zero_poses()[chain.base]
-        gravity = T_root_base[:3, :3].T @ GRAVITY
+        gravity = chain.T_base_root[:3, :3] @ GRAVITY
         return Description(
             name=self.name,
             convention=self.convention,

@@ -9,7 +9,7 @@ import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.errors import ModelError
-from dhkit.model.reference import PinocchioModel, pinocchio_model
+from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_model
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
 
 __all__ = ["Original", "Residual"]
@@ -66,12 +66,10 @@ class Original:
         self.q = _states(chain, states, seed)
         try:
             self.model: PinocchioModel | None = chain_model(chain)
-        except ModelError as error:
-            if "cannot be imported" not in str(error):
-                raise
+        except NoPinocchioError:
             self.model = None
         self.tool = np.array(list(self._tools()))
-        self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *(_lengths(chain)))
+        self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *_lengths(chain)) or 1.0
         self.M, self.g = _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
 
     def check_reading(self) -> None:

@@ -21,7 +21,7 @@ NEAR = (1e-13, 1e-5)
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table of n joints with base and tool.
+    """A table of n joints with its base; the tool is what is left behind frame n.
 
     Attributes
     ----------
@@ -29,28 +29,14 @@ class Table:
         theta, d, a, alpha of each row of the convention, shape (n, 4), rad and m.
     T_base_first
         Frame 0 in the base, shape (4, 4).
-    T_last_tip
-        The tip in frame n, shape (4, 4).
     """
 
     convention: Convention
     rows: Array
     T_base_first: Array
-    T_last_tip: Array
-
-    def frames(self) -> Array:
-        """Return frames 0 to n in the base with every joint at zero, shape (n+1, 4, 4)."""
-        frames = [self.T_base_first]
-        for theta, d, a, alpha in self.rows:
-            about_z, about_x = screw(2, theta, d), screw(0, alpha, a)
-            order = (about_z, about_x) if self.convention is Convention.STANDARD else (about_x, about_z)
-            frames.append(frames[-1] @ order[0] @ order[1])
-        return np.array(frames)
 
 
-def chain_axes(
-    poses: Array, directions: Array, prismatic: list[bool], T_base_tip: Array, *, parallel_below: float = 1e-10
-) -> Axes:
+def chain_axes(poses: Array, directions: Array, prismatic: list[bool], T_base_tip: Array) -> Axes:
     """Return the axes of joints in the base, with the points and directions that free choices are taken from.
 
     Parameters
@@ -63,8 +49,6 @@ def chain_axes(
         Whether each joint is.
     T_base_tip
         The tip at zero, shape (4, 4).
-    parallel_below
-        Sine of the largest angle between axes that are treated as parallel.
     """
     origins = poses[:, :3, 3]
     feet: list[Array] = []
@@ -83,7 +67,6 @@ def chain_axes(
         frames=np.swapaxes(poses[:, :3, :3], 1, 2),
         feet=np.array(feet).reshape(-1, 3),
         normals=np.array(normals).reshape(-1, 3),
-        parallel_below=parallel_below,
     )
 
 
@@ -99,9 +82,7 @@ def tidiest_table(axes: Axes, convention: Convention) -> Table:
     # powers of two change no digit; what counts as zero is then a share of the arm's size
     unit = 2.0 ** round(math.log2(extent)) if extent > 0 else 1.0
     table = _tidiest(_scaled(axes, 1 / unit), convention)
-    rows, first = table.rows * [1.0, unit, unit, 1.0], _stretched(table.T_base_first, unit)
-    table = Table(convention, rows, first, np.eye(4))
-    return replace(table, T_last_tip=np.linalg.inv(table.frames()[-1]) @ axes.T_base_tip)
+    return Table(convention, table.rows * [1.0, unit, unit, 1.0], _stretched(table.T_base_first, unit))
 
 
 def _scaled(axes: Axes, factor: float) -> Axes:
@@ -116,7 +97,7 @@ def _stretched(T: Array, factor: float) -> Array:
 
 
 def _tidiest(axes: Axes, convention: Convention) -> Table:
-    """Return the table of an arm whose size is about 1; its tool is open."""
+    """Return the table of an arm whose size is about 1."""
     z = axes.directions
     if axes.n == 1:
         path, start, end = _single(axes, convention)
@@ -132,7 +113,7 @@ def _tidiest(axes: Axes, convention: Convention) -> Table:
     T = frame(first.x, z[0], first.start) @ np.linalg.inv(screw(2, start.theta, start.d))
     if convention is Convention.MODIFIED:
         T = T @ np.linalg.inv(screw(0, start.alpha, start.a))
-    return Table(convention, rows, T, np.eye(4))
+    return Table(convention, rows, T)
 
 
 def _rows(axes: Axes, convention: Convention, normals: tuple[Normal, ...], start: FirstRow, end: LastRow) -> Array:

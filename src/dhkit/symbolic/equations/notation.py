@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -26,6 +26,10 @@ class Notation:
     def __call__(self, name: str) -> str:
         """Return what a constant is written as."""
         return self.names.get(name, name)
+
+    def printed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return constants' values by what the constants are written as."""
+        return {self(name): value for name, value in values.items()}
 
 
 @dataclass(frozen=True)

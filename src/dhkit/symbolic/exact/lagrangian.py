@@ -113,8 +113,7 @@ class Lagrangian:
     @property
     def constants(self) -> dict[str, float]:
         """The symbols as they are printed, and what they are worth, SI."""
-        names = notation(self.arm.ring).names
-        return {names.get(name, name): value for name, value in self.arm.parameters.items()}
+        return notation(self.arm.ring).printed(self.arm.parameters)
 
     # Quantities
 
