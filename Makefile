@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.ready-test
 CHECK_READY := $(VENV)/.ready-check
+ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadgroup -q
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
@@ -48,8 +49,12 @@ check: $(CHECK_READY)  ## ruff, mypy --strict, import order
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-accept: $(TEST_READY)  ## the laws at full size; writes benchmarks/results/acceptance.json
+accept: $(ACCEPT_READY)  ## the laws at full size, example-robot-data's chains too; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests
+
+$(ACCEPT_READY): $(TEST_READY)
+	$(BIN)/python -m pip install --quiet --editable '.[test,robots]'
+	@touch $@
 
 bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside peers; writes benchmarks/results/
 	$(BIN)/python benchmarks/kinematics.py $(ARGS)
