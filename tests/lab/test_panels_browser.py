@@ -142,7 +142,8 @@ def test_an_answer_is_judged_on_the_page(open_page):
     assert "angle" in texts(page, "#panel-submit .diagnosis")[0]
     page.evaluate(f"{labelled('Answer')}.value = {json.dumps(f'V = {HOSTILE}')}")
     page.click(button("Judge"))
-    page.until("document.querySelector('#panel-submit .note').textContent.length > 12", timeout=60)
+    page.until("document.querySelector('#panel-submit .note').textContent === 'unreadable'", timeout=60)
+    assert texts(page, "#panel-submit h3") == ["V: unreadable"]
     assert page.evaluate("document.querySelectorAll('img').length") == 0
     assert page.evaluate("globalThis.hacked ?? null") is None
 

@@ -205,8 +205,11 @@ MAX_WORK = 60 * MAX_EVALUATIONS
 LEAST_STATES = 15
 """An answer too long to be evaluated at so many states cannot be judged."""
 TRIED = 24
-GROUP = 100
-"""States that share parameters where an energy's zero is free."""
+GROUP = 5
+"""States that share parameters where an energy's zero is free: the first of them sets it, the others are compared.
+
+Few, for many sets of parameters: a difference may be there in a part of their range alone.
+"""
 
 
 def _witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:

@@ -60,7 +60,8 @@ def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, c
     arm
         The robot.
     numbers
-        Parameters that keep the file's values; others come within a factor of four of them.
+        Parameters that keep the file's values; others come within a factor of four of them, spread evenly over its
+        logarithm: of S sets of parameters, each S-th of the range has one.
     seed
         Of the random numbers. It must not be known to who writes answers: one that is wrong only far from the states
         that are tried would pass.
@@ -73,11 +74,16 @@ def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, c
 
     rng = np.random.default_rng(seed)
     found = []
+    sets = -(-count // every)
+    factors = dict[str, Any]()
+    for name in arm.parameters:
+        shares = (rng.permutation(sets) + rng.uniform(size=sets)) / sets
+        factors[name] = 4.0 ** (2 * shares - 1)
     parameters: dict[str, Any] = {name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()}
     for k in range(count):
         if k % every == 0:
             for name, value in arm.parameters.items():
-                parameters[name] = mpmath.mpf(value if name in numbers else value * 4.0 ** rng.uniform(-1.0, 1.0))
+                parameters[name] = mpmath.mpf(value if name in numbers else value * factors[name][k // every])
         names = dict(parameters)
         common = 10.0 ** rng.uniform(-3.0, 3.0)
         for i in range(arm.n):
