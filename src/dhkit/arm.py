@@ -1009,7 +1009,10 @@ class Arm:
         return f"<Arm {self.name}: {self._description.kinds}, {self._description.convention.value} DH>"
 
     def _repr_html_(self) -> str:
-        return f"<b>{self.name}</b>{self.dh._repr_html_()}"
+        from html import escape
+
+        warnings = "".join(f"<div>warning: {escape(warning)}</div>" for warning in self._description.warnings)
+        return f"<b>{self.name}</b>{self.dh._repr_html_()}{warnings}"
 
 
 def _listed(pushes: Sequence[Push]) -> tuple[Push, ...]:

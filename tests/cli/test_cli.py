@@ -46,7 +46,7 @@ def test_info_shows_what_the_robot_is(dhkit, name):
     assert facts["n"] == arm.n
     assert facts["inverse_kinematics"] == str(arm.family)
     assert bool(facts["branches"]) == (arm.family.closed_form)
-    assert facts["joints"][0]["alpha"] == arm.description.numbers.alpha[0]
+    assert facts["joints"][0]["alpha_rad"] == arm.description.numbers.alpha[0]
 
 
 def test_fk_takes_configurations_expressions_and_degrees(dhkit):
@@ -73,7 +73,7 @@ def test_info_lists_the_bodies_of_a_link_that_has_several(dhkit, tmp_path):
         "link 2: body 1 of 1.5 kg at (-0.2, 0, 0) m, payload of 0.5 kg at (0.1, 0, 0) m" in dhkit("info", str(path))[1]
     )
     bodies = json.loads(dhkit("info", str(path), "--json")[1])["joints"][1]["bodies"]
-    assert bodies[1] == {"name": "payload", "mass": 0.5, "com": [0.1, 0.0, 0.0]}
+    assert bodies[1] == {"name": "payload", "mass_kg": 0.5, "com_m": [0.1, 0.0, 0.0]}
 
 
 def test_info_names_the_branches(dhkit):
@@ -126,7 +126,7 @@ def test_the_schema_is_printed(dhkit):
         (["verify", "ur5", "--samples", "0"], "Invalid value"),
         (["verify", "ur5", "--samples", "many"], "Invalid value"),
         (["build", "ur5", "-o", "/dev/null/all.urdf"], "/dev/null: a file; expected a folder"),
-        (["schema", "cake"], "no schema 'cake'; expected robot or assignment"),
+        (["schema", "cake"], "no schema 'cake'; expected robot, assignment, sheet, rubric, task, motion"),
         (["demo", "--robot", "cake"], "no robot 'cake'"),
     ],
 )

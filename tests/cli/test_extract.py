@@ -40,7 +40,7 @@ def test_json_has_the_table_and_the_residual(capsys):
     facts = json.loads(out)
     assert code == 0
     assert facts["convention"] == "modified"
-    assert [round(joint["d"], 6) for joint in facts["joints"]] == [0.333, 0, 0.316, 0, 0.384, 0, 0]
+    assert [round(joint["d_m"], 6) for joint in facts["joints"]] == [0.333, 0, 0.316, 0, 0.384, 0, 0]
     assert facts["residual"]["tool"] < 1e-9
 
 

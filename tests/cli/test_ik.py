@@ -38,7 +38,8 @@ def facts(ik):
 
 
 def joints(said):
-    return np.array([branch["q"] for branch in said["branches"]])
+    rows = [branch["q_rad"] if "q_rad" in branch else np.radians(branch["q_deg"]) for branch in said["branches"]]
+    return np.array(rows)
 
 
 @pytest.mark.parametrize("name", [name for name in robots() if name not in ("jaco", "panda")])
@@ -55,7 +56,7 @@ def test_every_branch_of_every_robot_closes(facts, name):
     ]
     numbers = arm.description.numbers
     for branch in said["branches"]:
-        values = np.array(branch["q"])
+        values = np.array(branch["q_rad"])
         if "x" in said["met"]:
             assert np.abs(arm.fk(values)[:3, 3] - arm.fk(q)[:3, 3]).max() < CLOSES
         if len(said["met"]) == 6:
@@ -108,13 +109,13 @@ def test_near_chooses_windings_and_the_free_joint_and_marks_the_nearest(facts):
     status, said = facts("ur5", "--like", "nominal", "--near", *words, "--degrees")
     chosen = next(branch for branch in said["branches"] if branch["name"] == said["nearest"])
     assert status == 0
-    assert np.degrees(chosen["q"])[5] == pytest.approx(360)
-    assert np.degrees(chosen["q"])[:5] == pytest.approx(near[:5], abs=1e-6)
+    assert chosen["q_deg"][5] == pytest.approx(360)
+    assert chosen["q_deg"][:5] == pytest.approx(near[:5], abs=1e-6)
     # The wrist is straight at zero: joint 4 is free and takes the value asked for.
     status, said = facts("puma560", "--like", "zero", "--near", "0 0 0 0.3 0 0")
     chosen = next(branch for branch in said["branches"] if branch["name"] == said["nearest"])
     assert chosen["flags"] == ["wrist"]
-    assert np.allclose(chosen["q"], [0, 0, 0, 0.3, 0, -0.3], atol=1e-9)
+    assert np.allclose(chosen["q_rad"], [0, 0, 0, 0.3, 0, -0.3], atol=1e-9)
     assert said["status"] == "singular"
 
 
@@ -139,7 +140,7 @@ def test_out_of_reach_says_by_how_much(ik, facts):
     assert "out of reach by 0.1 m" in out
     status, said = facts("planar2r", "--xyz", "1", "0", "0")
     assert (status, said["branches"], said["status"]) == (1, [], "out_of_reach")
-    assert said["distance"] == pytest.approx(0.1)
+    assert said["distance_m"] == pytest.approx(0.1)
 
 
 def test_iteration_finds_one_solution_for_any_arm(facts, ik):

@@ -43,7 +43,7 @@ def test_a_run_is_that_of_python_and_its_files_hold_it(dhkit, tmp_path):
     control = FrictionCompensation(PDGravity.tuned(ARM, bandwidth=15))
     mine = ARM.simulate(control, motion, friction=True)
     facts = json.loads(out)
-    assert facts["peak_error"] == mine.peak_error.tolist() and facts["failure"] is None
+    assert facts["peak_error_rad"] == mine.peak_error.tolist() and facts["failure"] is None
     assert facts["files"] == [str(files[0]), str(files[2]), str(files[1])]
     loaded = SimulationResult.load(files[0])
     assert np.array_equal(loaded.q, mine.q) and np.array_equal(loaded.tau, mine.tau)
@@ -58,7 +58,7 @@ def test_a_payload_is_known_unless_it_is_said_not_to_be(dhkit):
         load = ("--payload", "0.2", "@", "0", "0", "0.1", *unmodelled)
         status, out, _ = dhkit("simulate", "planar2r", *ENDS, *load, "--json")
         assert status == 0
-        errors[unmodelled] = max(json.loads(out)["peak_error"])
+        errors[unmodelled] = max(json.loads(out)["peak_error_rad"])
     assert errors[("--unmodelled",)] > 20 * errors[()]
 
 
@@ -113,15 +113,16 @@ def test_motions_come_from_files_of_dhkit_and_from_elsewhere(dhkit, tmp_path):
     status, out, err = dhkit(
         "simulate", "planar2r", "--motion", tmp_path / "simulink.mat", "--columns", "q=yout", "--json"
     )
-    assert status == 0 and json.loads(out)["duration"] == pytest.approx(1.0), err
+    assert status == 0 and json.loads(out)["duration_s"] == pytest.approx(1.0), err
     status, _, err = dhkit("simulate", "planar2r", "--motion", tmp_path / "simulink.mat")
     assert status == 2 and "columns={'q': ...}" in err
     for path in (*ours, tmp_path / "theirs.mat", tmp_path / "theirs.csv"):
         degrees = ("--degrees",) if path.stem == "theirs" else ()
         status, out, err = dhkit("simulate", "planar2r", "--motion", path, *degrees, "--json")
         assert status == 0, err
-        assert json.loads(out)["duration"] == pytest.approx(1.0)
-        assert max(json.loads(out)["peak_error"]) < 1e-3, path
+        assert json.loads(out)["duration_s"] == pytest.approx(1.0)
+        said = json.loads(out)
+        assert max(np.radians(said["peak_error_deg"]) if degrees else said["peak_error_rad"]) < 1e-3, path
 
 
 def test_without_a_motion_every_joint_moves():

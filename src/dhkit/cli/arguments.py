@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from typer.core import TyperCommand
 
 from dhkit.arm import Arm
 from dhkit.description import Array, check_pose, pose
+from dhkit.description.joint_words import degrees_hint, joint_words, outside_words
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 
@@ -54,8 +56,22 @@ def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
         raise DescriptionError(f"{what}: {error}") from None
 
 
-def joint_values(arm: Arm, words: Sequence[str], degrees: bool, what: str = "joint values") -> Array:
+def joint_values(
+    arm: Arm,
+    words: Sequence[str],
+    degrees: bool,
+    what: str = "joint values",
+    *,
+    outside: Literal["told", "refused", "fine"] = "told",
+) -> Array:
     """Return joint values, shape (n,), rad and m, from expressions or the name of a configuration.
+
+    A joint outside its limits, or turned so far that degrees may be meant, is told on stderr.
+
+    Parameters
+    ----------
+    outside
+        What becomes of values outside the limits: told here, refused by who is given them, or of no account.
 
     Raises
     ------
@@ -63,7 +79,7 @@ def joint_values(arm: Arm, words: Sequence[str], degrees: bool, what: str = "joi
         No such configuration, another count, or no expression.
     """
     if len(words) == 1 and words[0] in arm.configurations:
-        return arm.configurations[words[0]]
+        return _told(arm, arm.configurations[words[0]], words[0], outside)
     listed = _split(words)
     if len(listed) == 1 and not listed[0][:1].isdigit() and listed[0][:1] not in "+-.(":
         names = ", ".join(arm.configurations)
@@ -73,7 +89,24 @@ def joint_values(arm: Arm, words: Sequence[str], degrees: bool, what: str = "joi
     if len(listed) != arm.n:
         raise DescriptionError(f"{len(listed)} {what}; expected {arm.n} for {arm.name}")
     values = numbers(listed, what, [arm.n])
-    return np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
+    values = np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
+    return _told(arm, values, what, outside)
+
+
+def _told(arm: Arm, q: Array, what: str, outside: str) -> Array:
+    """Return joint values; say on stderr which is outside its limits, or turns so far that degrees may be meant."""
+    numbers = arm.description.numbers
+    for i, joint in enumerate(arm.description.joints):
+        slides = not joint.is_revolute
+        beyond = outside_words(q[i], numbers.lower[i], numbers.upper[i], slides=slides)
+        hint = degrees_hint(q[i], slides=slides)
+        if beyond and outside == "refused":
+            break
+        if (beyond and outside == "told") or hint:
+            words = beyond or f"{joint_words(q[i], slides=slides)}{hint}"
+            sys.stderr.write(f"dhkit: warning: {what}: {joint.name} is {words}\n")
+            break
+    return q
 
 
 def target(
@@ -94,7 +127,7 @@ def target(
     if matrix is not None:
         return _matrix(matrix)
     if like is not None:
-        return arm.fk(joint_values(arm, [like], degrees, "values of --like"))
+        return arm.fk(joint_values(arm, [like], degrees, "values of --like", outside="fine"))
     placed[:3, 3] = numbers([xyz or ""], "--xyz", [3])
     return placed
 

@@ -15,7 +15,7 @@ from dhkit.dynamics import Friction
 __all__ = ["run"]
 
 
-def run(task: Task, figure: Path | None, *, json: bool) -> int:
+def run(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
     """Compare controllers on one motion, print a table and write a figure; return 0, or 1 where one failed."""
     check_outputs(((figure, FIGURES),))
     options = dict(task.options)
@@ -42,7 +42,7 @@ def run(task: Task, figure: Path | None, *, json: bool) -> int:
 
         write_figure(plot_comparison(compared.results, f"{task.arm.name}: {task.about}, {task.rate}"), figure)
     if json:
-        facts = {name: facts_of(result) for name, result in compared.results.items()}
+        facts = {name: facts_of(task.arm, result, degrees=degrees) for name, result in compared.results.items()}
         print_json({"robot": task.arm.name, "controllers": facts, "failures": dict(compared.failures)})
     else:
         _print(task, compared)

@@ -116,10 +116,10 @@ def _facts(extraction: Extraction) -> dict[str, Any]:
             {
                 "name": joint.name,
                 "type": joint.type.value,
-                "theta": float(numbers.theta[i]),
-                "d": float(numbers.d[i]),
-                "a": float(numbers.a[i]),
-                "alpha": float(numbers.alpha[i]),
+                "theta_rad": float(numbers.theta[i]),
+                "d_m": float(numbers.d[i]),
+                "a_m": float(numbers.a[i]),
+                "alpha_rad": float(numbers.alpha[i]),
             }
             for i, joint in enumerate(description.joints)
         ],

@@ -11,6 +11,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.arguments import joint_values
 from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Description, Joint, pose_parts, robots
 from dhkit.description.parameters import resolved
 from dhkit.expressions import substitute
@@ -23,8 +24,8 @@ def list_robots(json: bool) -> None:
     """Print the library."""
     arms = [Arm.load(name).description for name in robots()]
     if json:
-        keys = ("name", "n", "source")
-        print_json([{key: getattr(arm, key) for key in keys} | {"kinds": arm.kinds} for arm in arms])
+        keys = ("name", "n", "source", "kinds")
+        print_json([{key: getattr(arm, key) for key in keys} | {"reach_m": tool_reach(arm)} for arm in arms])
         return
     rows = [(arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _first(arm.source)) for arm in arms]
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
@@ -48,7 +49,7 @@ def show(arm: Arm, json: bool) -> None:
     for i, joint in enumerate(description.joints, start=1):
         if len(joint.bodies) > 1:
             listed = (
-                f"{one['name']} of {one['mass']:.4g} kg at {_vector(one['com'])} m" for one in _bodies(joint, arm)
+                f"{one['name']} of {one['mass_kg']:.4g} kg at {_vector(one['com_m'])} m" for one in _bodies(joint, arm)
             )
             say(f"link {i}: {', '.join(listed)}")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
@@ -73,8 +74,9 @@ def forward(arm: Arm, q: Sequence[str], *, degrees: bool, with_frames: bool, jso
     T, frames = arm.fk(values), arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
-        shown = {"T": T.tolist(), "position": xyz.tolist(), "euler_XYZ": angles.tolist()}
-        print_json({"q": values.tolist()} | shown | ({"frames": frames.tolist()} if with_frames else {}))
+        shown = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
+        asked = joint_entry(arm, "q", values, degrees=degrees)
+        print_json(asked | shown | ({"frames": frames.tolist()} if with_frames else {}))
         return
     named = [(f"frame {i}", frame) for i, frame in enumerate(frames)] if with_frames else []
     unit = "°" if degrees else "rad"
@@ -110,13 +112,13 @@ def _friction(viscous: float, forwards: float, backwards: float) -> str:
 
 
 def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
-    """Return name, mass, kg, and centre of mass, m, of each body of a link."""
+    """Return name, mass and centre of mass of each body of a link."""
     values = resolved(arm.description.parameters)
     return [
         {
             "name": body.name,
-            "mass": float(substitute(body.mass, values)),
-            "com": [float(substitute(x, values)) for x in body.com],
+            "mass_kg": float(substitute(body.mass, values)),
+            "com_m": [float(substitute(x, values)) for x in body.com],
         }
         for body in joint.bodies
     ]
@@ -134,13 +136,21 @@ def _first(source: str) -> str:
     return source if len(source) <= 90 else f"{source[:87]}..."
 
 
+def _columns(joint: Joint) -> dict[str, str]:
+    """Return what is told of a joint by its name in numbers, and the key for it, with its unit."""
+    q, drive = ("rad", "N_m") if joint.is_revolute else ("m", "N")
+    armature = "armature_kg_m2" if joint.is_revolute else "armature_kg"
+    table = {"theta": "theta_rad", "d": "d_m", "a": "a_m", "alpha": "alpha_rad", "mass": "mass_kg"}
+    limits = {"lower": f"lower_{q}", "upper": f"upper_{q}", "velocity": f"velocity_{q}_s", "effort": f"effort_{drive}"}
+    return table | limits | {"armature": armature}
+
+
 def _facts(arm: Arm) -> dict[str, Any]:
     description, numbers = arm.description, arm.description.numbers
     fit = classify(description).fit
-    columns = ("theta", "d", "a", "alpha", "lower", "upper", "velocity", "effort", "mass", "armature")
     joints = [
         {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
-        | {column: float(getattr(numbers, column)[i]) for column in columns}
+        | {key: float(getattr(numbers, column)[i]) for column, key in _columns(joint).items()}
         | {"bodies": _bodies(joint, arm)}
         for i, joint in enumerate(description.joints)
     ]
@@ -153,10 +163,10 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "length_sum_m": description.reach,
         "inverse_kinematics": str(arm.family),
         "branches": [] if fit is None else list(fit.branches),
-        "gravity": numbers.gravity.tolist(),
+        "gravity_m_s2": numbers.gravity.tolist(),
         "parameters": numbers.values,
         "joints": joints,
-        "configurations": {name: q.tolist() for name, q in numbers.configurations.items()},
+        "configurations_rad": {name: q.tolist() for name, q in numbers.configurations.items()},
         "warnings": list(description.warnings),
         "source": description.source,
         "notes": description.notes,

@@ -9,6 +9,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
 from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
@@ -178,13 +179,13 @@ def _summary(answer: Answer) -> str:
 
 
 def _facts(answer: Answer) -> dict[str, Any]:
-    """Return everything for machines: angles of joints in rad, whatever was asked for."""
+    """Return everything for machines."""
     found, nearest = answer.found, answer.nearest
     xyz, angles = pose_parts(answer.T, order=answer.order, degrees=answer.degrees)
     branches = [
         {
             "name": found.branches[k],
-            "q": answer.q[k].tolist(),
+            **joint_entry(answer.arm, "q", answer.q[k], degrees=answer.degrees),
             "within_limits": bool(found.allowed[k]),
             "flags": [flag.name for flag in FLAG_WORDS if found.flags[k] & flag],
         }
@@ -196,11 +197,11 @@ def _facts(answer: Answer) -> dict[str, Any]:
         "method": answer.method,
         "note": answer.note,
         "T": answer.T.tolist(),
-        "position": xyz.tolist(),
-        f"euler_{answer.order}": angles.tolist(),
+        "xyz_m": xyz.tolist(),
+        angle_key(f"euler_{answer.order}", degrees=answer.degrees): angles.tolist(),
         "met": list(found.met),
         "status": IKStatus(int(found.status_code)).name,
-        "distance": float(found.distance),
+        "distance_m": float(found.distance),
         "branches": branches,
         "nearest": None if nearest is None else found.branches[nearest],
         "reason": answer.refusal,

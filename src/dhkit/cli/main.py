@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, cast
 
@@ -15,6 +16,7 @@ from dhkit.arm import Arm
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import print_json, say
 from dhkit.description.files import check_place
+from dhkit.description.joint_words import DEGREES
 from dhkit.errors import DescriptionError, DhkitError
 
 __all__ = ["main"]
@@ -34,6 +36,19 @@ app = typer.Typer(
 Robot = Annotated[
     str, typer.Argument(help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP.")
 ]
+
+
+def _told_in_degrees(wanted: bool) -> bool:
+    """Have messages tell angles in the unit that the command's arguments are in."""
+    DEGREES.set(wanted)
+    return wanted
+
+
+def _degrees(text: str) -> Any:
+    return typer.Option("--degrees", callback=_told_in_degrees, help=text)
+
+
+Degrees = Annotated[bool, _degrees("Angles in and out are in degrees.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -41,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit with its status."""
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
     logging.getLogger("dhkit").setLevel(logging.INFO)  # says what takes seconds, such as compiling
+    degrees = DEGREES.set(False)
     try:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
     except (DhkitError, ValueError) as error:
@@ -55,6 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         _fail(f"{error.filename or 'output'}: {error.strerror or error}")
     except (typer.Abort, KeyboardInterrupt):
         _fail("interrupted", status=130)
+    finally:
+        DEGREES.reset(degrees)
     sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -147,7 +165,7 @@ def import_cad(
     at: Annotated[
         str | None, typer.Option(metavar="Q ...", help="Joint values of the export; ready, else zero, unless given.")
     ] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles of --at are in degrees.")] = False,
+    degrees: Annotated[bool, _degrees("Angles of --at are in degrees.")] = False,
     json: Json = False,
 ) -> int:
     """Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF."""
@@ -173,7 +191,7 @@ def import_cad(
 def fk(
     robot: Robot,
     q: Annotated[list[str], typer.Argument(help="Joint values, or the name of a configuration such as ready.")],
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    degrees: Degrees = False,
     frames: Annotated[bool, typer.Option("--frames", help="All DH frames too.")] = False,
     json: Json = False,
 ) -> None:
@@ -194,7 +212,7 @@ def ik(
     ] = None,
     like: Annotated[str | None, typer.Option(metavar="Q ...", help="Where these joint values put the tool.")] = None,
     near: Annotated[str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these values.")] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    degrees: Degrees = False,
     limits: Annotated[bool, typer.Option("--limits", help="Only branches inside the joint limits.")] = False,
     numeric: Annotated[bool, typer.Option("--numeric", help="One solution, by iteration, for any arm.")] = False,
     json: Json = False,
@@ -209,7 +227,7 @@ def ik(
     return inverse_command.run(
         arm,
         target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees),
-        near=None if near is None else joint_values(arm, [near], degrees, "values of --near"),
+        near=None if near is None else joint_values(arm, [near], degrees, "values of --near", outside="fine"),
         order=order,
         degrees=degrees,
         limits=limits,
@@ -274,7 +292,7 @@ def plan(
     line: Annotated[bool, typer.Option("--line", help="The tool goes straight.")] = False,
     intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Of the mesh.")] = None,
     time_limit: Annotated[float, typer.Option(min=0.01, help="To search, s.")] = 30.0,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    degrees: Degrees = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
     ] = None,
@@ -294,11 +312,11 @@ def plan(
         raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
     task = plan_command.Task(
         arm=arm,
-        start=joint_values(arm, [start], degrees, "values of --from"),
+        start=joint_values(arm, [start], degrees, "values of --from", outside="refused"),
         goal=target(arm, **pose, euler=euler, order=order, degrees=degrees)
         if to is None
-        else joint_values(arm, [to], degrees, "values of --to"),
-        via=[joint_values(arm, [place], degrees, "values of --via") for place in via or ()],
+        else joint_values(arm, [to], degrees, "values of --to", outside="refused"),
+        via=[joint_values(arm, [place], degrees, "values of --via", outside="refused") for place in via or ()],
         objective=objective(wanted),
         duration=duration,
         limits=joint_limits(
@@ -377,7 +395,7 @@ def simulate(
     push: PushOption = None,
     noise: Annotated[float, typer.Option(min=0, help="Standard deviation of measured joint values, rad and m.")] = 0.0,
     resolution: Annotated[float, typer.Option(min=0, help="Of the encoders, on the joints' side, rad and m.")] = 0.0,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in and out are in degrees.")] = False,
+    degrees: Degrees = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
@@ -431,7 +449,7 @@ def compare(
     restitution: Restitution = 0.0,
     no_stops: NoStops = False,
     push: PushOption = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles in are in degrees.")] = False,
+    degrees: Annotated[bool, _degrees("Angles in are in degrees.")] = False,
     figure: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
     json: Json = False,
 ) -> int:
@@ -458,7 +476,7 @@ def compare(
             "pushes": asked.pushes(push or ()),
         },
     )
-    return compare_command.run(task, figure, json=json)
+    return compare_command.run(task, figure, degrees=degrees, json=json)
 
 
 @app.command()
@@ -467,7 +485,7 @@ def play(
     file: Annotated[Path, typer.Argument(help="A motion or a simulation.")],
     html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
     columns: Columns = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Samples from elsewhere have degrees.")] = False,
+    degrees: Annotated[bool, _degrees("Samples from elsewhere have degrees.")] = False,
 ) -> int:
     """Play a motion or a simulation in the browser, or write a page of it."""
     from dhkit.cli import play as play_command
@@ -475,7 +493,7 @@ def play(
     return play_command.run(Arm.load(robot), file, html, degrees=degrees, names=columns)
 
 
-@app.command()
+@app.command(cls=gathering({"--at": None}))
 def picture(
     robot: Robot,
     output: Annotated[Path, typer.Option("--output", "-o", help="The file: .png, or .gif of a motion.")],
@@ -487,7 +505,7 @@ def picture(
     count: Annotated[int, typer.Option(min=2, max=900, help="PNG files of a motion.")] = 6,
     rate: Annotated[float, typer.Option(min=1, max=50, help="Pictures a second of a GIF.")] = 15.0,
     frames: Annotated[bool, typer.Option("--frames", help="Draw the DH frames.")] = False,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles are in degrees.")] = False,
+    degrees: Annotated[bool, _degrees("Angles are in degrees.")] = False,
 ) -> int:
     """Write a picture of an arm, or of a motion: PNG files or a GIF; no browser is needed."""
     from dhkit.cli import picture as picture_command
@@ -754,19 +772,23 @@ def bench(
     )
 
 
+SCHEMAS = {
+    "robot": "dhkit.description.schema",
+    "assignment": "dhkit.lab.assignment_form",
+    "sheet": "dhkit.grading.schema",
+    "rubric": "dhkit.grading.schema",
+    "task": "dhkit.grading.schema",
+    "motion": "dhkit.trajectories.schema",
+}
+"""Modules that have a function ``NAME_schema``, by NAME."""
+
+
 @app.command()
-def schema(what: Annotated[str, typer.Argument(help="Which file: robot or assignment.")]) -> None:
+def schema(what: Annotated[str, typer.Argument(help=f"Which file: {', '.join(SCHEMAS)}.")]) -> None:
     """Print the JSON Schema of a file format."""
-    if what == "robot":
-        from dhkit.description.schema import robot_schema
-
-        print_json(robot_schema(), indent=2)
-    elif what == "assignment":
-        from dhkit.lab.assignment_form import assignment_schema
-
-        print_json(assignment_schema(), indent=2)
-    else:
-        raise DescriptionError(f"no schema {what!r}; expected robot or assignment")
+    if what not in SCHEMAS:
+        raise DescriptionError(f"no schema {what!r}; expected {', '.join(SCHEMAS)}")
+    print_json(getattr(import_module(SCHEMAS[what]), f"{what}_schema")(), indent=2)
 
 
 @app.command()

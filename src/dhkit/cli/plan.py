@@ -14,6 +14,7 @@ from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
 from dhkit.cli.patience import Patience
+from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import Floor, Objective, Obstacle, Payload, PlanReport, Progress, ToolSpeed
@@ -135,7 +136,7 @@ def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> i
         _print(task, motion, line=line, degrees=degrees)
     written = [str(path) for path in files.write(task, motion)]
     if json:
-        print_json(_facts(task, motion, line=line) | {"files": written})
+        print_json(_facts(task, motion, line=line, degrees=degrees) | {"files": written})
     elif written:
         say("\n" + "\n".join(f"wrote {path}" for path in written))
     return 0
@@ -248,6 +249,7 @@ def _carrying(task: Task, motion: Trajectory) -> Trajectory:
     return replace(motion, description=task.loaded.description)
 
 
-def _facts(task: Task, motion: Trajectory, *, line: bool) -> dict[str, Any]:
-    ends = {"start": motion.q(0.0).tolist(), "goal": motion.q(motion.duration).tolist()}
+def _facts(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> dict[str, Any]:
+    ends = joint_entry(task.arm, "start", motion.q(0.0), degrees=degrees)
+    ends |= joint_entry(task.arm, "goal", motion.q(motion.duration), degrees=degrees)
     return {"robot": task.arm.name, "found": True, "line": line, **ends, **motion.report.as_dict()}

@@ -17,6 +17,7 @@ from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
 from dhkit.cli.patience import Patience
 from dhkit.cli.simulation_task import Task
+from dhkit.cli.units import joint_entry
 from dhkit.control import SimulationResult
 from dhkit.errors import SimulationError
 
@@ -79,7 +80,7 @@ def run(task: Task, files: Files, *, degrees: bool, json: bool) -> int:
     seconds = time.perf_counter() - begin
     written = [] if result is None else [str(path) for path in files.write(task.arm, result)]
     if json:
-        facts = {} if result is None else facts_of(result)
+        facts = {} if result is None else facts_of(task.arm, result, degrees=degrees)
         print_json({"robot": task.arm.name, "controller": name, "failure": failure or None, **facts, "files": written})
     else:
         if result is not None:
@@ -131,16 +132,16 @@ def _units(prismatic: NDArray[np.bool_], degrees: bool) -> list[tuple[str, float
     return [("m", 1.0) if slides else turn for slides in prismatic.tolist()]
 
 
-def facts_of(result: SimulationResult) -> dict[str, Any]:
+def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, Any]:
     """Return what `--json` says of a run."""
     tool = result.tool_norms
     return {
-        "duration": float(result.t[-1]),
+        "duration_s": float(result.t[-1]),
         "steps": len(result.t) - 1,
-        "peak_error": result.peak_error.tolist(),
-        "rms_error": result.rms_error.tolist(),
-        "final_error": result.final_error.tolist(),
-        "tool_error": {"peak": tool.peak, "rms": tool.rms, "final": tool.final},
+        **joint_entry(arm, "peak_error", result.peak_error, degrees=degrees),
+        **joint_entry(arm, "rms_error", result.rms_error, degrees=degrees),
+        **joint_entry(arm, "final_error", result.final_error, degrees=degrees),
+        "tool_error_m": {"peak": tool.peak, "rms": tool.rms, "final": tool.final},
         "saturated": result.saturated.tolist(),
         "energy_error": result.audit.error,
     }

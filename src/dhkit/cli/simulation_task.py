@@ -98,8 +98,8 @@ def chosen_motion(
             raise DescriptionError("--motion: found --from, --to or --duration too; expected the file alone")
         return read_motion(path, arm.description, degrees=degrees, columns=columns(names)), str(path)
     here, there = ends(arm)
-    here = here if start is None else joint_values(arm, [start], degrees, "values of --from")
-    there = there if goal is None else joint_values(arm, [goal], degrees, "values of --to")
+    here = here if start is None else joint_values(arm, [start], degrees, "values of --from", outside="refused")
+    there = there if goal is None else joint_values(arm, [goal], degrees, "values of --to", outside="refused")
     if start is None and np.array_equal(here, there):
         here = ends(arm)[1]
     if np.array_equal(here, there):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.units import joint_entry
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.kinematics.manipulability import velocity_ellipsoid
@@ -133,16 +134,16 @@ def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
         "assumed": list(space.assumed),
         "reach_m": space.radii[1],
         "length_sum_m": arm.description.reach,
-        "distances": list(space.distances),
-        "radii": list(space.radii),
-        "bounds": space.bounds.tolist(),
+        "distances_m": list(space.distances),
+        "radii_m": list(space.radii),
+        "bounds_m": space.bounds.tolist(),
         "freedoms": space.freedoms,
-        "estimate": None if estimate is None else vars(estimate) | {"edge": space.grid and space.grid.edge},
+        "estimate": None if estimate is None else vars(estimate) | {"edge_m": space.grid and space.grid.edge},
         "manipulability": {f"{q:.0%}": w for q, w in zip(QUANTILES, _quantiles(space), strict=True)},
         "best": {
             "manipulability": float(space.manipulability.max()),
-            "q": space.best.tolist(),
-            "position": arm.fk(space.best)[:3, 3].tolist(),
+            **joint_entry(arm, "q", space.best),
+            "xyz_m": arm.fk(space.best)[:3, 3].tolist(),
         },
         "singularities": None if singular is None else _singular_facts(singular),
     }
@@ -152,7 +153,7 @@ def _singular_facts(found: Singularities) -> dict[str, Any]:
     """Return each kind's joint, counted from 1 as in words, its singular values, rad or m, and its words."""
     joints = {kind: None if joint is None else joint + 1 for kind, joint in found.joints.items()}
     return {
-        kind: {"joint": joints[kind], "values": list(found.values[kind]), "words": found.words[kind]}
+        kind: {"joint": joints[kind], "values_rad": list(found.values[kind]), "words": found.words[kind]}
         for kind in found.kinds
     }
 

@@ -24,6 +24,7 @@ from dhkit.control.timing import (
     substeps,
 )
 from dhkit.description import Array, Description, joint_vector
+from dhkit.description.joint_words import joint_words, outside_words
 from dhkit.description.robot import takes_robot
 from dhkit.trajectories import Trajectory
 
@@ -163,9 +164,9 @@ def _tell_beyond(plant: Plant, q: Array) -> None:
     if (beyond > ROUNDING).any():
         i = int(np.argmax(beyond))
         log.warning(
-            "the reference leads %s by %.3g beyond its limits; are its angles in degrees?",
+            "the reference leads %s by %s beyond its limits; are its angles in degrees?",
             plant.description.joints[i].name,
-            beyond[i],
+            joint_words(beyond[i], slides=bool(plant.description.numbers.prismatic[i]), digits=3),
         )
 
 
@@ -176,11 +177,8 @@ def _inside(plant: Plant, q: Array, name: str) -> Array:
         return np.clip(q, lower, upper)
     i = int(np.argmax((q < lower) | (q > upper)))
     joint = plant.description.joints[i]
-    degrees = "; degrees?" if joint.is_revolute and abs(q[i]) > 2 * np.pi else ""
-    raise ValueError(
-        f"{name}: {joint.name} is {q[i]:.4g}, its limits are {lower[i]:.4g} and {upper[i]:.4g}{degrees}; expected joint"
-        " values inside them, or restitution=None for no stops"
-    )
+    words = outside_words(q[i], lower[i], upper[i], slides=not joint.is_revolute, digits=4)
+    raise ValueError(f"{name}: {joint.name} is {words}; expected joint values inside, or restitution=None for no stops")
 
 
 def _state(description: Description, given: ArrayLike | None, default: Array, name: str) -> Array:

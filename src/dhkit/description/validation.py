@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dhkit.description.joint_words import outside_words
 from dhkit.description.parameters import check_parameter_name, resolved
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
@@ -40,6 +41,9 @@ ABSOLUTE_SLACK = 1e-12
 """kg m^2: the smallest eigenvalue of a published inertia may be this far below zero."""
 RELATIVE_SLACK = 1e-9
 """Share of the largest eigenvalue, for tensors given to ten digits."""
+
+WHOLE_TURN, SEVERAL_TURNS, LARGEST_DEGREES = math.tau + 1e-9, 2 * math.tau + 1e-9, 1080.0
+"""rad: an angle of the table, or a joint limit, between these and the last is likely one in degrees."""
 
 Value = Callable[[str, Expression], float]
 
@@ -81,7 +85,7 @@ def check(description: Description) -> tuple[str, ...]:
         warnings += _check_shapes(joint.shapes, f"link of {joint.name}", value, description)
     if description.base.body is not None:
         warnings += _check_lone_body(description.base.body, "base", value)
-    _check_configurations(description, value)
+    warnings += _check_configurations(description, value)
     return tuple(warnings)
 
 
@@ -124,12 +128,20 @@ def _check_names(description: Description) -> None:
 
 
 def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
+    angles = list[tuple[str, float, float]]()
     for key in ("a", "alpha", "d", "theta"):
-        value(f"{where}: {key}", getattr(joint, key))
+        size = value(f"{where}: {key}", getattr(joint, key))
+        if key in ("alpha", "theta"):
+            angles.append((key, size, WHOLE_TURN))
     if joint.limits is not None:
         lower, upper = (value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits))
         if lower > upper:
             raise DescriptionError(f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round")
+        if joint.is_revolute:
+            angles += [("lower limit", lower, SEVERAL_TURNS), ("upper limit", upper, SEVERAL_TURNS)]
+    for key, angle, most in angles:
+        if most < abs(angle) <= LARGEST_DEGREES:
+            yield f"{where}: {key} is {angle:.6g} rad, {abs(angle) / math.tau:.3g} turns; are angles in degrees?"
     for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
         limit = getattr(joint, key)
         if limit is not None and not value(f"{where}: {key}", limit) > 0:
@@ -277,11 +289,16 @@ def _check_mesh(mesh: Mesh, where: str, value: Value, description: Description) 
         yield f"{where}.mesh: {mesh.path!r} {what}; the link is drawn from the table"
 
 
-def _check_configurations(description: Description, value: Value) -> None:
+def _check_configurations(description: Description, value: Value) -> Iterator[str]:
     for name, q in description.configurations.items():
         if not NAME.fullmatch(name):
             raise DescriptionError(f"configurations: {name[:80]!r} is no name")
         if len(q) != description.n:
             raise DescriptionError(f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint")
         for i, entry in enumerate(q):
-            value(f"configurations.{name}[{i}]", entry)
+            found, joint = value(f"configurations.{name}[{i}]", entry), description.joints[i]
+            if joint.limits is None:
+                continue
+            lower, upper = (value("", limit) for limit in joint.limits)
+            if words := outside_words(found, lower, upper, slides=not joint.is_revolute):
+                yield f"configurations.{name}: {joint.name} is {words}"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.joint_words import joint_words, outside_words
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.goals import Place
@@ -22,11 +23,6 @@ EDGE = 1e-9
 """rad and m: how far outside its limits rounding may put a joint."""
 
 
-def unit_of(description: Description, i: int) -> str:
-    """Return the unit of a joint's values."""
-    return "m" if description.numbers.prismatic[i] else "rad"
-
-
 def require_inside_limits(description: Description, limits: Limits, q: Array, where: str) -> None:
     """Refuse a configuration outside the joint limits.
 
@@ -39,13 +35,8 @@ def require_inside_limits(description: Description, limits: Limits, q: Array, wh
     if not excess.max() > EDGE:
         return
     i = int(np.argmax(excess))
-    side, limit = (
-        ("below its lower", limits.lower[i]) if q[i] < limits.lower[i] else ("above its upper", limits.upper[i])
-    )
-    unit = unit_of(description, i)
-    raise PlanningError(
-        f"{where}: joint {description.joints[i].name} is at {q[i]:.6g} {unit}, {side} limit, {limit:.6g} {unit}"
-    )
+    words = outside_words(q[i], limits.lower[i], limits.upper[i], slides=bool(description.numbers.prismatic[i]))
+    raise PlanningError(f"{where}: joint {description.joints[i].name} is at {words}")
 
 
 def require_speed(description: Description, limits: Limits, qd: Array, where: str) -> None:
@@ -60,11 +51,9 @@ def require_speed(description: Description, limits: Limits, qd: Array, where: st
     if not excess.max() > 0:
         return
     i = int(np.argmax(excess))
-    unit = unit_of(description, i)
-    raise PlanningError(
-        f"{where}: joint {description.joints[i].name} moves with {abs(qd[i]):.6g} {unit}/s, "
-        f"above its limit, {limits.velocity[i]:.6g} {unit}/s"
-    )
+    slides = bool(description.numbers.prismatic[i])
+    found, bound = (joint_words(x, slides=slides, rate="/s") for x in (abs(qd[i]), limits.velocity[i]))
+    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {found}, above its limit, {bound}")
 
 
 def require_holdable(description: Description, limits: Limits, q: Array, where: str) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, check_pose, joint_array
+from dhkit.description.joint_words import joint_words
 from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
 from dhkit.kinematics import inverse_kinematics, solve_numerically
 from dhkit.trajectories import Limits
@@ -147,8 +148,8 @@ def _excess(description: Description, limits: Limits, every: Array) -> str:
     excess = np.maximum(limits.lower - finite, finite - limits.upper)
     best = excess[np.argmin(np.maximum(excess, 0.0).sum(axis=1))]
     i = int(np.argmax(best))
-    unit = "m" if description.numbers.prismatic[i] else "rad"
-    return f"at best joint {description.joints[i].name} by {best[i]:.4g} {unit}"
+    words = joint_words(best[i], slides=bool(description.numbers.prismatic[i]), digits=4)
+    return f"at best joint {description.joints[i].name} by {words}"
 
 
 def _iterated(description: Description, T: Array, near: Array | None) -> tuple[Array, list[str]]:

@@ -84,7 +84,7 @@ class PlanReport:
         return {
             "objective": self.objective,
             "cost": self.cost,
-            "duration": self.duration,
+            "duration_s": self.duration,
             "certified": certificate.ok,
             "violation": certificate.violation,
             "reference": certificate.reference,
@@ -94,7 +94,7 @@ class PlanReport:
                     "what": check.what,
                     "joint": self._joint(check.what, check.row),
                     "excess": check.excess,
-                    "time": check.time,
+                    "time_s": check.time,
                 }
                 for check in certificate.checks
             ],
@@ -104,15 +104,21 @@ class PlanReport:
             "tightened": list(self.tightened),
             "intervals": self.intervals,
             "coarse": None if self.coarse is None else {"intervals": self.coarse[0], "cost": self.coarse[1]},
-            "classical": dict(self.classical),
+            "classical_s": dict(self.classical),
             "branches": [
-                {"branch": b.branch, "duration": b.duration, "solved": b.solved, "chosen": b.chosen, "reason": b.reason}
+                {
+                    "branch": b.branch,
+                    "duration_s": b.duration,
+                    "solved": b.solved,
+                    "chosen": b.chosen,
+                    "reason": b.reason,
+                }
                 for b in self.branches
             ],
             "iterations": self.iterations,
             "solves": self.solves,
-            "build_seconds": self.build_seconds,
-            "solve_seconds": self.solve_seconds,
+            "build_s": self.build_seconds,
+            "solve_s": self.solve_seconds,
         }
 
     def __str__(self) -> str:

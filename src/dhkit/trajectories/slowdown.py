@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.description.joint_words import degrees_hint, joint_words
 from dhkit.dynamics import gravity_torque, inverse_dynamics
 from dhkit.errors import PlanningError
 from dhkit.trajectories.limits import Limits
@@ -118,10 +119,11 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     row, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     below = q[row, i] < limits.lower[i]
     side, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
-    unit = "m" if trajectory.description.numbers.prismatic[i] else "rad"
+    slides = bool(trajectory.description.numbers.prismatic[i])
+    bound, found = joint_words(limit, slides=slides), joint_words(q[row, i], slides=slides)
     raise PlanningError(
-        f"{trajectory.description.joints[i].name} leaves its {side} limit, {limit:.6g} {unit}: it comes to"
-        f" {q[row, i]:.6g} {unit} at {t[row, i]:.4g} s"
+        f"{trajectory.description.joints[i].name} leaves its {side} limit, {bound}: it comes to {found}"
+        f"{degrees_hint(q[row, i], slides=slides)} at {t[row, i]:.4g} s"
     )
 
 

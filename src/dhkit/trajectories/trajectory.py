@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.frames import number_array
+from dhkit.description.joint_words import joint_words
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
 from dhkit.trajectories.interpolation import interpolated
@@ -200,8 +201,9 @@ class Trajectory:
         apart = np.flatnonzero(np.abs(end - start) > MEETS)
         if len(apart):
             i = int(apart[0])
-            name = self.description.joints[i].name
-            raise ValueError(f"{name} ends at {end[i]:.9g} and goes on from {start[i]:.9g}; expected the same value")
+            name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])
+            here, there = (joint_words(x, slides=slides, digits=9) for x in (end[i], start[i]))
+            raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
         return Trajectory(self.description, *joined(self.pieces, other.pieces))
 
     @classmethod

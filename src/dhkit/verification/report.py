@@ -99,7 +99,11 @@ class VerificationReport:
 
     def json(self) -> dict[str, Any]:
         """Return everything as what JSON knows."""
-        agreements = [vars(agreement) | {"ok": agreement.ok} for agreement in self.agreements]
+        units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of sliding joints m, m/s, m/s^2
+        agreements = [
+            {units.get(key, key): value for key, value in vars(agreement).items()} | {"ok": agreement.ok}
+            for agreement in self.agreements
+        ]
         return vars(self) | {"agreements": agreements, "ok": self.ok}
 
     def markdown(self) -> str:
