@@ -127,7 +127,7 @@ def test_a_contender_that_disagrees_is_reported_with_its_error_and_timed():
 def test_a_contender_that_fails_is_missing_with_the_reason():
     broken = Contender("broken", "fk", Mode.BATCH, failing)
     report = run(Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[broken])
-    assert report.missing == (Missing("fk", "broken", "failed: RuntimeError: out of cheese"),)
+    assert report.missing == (Missing("fk", "broken", "failed: RuntimeError: out of cheese", failed=True),)
     assert not report.rows
 
 

@@ -68,6 +68,14 @@ def test_points_by_weights_and_rules(rubric):
     assert [(mark.name, mark.points, mark.most) for mark in given.quantities] == [("M", 40, 40), ("g", 7.5, 20)]
 
 
+def test_entries_are_weighed_however_their_names_are_written():
+    written = {"M_12": 0, "M1_10": 0, "A1_14": 0, "A114": 0, "A1014": 0, "tau_2": 0, "g10": 0, "M_1_10": 0, "A12": 1}
+    found = [next(iter(Rubric.from_data({"weights": {name: 0}}).weights)) for name in written]
+    assert found == ["M12", "M1_10", "A114", "A114", "A1014", "tau2", "g10", "M1_10", "A12"]
+    one, other = (marks(REPORT, Rubric.from_data({"weights": {"M": 4, name: 0}})) for name in ("M12", "M_12"))
+    assert one == other
+
+
 def test_what_is_asked_for_and_missing_gets_nothing_and_what_is_not_counts_nothing():
     given = marks(REPORT, Rubric(points=10, weights={"M": 1, "V": 1}))
     assert given.points == 5
@@ -148,6 +156,9 @@ def test_what_is_right_throughout_gets_all_points_exactly(report, points):
         ("[credit]\nroundign = 1", "credit: unknown key 'roundign'; did you mean 'rounding'?"),
         ("[credit.mistakes]\na = 2", "credit.mistakes.a: found 2; expected less than or equal to 1"),
         ("[weights]\nG = 1", "weights: no quantity 'G'; did you mean 'g'?"),
+        ("[weights]\nK1 = 1", "weights: no quantity 'K1'; did you mean 'K'?"),
+        ("[weights]\nM0 = 1", "weights: no quantity 'M0'; did you mean 'M'?"),
+        ("[weights]\nM12 = 1\nM_12 = 0", "weights: M_12 is there twice, as M12"),
         ("weights = 3", "weights: found 3; expected a table"),
         ("[weights]\nM = -1", "weights.M: found -1; expected greater than or equal to 0"),
         ("points = ", "no TOML: "),

@@ -5,7 +5,7 @@ from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, Unavailabl
 from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
-from dhkit.bench.report import BenchReport, Missing, Requirement, Row
+from dhkit.bench.report import BenchReport, Ending, Missing, Outcome, Requirement, Row
 from dhkit.bench.runner import run
 
 __all__ = [
@@ -13,11 +13,13 @@ __all__ = [
     "BenchReport",
     "Contender",
     "Derivation",
+    "Ending",
     "FirstCall",
     "Machine",
     "Missing",
     "Mode",
     "Operations",
+    "Outcome",
     "PeakMemory",
     "Requirement",
     "Row",

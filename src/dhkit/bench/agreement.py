@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dhkit.arm import Arm
 from dhkit.bench.contenders import Task, Workload
 from dhkit.description import Array
 
@@ -27,7 +28,8 @@ class Verdict:
     ----------
     error
         The largest difference of an entry: of the poses, of the Jacobians, or of the pose where a solution puts the
-        tool from the one asked for; None if there was nothing finite to compare.
+        tool from the one asked for (the position alone where inverse kinematics of the arm do not meet whole poses);
+        None if there was nothing finite to compare.
     solutions
         Solutions a pose on average that put the tool where it was asked for, for ``ik``; None for the rest.
     """
@@ -39,6 +41,10 @@ class Verdict:
     def ok(self) -> bool:
         """Whether the two agree."""
         return self.error is not None and self.error <= TOLERANCE
+
+    def __str__(self) -> str:
+        error = "no answer" if self.error is None else f"{self.error:.0e}"
+        return error if self.ok else f"DISAGREES: {error}"
 
 
 def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
@@ -56,8 +62,17 @@ def _closes(workload: Workload, answers: Sequence[Array]) -> Verdict:
     wanted = np.repeat(workload.T[: len(answers)], counts, axis=0)
     q = np.concatenate([np.reshape(solutions, (-1, workload.arm.n)) for solutions in answers])
     misses = np.abs(workload.arm.fk(q) - wanted)
+    if not _meets_whole_poses(workload.arm):
+        misses = misses[:, :3, 3:]
     closing = int(np.sum(misses.max(axis=(1, 2)) <= TOLERANCE)) if len(q) else 0
     return Verdict(_worst(misses), closing / len(counts))
+
+
+def _meets_whole_poses(arm: Arm) -> bool:
+    """Whether inverse kinematics of an arm meet whole poses; those of few joints may meet the position alone."""
+    fit = arm.family.fit
+    # Position and yaw are all that a planar arm or a SCARA leaves open.
+    return fit is None or len(fit.met) == 6 or "yaw" in fit.met
 
 
 def _worst(difference: Array) -> float | None:

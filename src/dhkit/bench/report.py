@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
+from enum import Enum
 from typing import Any, TypeAlias
 
 from dhkit.bench.agreement import Verdict
@@ -15,7 +16,9 @@ from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 __all__ = [
     "BATCH",
     "BenchReport",
+    "Ending",
     "Missing",
+    "Outcome",
     "Requirement",
     "Row",
     "Table",
@@ -73,11 +76,68 @@ class Row:
 
 @dataclass(frozen=True)
 class Missing:
-    """A contender or a probe that did not take part, and why."""
+    """A contender or a probe that did not take part, and why.
+
+    Attributes
+    ----------
+    quantity, name, reason
+        What it was to compute or to measure, whose or what it is, why there are no figures of it.
+    failed
+        Whether it raised an error; otherwise it is not installed, or is not made for this arm or machine.
+    own
+        Whether it is one of dhkit's own contenders.
+    """
 
     quantity: str
     name: str
     reason: str
+    failed: bool = False
+    own: bool = False
+
+
+class Ending(Enum):
+    """How the comparison of a quantity ended, in words."""
+
+    COMPLETE = "every contender that took part agrees"
+    PEERS_FAILED = "peers failed"
+    OWN_FAILED = "dhkit itself failed"
+    OWN_MISSING = "dhkit itself could not be timed"
+    ALL_FAILED = "every contender failed"
+    NOTHING_TIMED = "nothing could be timed"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the comparison of a quantity ended, and why.
+
+    Attributes
+    ----------
+    quantity
+        What was compared.
+    ending
+        How it ended.
+    causes
+        The contenders that brought it about, each with its reason; none where all is well.
+    """
+
+    quantity: str
+    ending: Ending
+    causes: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether dhkit was timed and agrees, whatever its peers did."""
+        return self.ending in (Ending.COMPLETE, Ending.PEERS_FAILED)
+
+    @property
+    def derived(self) -> dict[str, Any]:
+        """What JSON carries beside the quantity and the causes."""
+        return {"ending": self.ending.name.lower(), "ok": self.ok}
+
+    def __str__(self) -> str:
+        more = f" (and {len(self.causes) - 1} more)" if len(self.causes) > 1 else ""
+        cause = f"; {self.causes[0]}{more}" if self.causes else ""
+        return f"{self.quantity}: {self.ending.value}{cause}"
 
 
 @dataclass(frozen=True)
@@ -148,6 +208,8 @@ class BenchReport:
         Items of a batch, threads a batch call may use, seed of the states.
     rows, missing
         The contenders' figures; who did not take part, and why.
+    outcomes
+        How the comparison of each quantity ended; an interrupted run has those that it finished.
     scaling, memory, starts
         Two threads against one, peak memory, time of a second process.
     requirements
@@ -166,6 +228,7 @@ class BenchReport:
     seed: int
     rows: tuple[Row, ...]
     missing: tuple[Missing, ...]
+    outcomes: tuple[Outcome, ...]
     scaling: tuple[ThreadScaling, ...]
     memory: tuple[PeakMemory, ...]
     starts: tuple[FirstCall, ...]
@@ -181,7 +244,7 @@ class BenchReport:
         for entry, row in zip(plain["rows"], self.rows, strict=True):
             verdict = entry.pop("verdict")
             entry |= verdict | {"mode": row.mode.value, "agrees": row.verdict.ok}
-        for key in ("requirements", "scaling", "memory"):
+        for key in ("outcomes", "requirements", "scaling", "memory"):
             for entry, value in zip(plain[key], getattr(self, key), strict=True):
                 entry |= value.derived
         listed: dict[str, Any] = listed_values(plain)
@@ -227,7 +290,6 @@ class BenchReport:
 
 def _cells(row: Row) -> list[str]:
     verdict = row.verdict
-    error = "no answer" if verdict.error is None else f"{verdict.error:.0e}"
     return [
         row.contender,
         row.mode.value,
@@ -237,7 +299,7 @@ def _cells(row: Row) -> list[str]:
         _ratio(row.times_batch),
         _ratio(row.times_single),
         "" if verdict.solutions is None else f"{verdict.solutions:.2f}",
-        error if verdict.ok else f"DISAGREES: {error}",
+        str(verdict),
     ]
 
 

@@ -12,9 +12,10 @@ from dhkit.bench.agreement import Verdict, judge
 from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, UnavailableError, Workload
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
+from dhkit.bench.outcomes import outcome_of
 from dhkit.bench.peers import all_contenders, dhkit_arm
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
-from dhkit.bench.report import BATCH, BenchReport, Missing, Row
+from dhkit.bench.report import BATCH, BenchReport, Missing, Outcome, Row
 from dhkit.bench.required import requirements
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
@@ -47,6 +48,7 @@ class _Findings:
 
     rows: list[Row] = field(default_factory=list)
     missing: list[Missing] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
     scaling: list[ThreadScaling] = field(default_factory=list)
     memory: list[PeakMemory] = field(default_factory=list)
     starts: list[FirstCall] = field(default_factory=list)
@@ -117,6 +119,7 @@ def run(
             arm.compile()
             for quantity in quantities:
                 _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, findings, tell)
+                findings.outcomes.append(outcome_of(quantity, findings.rows, findings.missing))
             for quantity in quantities if probes else ():
                 _probe(workload, quantity, repeats, findings, tell)
             if probes and not DYNAMICS.isdisjoint(quantities):
@@ -141,6 +144,7 @@ def run(
         seed=seed,
         rows=tuple(findings.rows),
         missing=tuple(findings.missing),
+        outcomes=tuple(findings.outcomes),
         scaling=tuple(findings.scaling),
         memory=tuple(findings.memory),
         starts=tuple(findings.starts),
@@ -166,13 +170,15 @@ def _compare(
 ) -> None:
     """Check and time the contenders of one quantity; what an interrupted run has seen is kept."""
     entrants = list(_entrants(workload, contenders, findings, tell))
+    if not entrants:
+        return
     seconds: list[Array] = []
     try:
         for measured in rounds([entrant.call for entrant in entrants], repeats):
             seconds.append(measured)
-            tell(f"{entrants[0].contender.quantity if entrants else ''}: round {len(seconds)} of {repeats}")
+            tell(f"{entrants[0].contender.quantity}: round {len(seconds)} of {repeats}")
     finally:
-        if seconds and entrants:
+        if seconds:
             findings.rows += _rows(entrants, np.array(seconds))
 
 
@@ -186,7 +192,7 @@ def _entrants(
             verdict = judge(workload, contender.quantity, task)
             yield _prepared(contender, task, verdict, len(workload.q))
         except Exception as error:  # a peer may fail in any way; the benchmark goes on and says so
-            findings.missing.append(Missing(contender.quantity, contender.name, _reason(error)))
+            findings.missing.append(_missing(contender.quantity, contender.name, error, own=contender.own))
 
 
 def _prepared(contender: Contender, task: Task, verdict: Verdict, most: int) -> _Entrant:
@@ -196,9 +202,11 @@ def _prepared(contender: Contender, task: Task, verdict: Verdict, most: int) -> 
     return _Entrant(contender, verdict, items, times, repeated(call, times))
 
 
-def _reason(error: Exception) -> str:
+def _missing(quantity: str, name: str, error: Exception, *, own: bool = False) -> Missing:
     text = " ".join(str(error).split())
-    return text if isinstance(error, UnavailableError) else f"failed: {type(error).__name__}: {text}"
+    if isinstance(error, UnavailableError):
+        return Missing(quantity, name, text, failed=False, own=own)
+    return Missing(quantity, name, f"failed: {type(error).__name__}: {text}", failed=True, own=own)
 
 
 def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
@@ -235,7 +243,7 @@ def _derive(arm: Arm, findings: _Findings) -> None:
         findings.operations += operations(arm)
         findings.derivations += derivations(arm, DERIVING)
     except Exception as error:  # as for the contenders
-        findings.missing.append(Missing("dynamics", "derivations", _reason(error)))
+        findings.missing.append(_missing("dynamics", "derivations", error))
 
 
 def _probe(workload: Workload, quantity: str, repeats: int, findings: _Findings, tell: Progress) -> None:
@@ -253,4 +261,4 @@ def _probe(workload: Workload, quantity: str, repeats: int, findings: _Findings,
         try:
             step()
         except Exception as error:  # as for the contenders
-            findings.missing.append(Missing(quantity, name, _reason(error)))
+            findings.missing.append(_missing(quantity, name, error))

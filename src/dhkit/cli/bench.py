@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
-from dhkit.bench import BenchReport
+from dhkit.bench import BenchReport, Ending
 from dhkit.bench import run as run_bench
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
@@ -32,7 +32,11 @@ def run(
     output: Path | None,
     json: bool,
 ) -> int:
-    """Run the benchmark and print its report; return 0, or 130 where Ctrl-C ended it early."""
+    """Run the benchmark, print its report, and say on stderr which quantities failed.
+
+    Returns 0; 1 where dhkit itself, or every contender of a quantity, failed or could not be timed; 130 where Ctrl-C
+    ended the run early. Peers that fail beside dhkit are noted.
+    """
     if output is not None:
         check_place(output)
     progress = _Progress()
@@ -44,7 +48,12 @@ def run(
         print_json(report.json())
     else:
         say(str(report))
-    return INTERRUPTED if report.interrupted else 0
+    for outcome in report.outcomes:
+        if outcome.ending is not Ending.COMPLETE:
+            sys.stderr.write(f"dhkit: {'note: ' if outcome.ok else ''}{outcome}\n")
+    if report.interrupted:
+        return INTERRUPTED
+    return 0 if all(outcome.ok for outcome in report.outcomes) else 1
 
 
 def write(report: BenchReport, path: Path) -> tuple[Path, Path]:

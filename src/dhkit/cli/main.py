@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn, cast
 
 import typer
+from typer.core import TyperGroup
 
 from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import print_json, say
+from dhkit.cli.streams import accept_every_letter
 from dhkit.description.files import check_place
 from dhkit.description.joint_words import DEGREES
 from dhkit.errors import DescriptionError, DhkitError
@@ -24,8 +26,20 @@ __all__ = ["main"]
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 """Click's base of usage errors: newer typers carry a click of their own, which ``import click`` is not."""
 
+
+class Commands(TyperGroup):
+    """Lists the commands with their whole first sentence, over several lines where it is long."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the list into the help."""
+        texts = ((name, self.commands[name].help or "") for name in self.list_commands(ctx))
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, " ".join(text.split("\n\n")[0].split())) for name, text in texts])
+
+
 app = typer.Typer(
     name="dhkit",
+    cls=Commands,
     help="Robot arms from their Denavit-Hartenberg table.",
     no_args_is_help=True,
     add_completion=True,
@@ -54,6 +68,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command and exit with its status."""
+    accept_every_letter()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
     logging.getLogger("dhkit").setLevel(logging.INFO)  # says what takes seconds, such as compiling
     degrees = DEGREES.set(False)
@@ -754,6 +769,8 @@ def bench(
 ) -> int:
     """Time our kinematics and dynamics beside every installed peer: median, spread and ratios.
 
+    Exit status 1: dhkit itself, or every contender of a quantity, failed or could not be timed.
+
     Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.
     """
     from dhkit.bench import QUANTITIES
@@ -794,7 +811,7 @@ def schema(what: Annotated[str, typer.Argument(help=f"Which file: {', '.join(SCH
 @app.command()
 def demo(
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    output: Annotated[Path | None, typer.Option(help="Folder to write; out/NAME.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer samples.")] = False,
     json: Json = False,
 ) -> int:

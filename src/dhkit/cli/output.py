@@ -31,7 +31,8 @@ def say(text: str, style: str = "") -> None:
 
 def print_json(value: Any, indent: int | None = None) -> None:
     """Print a value as one JSON document; NaN and infinities are null."""
-    sys.stdout.write(json.dumps(finite(value), ensure_ascii=False, allow_nan=False, indent=indent) + "\n")
+    plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text
+    sys.stdout.write(json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent) + "\n")
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 from dhkit.errors import DescriptionError
 
 __all__ = ["check_place", "read_bounded", "write_atomically"]
+
+STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
 
 
 def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes:
@@ -69,10 +73,11 @@ def write_atomically(path: Path, content: str | bytes, *, private: bool = False)
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     if not private:
-        path = path.resolve()
-        if path.exists() and not path.is_file():
-            path.write_bytes(data)
+        if path.absolute().parts[1:2] in (("dev",), ("proc",)) or (path.exists() and not path.is_file()):
+            with _opened(path) as stream:
+                stream.write(data)
             return
+        path = path.resolve()
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -85,3 +90,13 @@ def write_atomically(path: Path, content: str | bytes, *, private: bool = False)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def _opened(path: Path) -> BinaryIO:
+    """Return a pipe, a device or an open stream to write to as it is, never a file in its place."""
+    found = STREAM.fullmatch(str(path.absolute()))
+    if found is None:
+        return path.open("ab")
+    # A second opening of a stream that goes into a file would have a place of its own there, and be written over.
+    number = {"stdout": 1, "stderr": 2}.get(found[1]) or int(found[2] or found[3])
+    return os.fdopen(os.dup(number), "wb")

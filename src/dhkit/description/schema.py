@@ -23,7 +23,7 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["BodyForm", "JointForm", "RobotForm", "ShapeForm", "robot_schema", "validated"]
+__all__ = ["BodyForm", "JointForm", "RobotForm", "ShapeForm", "robot_schema", "titled_schema", "validated"]
 
 Entry: TypeAlias = int | Decimal | str
 """A number as the file has it: bare, or text in quotes."""
@@ -250,10 +250,13 @@ class RobotForm(Form):
 
 def robot_schema() -> dict[str, Any]:
     """Return the JSON Schema of robot files, made from the definition that validates them."""
-    schema = RobotForm.model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dhkit robot file, format 1"} | {
-        key: value for key, value in schema.items() if key != "title"
-    }
+    return titled_schema("dhkit robot file, format 1", RobotForm.model_json_schema())
+
+
+def titled_schema(title: str, schema: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a file format's JSON Schema, draft 2020-12, under another title."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+    return head | {key: value for key, value in schema.items() if key != "title"}
 
 
 def validated(document: Mapping[str, Any]) -> RobotForm:

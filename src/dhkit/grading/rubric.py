@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -18,11 +18,15 @@ from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import QUANTITY
 
-__all__ = ["Credit", "Feedback", "Rubric"]
+__all__ = ["WEIGHED", "Credit", "Feedback", "Rubric"]
 
 MAX_BYTES = 100_000
-STRICT = ConfigDict(extra="forbid")
-WEIGHED = re.compile(rf"({QUANTITY.pattern})(_?[0-9]+)?")
+STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+WEIGHED = re.compile(
+    rf"(?:{QUANTITY.pattern})|(M|C|T|J|A[1-9][0-9]??)_?([1-9])([1-9])|(M|C|J)_?([1-9][0-9]?)_([1-9][0-9]?)"
+    r"|(h|g|tau|dh|ik)_?([1-9][0-9]?)"
+)
+"""Names of quantities, and of their entries: M12, M_12, M1_10 where indices have two digits, A1_14, g2, tau_2."""
 QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A1")
 
 Feedback: TypeAlias = Literal["full", "hint", "verdict"]
@@ -34,50 +38,25 @@ Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 
 @dataclass(frozen=True, config=STRICT)
 class Credit:
-    """Which share of its points an entry gets that is not simply right, from 0 to 1.
-
-    Attributes
-    ----------
-    rounding
-        Correct within rounding.
-    undecided
-        Neither proved nor refuted.
-    follow_on
-        Wrong only because earlier answers of the sheet are.
-    other_frames
-        Right in frames other than the table's.
-    diagnosed
-        Wrong by a single mistake that is named.
-    mistakes
-        Wrong by these mistakes, by name; goes before ``diagnosed``.
-    """
+    """Which share of its points an entry gets that is not simply right, from 0 to 1."""
 
     rounding: Share = 1.0
+    """Correct within rounding."""
     undecided: Share = 1.0
+    """Neither proved nor refuted."""
     follow_on: Share = 0.5
+    """Wrong only because earlier answers of the sheet are."""
     other_frames: Share = 0.5
+    """Right in frames other than the table's."""
     diagnosed: Share = 0.0
+    """Wrong by a single mistake that is named."""
     mistakes: dict[str, Share] = Field(default_factory=dict, max_length=200)
+    """Wrong by these mistakes, by name; goes before diagnosed."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class Rubric:
     """What answers are worth.
-
-    Attributes
-    ----------
-    points
-        For a sheet that is right throughout.
-    weights
-        Of quantities (``M = 4``) and of entries within their quantity (``M12 = 0``; 1 unless given). Where a quantity
-        has a weight above 0, those are what is asked for: one that is missing from a sheet gets none of its points,
-        and one that is not named counts nothing. Otherwise the quantities of the sheet weigh the same.
-    credit
-        Shares for what is not simply right.
-    digits
-        Significant digits from which a decimal may be rounded.
-    feedback
-        How much a report tells.
 
     Examples
     --------
@@ -86,10 +65,19 @@ class Rubric:
     """
 
     points: Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)] = 100.0
+    """Of a sheet that is right throughout."""
     weights: dict[str, Weight] = Field(default_factory=dict, max_length=1000)
+    """Of quantities (M = 4) and of entries within their quantity (M12 = 0; 1 unless given).
+
+    Where a quantity has a weight above 0, those are what is asked for: one that is missing from a sheet gets none of
+    its points, and one that is not named counts nothing. Otherwise the quantities of the sheet weigh the same.
+    """
     credit: Credit = Field(default_factory=Credit)
+    """Shares for what is not simply right."""
     digits: Annotated[int, Field(strict=True, ge=3, le=15)] = 4
+    """Significant digits from which a decimal may be rounded."""
     feedback: Feedback = "full"
+    """How much a report tells: everything (full), where to look (hint), or verdicts alone (verdict)."""
 
     @classmethod
     def read(cls, path: Path) -> Rubric:
@@ -127,11 +115,16 @@ class Rubric:
             # A mistyped key says more than what else is wrong.
             found = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
             raise AnswerError(place + _one_line(found[0])) from None
-        for name in rubric.weights:
-            if not WEIGHED.fullmatch(name):
+        weights: dict[str, float] = {}
+        for name, weight in rubric.weights.items():
+            entry = _entry_name(name)
+            if entry is None:
                 unknown = f"weights: no quantity {name[:80]!r}"
                 raise AnswerError(f"{place}{unknown}{_hint(name, QUANTITIES)}")
-        return rubric
+            if entry in weights:
+                raise AnswerError(f"{place}weights: {name} is there twice, as {entry}")
+            weights[entry] = weight
+        return replace(rubric, weights=weights)
 
     def require_mistakes(self, known: Collection[str], place: str = "rubric: ") -> None:
         """Refuse a share for a mistake that the library does not have: it would never be given.
@@ -144,6 +137,15 @@ class Rubric:
         for name in self.credit.mistakes:
             if name not in known:
                 raise AnswerError(f"{place}credit.mistakes: no mistake {name[:80]!r}{_hint(name, sorted(known))}")
+
+
+def _entry_name(name: str) -> str | None:
+    """Return the name of a quantity or an entry as reports have it, M12 for M_12; None where there is no such one."""
+    found = WEIGHED.fullmatch(name)
+    if found is None:
+        return None
+    quantity, *indices = [part for part in found.groups() if part] or [name]
+    return quantity + ("_" if any(len(index) > 1 for index in indices) else "").join(indices)
 
 
 def _one_line(error: ErrorDetails) -> str:

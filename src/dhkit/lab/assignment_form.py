@@ -24,6 +24,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from dhkit.description.schema import titled_schema
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 from dhkit.lab.tool_panel import ORDERS
@@ -215,10 +216,7 @@ FORMS: dict[str, type] = {
 
 def assignment_schema() -> dict[str, Any]:
     """Return the JSON Schema of assignment files, made from the definition that validates them."""
-    schema = TypeAdapter(AssignmentForm).json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "dhkit assignment, format 1"} | {
-        key: value for key, value in schema.items() if key != "title"
-    }
+    return titled_schema("dhkit assignment, format 1", TypeAdapter(AssignmentForm).json_schema())
 
 
 def validated(document: Mapping[str, Any]) -> AssignmentForm:

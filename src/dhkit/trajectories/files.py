@@ -14,12 +14,14 @@ from dhkit.errors import DescriptionError
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
-from dhkit.trajectories.ros_yaml import parse_message, trajectory_text
+from dhkit.trajectories.ros_yaml import POINT, ROWS, TIMES, parse_message, trajectory_text
 from dhkit.trajectories.tables import check_columns, read_table, select_columns, table_text
 from dhkit.trajectories.trajectory import Trajectory
 
 __all__ = [
     "ARCHIVES",
+    "LEFT_OUT",
+    "MOST_DIGITS",
     "TABLES",
     "load_trajectory",
     "read_motion",
@@ -47,6 +49,10 @@ JUMP = 1e-6
 """How far joint values, rad or m, and speeds may jump between pieces of a motion, absolute and relative."""
 SECOND = 1_000_000_000
 """In ns."""
+LEFT_OUT: tuple[object, ...] = (None, "", [])
+"""What stands for a row that a message's point does not have."""
+MOST_DIGITS = 20
+"""Of whole seconds or nanoseconds."""
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None = None) -> Path:
@@ -312,8 +318,10 @@ def _message_samples(text: str, description: Description) -> _Read:
     for k, point in enumerate(points):
         if not isinstance(point, dict):
             raise DescriptionError(f"points[{k}]: expected positions and time_from_start")
+        if unknown := next((key for key in point if key not in POINT), None):
+            raise DescriptionError(f"points[{k}]: unknown key {unknown[:40]!r}; expected {', '.join(POINT)}")
         times.append(_seconds(point.get("time_from_start"), k))
-        rows = [_row(point.get(key), key, k, len(own)) for key in ("positions", "velocities", "accelerations")]
+        rows = [_row(point.get(key), key, k, len(own)) for key in ROWS]
         columns.append([row for row in rows if row is not None])
         if rows[0] is None or (rows[1] is None and rows[2] is not None) or len(columns[-1]) != len(columns[0]):
             raise DescriptionError(f"points[{k}]: expected positions, and velocities and accelerations as in points[0]")
@@ -322,9 +330,9 @@ def _message_samples(text: str, description: Description) -> _Read:
 
 
 def _seconds(value: Any, k: int) -> float:
-    """Return a duration, s: sec and nanosec, or secs and nsecs as ROS 1 has it."""
+    """Return a duration, s."""
     if isinstance(value, dict):
-        for whole, part in (("sec", "nanosec"), ("secs", "nsecs")):
+        for whole, part in TIMES:
             if whole in value and part in value:
                 # Seconds and a fraction that is rounded once, so that what was written in ns comes back.
                 return (_whole(value[whole], k) * SECOND + _whole(value[part], k)) / SECOND
@@ -332,13 +340,13 @@ def _seconds(value: Any, k: int) -> float:
 
 
 def _whole(text: Any, k: int) -> int:
-    if not isinstance(text, str) or len(text) > 20 or not text.isascii() or not text.isdigit():
+    if not isinstance(text, str) or len(text) > MOST_DIGITS or not text.isascii() or not text.isdigit():
         raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
     return int(text)
 
 
 def _row(value: Any, key: str, k: int, n: int) -> list[float] | None:
-    if value in (None, "", []):
+    if value in LEFT_OUT:
         return None
     if not isinstance(value, list) or len(value) != n:
         found = f"{len(value)} values" if isinstance(value, list) else repr(value)[:40]

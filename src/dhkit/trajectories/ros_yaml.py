@@ -9,7 +9,14 @@ from typing import Any
 from dhkit.description import Array
 from dhkit.errors import DescriptionError
 
-__all__ = ["parse_message", "trajectory_text"]
+__all__ = ["POINT", "ROWS", "TIMES", "parse_message", "trajectory_text"]
+
+ROWS = ("positions", "velocities", "accelerations")
+"""Keys of a point's rows, one number a joint."""
+POINT = (*ROWS, "effort", "time_from_start")
+"""Keys of a point."""
+TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
+"""Keys of a duration, whole seconds and nanoseconds: of ROS 2, which is written, and of ROS 1."""
 
 DEEPEST = 12
 LONGEST_LIST = 10_000
@@ -174,7 +181,7 @@ def trajectory_text(
     lines += [f"- {_name(name)}" for name in names]
     lines.append("points:")
     for time, *rows in zip(nanoseconds, q.tolist(), qd.tolist(), qdd.tolist(), strict=True):
-        for k, (key, row) in enumerate(zip(("positions", "velocities", "accelerations"), rows, strict=True)):
+        for k, (key, row) in enumerate(zip(ROWS, rows, strict=True)):
             lines.append(f"{'  ' if k else '- '}{key}: [{', '.join(map(_number, row))}]")
         sec, nanosec = divmod(time, 1_000_000_000)
         lines += ["  effort: []", "  time_from_start:", f"    sec: {sec}", f"    nanosec: {nanosec}"]

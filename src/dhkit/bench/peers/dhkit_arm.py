@@ -56,6 +56,8 @@ def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
 def _into_out(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
         function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        if quantity == "ik" and workload.arm.family.fit is None:
+            raise UnavailableError("arm.ik takes out= only where a closed form decides how many branches there are")
 
         def prepare(items: int) -> Callable[[], Any]:
             chosen = [x[:items] for x in inputs]

@@ -12,8 +12,9 @@ from dhkit.description import Array
 
 __all__ = ["contenders"]
 
-NOBODY = [(10.0, 11.0)] * 6
-"""rad; limits that no branch meets: `reach` returns every branch all the same, and spares the singular values."""
+UNMET_LIMITS = [(10.0, 11.0)] * 6
+"""rad; joint limits that no branch is within: `reach` returns every branch all the same, and computes no singular
+values of branches outside them."""
 
 
 def contenders() -> tuple[Contender, ...]:
@@ -28,10 +29,10 @@ def contenders() -> tuple[Contender, ...]:
 
 def _forward(workload: Workload) -> Task:
     robot, family, _ = _robot(workload)
-    angles = family.angles(workload.q)
+    states = [tuple(angles) for angles in family.angles(workload.q).tolist()]
     return Task(
-        one_by_one(robot.forward, [tuple(map(float, state)) for state in angles]),
-        lambda k: [family.tool_poses(robot.forward(tuple(state)).as_matrix()) for state in angles[:k]],
+        one_by_one(robot.forward, [(state,) for state in states]),  # one argument, a tuple of six
+        lambda k: [family.tool_poses(robot.forward(state).as_matrix()) for state in states[:k]],
     )
 
 
@@ -61,10 +62,10 @@ def _reach(workload: Workload) -> Task:
 
     def prepare(items: int) -> Call:
         chosen = transform(poses[:items])
-        return lambda: robot.reach(chosen, joint_limits=NOBODY, threads=workload.threads)
+        return lambda: robot.reach(chosen, joint_limits=UNMET_LIMITS, threads=workload.threads)
 
     def answers(k: int) -> list[Array]:
-        branches = family.ours(robot.reach(transform(poses[:k]), joint_limits=NOBODY).joints)
+        branches = family.ours(robot.reach(transform(poses[:k]), joint_limits=UNMET_LIMITS).joints)
         return [solutions[~np.isnan(solutions).any(axis=1)] for solutions in branches]
 
     return Task(prepare, answers)

@@ -16,8 +16,13 @@ from dhkit.errors import AnswerError, DescriptionError
 
 __all__ = [
     "ALIASES",
+    "CHOICES",
+    "COLUMNS",
     "FORMAT",
+    "KEYS",
+    "MAX_BRANCHES",
     "MAX_BYTES",
+    "MAX_NAMES",
     "QUANTITY",
     "AnswerSheet",
     "Chain",
@@ -38,6 +43,25 @@ MAX_BYTES = 4_000_000
 """A PUMA's M and C, multiplied out in numbers, are 2 MB."""
 MAX_NAMES = 100
 MAX_BRANCHES = 64
+KEYS = {
+    "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
+    "task file": ("format", "robot", "names", "task", "rubric"),
+    "names": ("q", "qd", "qdd", "angles", "parameters"),
+    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero"),
+    "dh": ("convention", "rows"),
+    "ik": ("branches",),
+}
+"""Keys that a document, and each table in it, may have. No key stands in two tables with two meanings."""
+CHOICES = {
+    "angles": ("relative", "absolute"),
+    "proof": ("optional", "required"),
+    "frames": ("free", "given"),
+    "zero": ("free", "given"),
+    "convention": ("standard", "modified"),
+}
+"""Values that a key may have; the first counts where the key is missing."""
+COLUMNS = ("theta", "d", "a", "alpha")
+"""Entries of a table's row."""
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
 ALIASES = {
@@ -230,7 +254,7 @@ def read_task(path: Path) -> AnswerSheet:
     """
     try:
         data = toml_document(read_text(path, "a task"))
-        return _sheet(data, _Where(str(path)), ("format", "robot", "names", "task", "rubric"))
+        return _sheet(data, _Where(str(path)), KEYS["task file"])
     except DescriptionError as error:
         raise AnswerError(f"{path}: {error}") from None
     except RecursionError:
@@ -262,7 +286,7 @@ def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:
         It is none; with the key, what was found and expected.
     """
     where = _Where(file)
-    sheet = _sheet(data, where, ("format", "robot", "student", "names", "task", "answer", "rubric"))
+    sheet = _sheet(data, where, KEYS["sheet"])
     if not where.table(data, "answer", ""):
         raise AnswerError(f"{file}: no answers; expected a table [answer] with M, g, tau or others")
     return sheet
@@ -329,7 +353,8 @@ class _Where:
             raise self.fail(key, value, what)
         return tuple(str(x) for x in value)
 
-    def choice(self, data: Mapping[str, Any], key: str, prefix: str, known: Sequence[str]) -> str:
+    def choice(self, data: Mapping[str, Any], key: str, prefix: str) -> str:
+        known = CHOICES[key]
         value = data.get(key, known[0])
         if value not in known:
             raise self.fail(prefix + key, value, " or ".join(map(repr, known)))
@@ -347,7 +372,7 @@ def _is_entry(value: object) -> bool:
 
 
 def _names(where: _Where, data: Mapping[str, Any]) -> Names:
-    where.keys(data, ("q", "qd", "qdd", "angles", "parameters"), "names.")
+    where.keys(data, KEYS["names"], "names.")
     parameters = where.table(data, "parameters", "names.")
     if len(parameters) > MAX_NAMES:
         raise where.fail("names.parameters", f"{len(parameters)} names", f"at most {MAX_NAMES}")
@@ -358,12 +383,12 @@ def _names(where: _Where, data: Mapping[str, Any]) -> Names:
         where.texts(data[key], f"names.{key}", "a list of names, one a joint") if key in data else ()
         for key in ("q", "qd", "qdd")
     )
-    absolute = where.choice(data, "angles", "names.", ("relative", "absolute")) == "absolute"
+    absolute = where.choice(data, "angles", "names.") == "absolute"
     return Names(q, qd, qdd, absolute, parameters={name: str(value) for name, value in parameters.items()})
 
 
 def _task(where: _Where, data: Mapping[str, Any]) -> Task:
-    where.keys(data, ("friction", "total_derivative", "asked", "proof", "frames", "zero"), "task.")
+    where.keys(data, KEYS["task"], "task.")
     asked = where.texts(data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]')
     for name in asked:
         if not QUANTITY.fullmatch(name):
@@ -372,26 +397,26 @@ def _task(where: _Where, data: Mapping[str, Any]) -> Task:
         where.switch(data, "friction", "task."),
         where.switch(data, "total_derivative", "task."),
         tuple(dict.fromkeys(asked)),
-        where.choice(data, "proof", "task.", ("optional", "required")) == "required",
-        where.choice(data, "frames", "task.", ("free", "given")) == "given",
-        where.choice(data, "zero", "task.", ("free", "given")) == "given",
+        where.choice(data, "proof", "task.") == "required",
+        where.choice(data, "frames", "task.") == "given",
+        where.choice(data, "zero", "task.") == "given",
     )
 
 
 def _dh(where: _Where, data: Mapping[str, Any]) -> tuple[str, tuple[tuple[str, ...], ...]]:
-    where.keys(data, ("convention", "rows"), "answer.dh.")
+    where.keys(data, KEYS["dh"], "answer.dh.")
     rows = data.get("rows")
     if not isinstance(rows, list) or not rows:
         raise where.fail("answer.dh.rows", rows, "a list of rows [theta, d, a, alpha]")
     read = tuple(where.texts(row, f"answer.dh.rows[{k}]", "[theta, d, a, alpha]") for k, row in enumerate(rows))
     for k, row in enumerate(read):
-        if len(row) != 4:
+        if len(row) != len(COLUMNS):
             raise where.fail(f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha")
-    return where.choice(data, "convention", "answer.dh.", ("standard", "modified")), read
+    return where.choice(data, "convention", "answer.dh."), read
 
 
 def _branches(where: _Where, data: Mapping[str, Any]) -> tuple[tuple[str, ...], ...]:
-    where.keys(data, ("branches",), "answer.ik.")
+    where.keys(data, KEYS["ik"], "answer.ik.")
     branches = data.get("branches")
     if not isinstance(branches, list) or not 0 < len(branches) <= MAX_BRANCHES:
         raise where.fail("answer.ik.branches", branches, f"1 to {MAX_BRANCHES} lists of formulas, one a joint")

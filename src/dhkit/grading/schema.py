@@ -1,0 +1,180 @@
+"""JSON Schemas of answer sheets, tasks and rubrics, made from the tables and forms by which they are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from dhkit.description.schema import titled_schema
+from dhkit.grading.answers.quantity_names import SMALL_HEADS
+from dhkit.grading.answers.sheet import (
+    ALIASES,
+    CHOICES,
+    COLUMNS,
+    FORMAT,
+    KEYS,
+    MAX_BRANCHES,
+    MAX_NAMES,
+    QUANTITY,
+    quantity_names,
+    shape_of,
+)
+from dhkit.grading.mistakes.library import LIBRARY
+from dhkit.grading.rubric import WEIGHED, Rubric
+
+__all__ = ["rubric_schema", "sheet_schema", "task_schema"]
+
+ENTRY = {"type": ["string", "number"]}
+"""A formula as text, or a number."""
+ANSWER = {"$ref": "#/$defs/Answer"}
+MEANINGS = {
+    "M": "Mass matrix M(q), n rows of n: kg m^2 of revolute joints, kg of sliding ones.",
+    "C": "Matrix C(q, qd) of Coriolis and centrifugal terms, n rows of n; it is judged by C qd.",
+    "h": "Coriolis and centrifugal torques C(q, qd) qd, n entries: N m and N.",
+    "g": "Gravity torques g(q), n entries: N m and N.",
+    "tau": "Joint torques M qdd + C qd + g, n entries: N m and N.",
+    "K": "Kinetic energy, J.",
+    "V": "Potential energy, J, counted from any zero.",
+    "L": "Lagrangian K - V, J.",
+    "T": "Transform from base to tool, 4 rows of 4: lengths in m.",
+    "J": "The tool's Jacobian, 6 rows of n: linear (m), then angular; world axes.",
+}
+"""Of each quantity but the link transforms, by its name."""
+UNITS = dict(zip(COLUMNS, ("rad", "m", "m", "rad"), strict=True))
+"""Of the entries of a table's row."""
+
+
+def sheet_schema() -> dict[str, Any]:
+    """Return the JSON Schema of answer sheets in TOML."""
+    text = "Answers about a robot, as text that is read and never run: SI units and radians."
+    answer = {"anyOf": [ENTRY, {"type": "array", "items": ANSWER}]}
+    return _document("answer sheet", "sheet", text, Answer=answer) | {"required": ["answer"]}
+
+
+def task_schema() -> dict[str, Any]:
+    """Return the JSON Schema of an instructor's task, the file of ``dhkit grade --task``."""
+    return _document("task", "task file", "What was asked for; it goes before what sheets say.")
+
+
+def rubric_schema() -> dict[str, Any]:
+    """Return the JSON Schema of rubrics, the file of ``dhkit grade --rubric``, from the form that validates them."""
+    schema = TypeAdapter(Rubric).json_schema() | {"description": "What answers are worth."}
+    schema["properties"]["weights"]["propertyNames"] = {"pattern": _whole(WEIGHED.pattern)}
+    schema["$defs"]["Credit"]["properties"]["mistakes"]["propertyNames"] = {"enum": sorted(LIBRARY)}
+    return titled_schema("dhkit rubric", schema)
+
+
+def _document(noun: str, kind: str, description: str, **definitions: Any) -> dict[str, Any]:
+    """Return the schema of a document with a rubric in it, and with further definitions."""
+    rubric = rubric_schema()
+    definitions |= rubric.pop("$defs")
+    definitions["Rubric"] = {key: value for key, value in rubric.items() if key not in ("$schema", "title")}
+    table = _table(KEYS[kind], _properties(), description)
+    return titled_schema(f"dhkit {noun}, format {FORMAT}", table | {"$defs": definitions})
+
+
+def _properties() -> dict[str, Any]:
+    """Return the schema of every key, of a document and of the tables in it."""
+    names = {"type": "array", "items": {"type": "string"}}
+    keys = {
+        "format": {"const": FORMAT, "description": "Version of the file's format."},
+        "robot": _text("Robot: a library name (see `dhkit robots`), or a robot file (.toml) in this file's folder."),
+        "student": _text("Student's name."),
+        "rubric": {
+            "$ref": "#/$defs/Rubric",
+            "description": "What answers are worth, unless --rubric says it; a sheet's own counts where it is alone.",
+        },
+        "q": names | {"description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."},
+        "qd": names | {"description": "Names of their rates (rad/s, m/s)."},
+        "qdd": names | {"description": "Names of their accelerations (rad/s^2, m/s^2)."},
+        "angles": _choice("angles", "Whether angles count from the link before, or from a fixed direction."),
+        "parameters": {
+            "type": "object",
+            "description": "Further names, each an expression in the robot's parameters and in names before it.",
+            "additionalProperties": ENTRY,
+            "maxProperties": MAX_NAMES,
+        },
+        "friction": _switch("Whether tau includes viscous friction."),
+        "total_derivative": _switch("Whether L is right up to the time derivative of a function of q."),
+        "asked": {
+            "type": "array",
+            "description": "Quantities that were assigned: a sheet without one of them is incomplete.",
+            "items": {"type": "string", "pattern": _whole(QUANTITY.pattern)},
+        },
+        "proof": _choice("proof", "Whether an answer has to be proved equal, or may be tried at random states."),
+        "frames": _choice("frames", "Whether a table may place its frames freely, or must have the robot file's."),
+        "zero": _choice("zero", "Whether a table's zero pose is free, or must be the robot file's."),
+        "convention": _choice(
+            "convention", "Whose Denavit-Hartenberg table it is: the standard one, or Craig's modified."
+        ),
+        "rows": {
+            "type": "array",
+            "description": "A row a joint.",
+            "minItems": 1,
+            "items": {
+                "type": "array",
+                "prefixItems": [ENTRY | {"description": f"{name}, {UNITS[name]}"} for name in COLUMNS],
+                "minItems": len(COLUMNS),
+                "maxItems": len(COLUMNS),
+            },
+        },
+        "branches": {
+            "type": "array",
+            "description": "Solutions, each a list of n formulas (rad, m) of the tool's pose px py pz, r11 ... r33.",
+            "minItems": 1,
+            "maxItems": MAX_BRANCHES,
+            "items": {"type": "array", "items": ENTRY},
+        },
+    }
+    tables = {
+        "names": _table(KEYS["names"], keys, "The student's own names."),
+        "task": _table(KEYS["task"], keys, "What was asked for, where there is a choice."),
+        "answer": _answer(
+            dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row.") | {"required": ["rows"]},
+            ik=_table(KEYS["ik"], keys, "Inverse kinematics as formulas.") | {"required": ["branches"]},
+        ),
+    }
+    return keys | tables
+
+
+def _table(keys: Sequence[str], properties: dict[str, Any], description: str) -> dict[str, Any]:
+    known = {key: properties[key] for key in keys}
+    return {"type": "object", "description": description, "properties": known, "additionalProperties": False}
+
+
+def _answer(**tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of the answers: quantities whole, by their entries, or as one of the tables."""
+    whole = {name: ANSWER | {"description": MEANINGS[name]} for name in quantity_names(0)}
+    names = {name: name for name in whole} | ALIASES | SMALL_HEADS
+    heads = "|".join(name for name, quantity in names.items() if shape_of(quantity, 1))
+    element = rf"(?:{heads})[_{{]*[1-9][0-9_,{{}}]*|A[1-9][0-9_,{{}}]{{2,}}"
+    return {
+        "type": "object",
+        "description": "Formulas in quotes or numbers, alone or in lists; what is empty is not handed in.",
+        "properties": whole | tables,
+        "patternProperties": {
+            _whole("A[1-9][0-9]?"): ANSWER | {"description": "Link transform from link i - 1 to link i, 4 rows of 4."},
+            _whole(element): ENTRY | {"description": "A single entry, counted from 1: M11, g_2, A1_14."},
+        },
+        "additionalProperties": False,
+        "minProperties": 1,
+    }
+
+
+def _text(description: str) -> dict[str, Any]:
+    return {"type": "string", "description": description}
+
+
+def _switch(description: str) -> dict[str, Any]:
+    return {"type": "boolean", "default": False, "description": description}
+
+
+def _choice(key: str, description: str) -> dict[str, Any]:
+    return {"enum": [*CHOICES[key]], "default": CHOICES[key][0], "description": description}
+
+
+def _whole(pattern: str) -> str:
+    """Return a pattern for JSON Schema, which searches, that matches whole texts only."""
+    return f"^(?:{pattern})$"

@@ -1,0 +1,79 @@
+"""JSON Schema of motion files in YAML: the ROS JointTrajectory as it is written and read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dhkit.description.schema import titled_schema
+from dhkit.trajectories.files import LEFT_OUT, MOST_DIGITS
+from dhkit.trajectories.ros_yaml import ROWS, TIMES
+
+__all__ = ["motion_schema"]
+
+NUMBER = {
+    "type": ["number", "string"],
+    "pattern": r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$",
+}
+"""A number, or its text: YAML 1.1 takes 1e-05 for text."""
+WHOLE = {
+    "type": ["integer", "string"],
+    "minimum": 0,
+    "maximum": 10**MOST_DIGITS - 1,
+    "pattern": f"^[0-9]{{1,{MOST_DIGITS}}}$",
+}
+ROW = {"type": "array", "items": NUMBER, "minItems": 1}
+ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}
+
+
+def motion_schema() -> dict[str, Any]:
+    """Return the JSON Schema of motion files that end in .yaml or .yml.
+
+    JSON Schema cannot say that all rows have one number a joint, that times increase, that all points have the same
+    rows, nor which joints a robot has; the reader checks these too.
+    """
+    description = (
+        "A motion as samples: a ROS message trajectory_msgs/JointTrajectory, in rad, m and s. A file that dhkit wrote"
+        " begins with the comments '# dhkit trajectory' and '# robot: NAME DIGEST'."
+    )
+    properties = {
+        "header": {"description": "Of the ROS message; not read."},
+        "joint_names": {
+            "type": "array",
+            "description": "Names of the robot's joints, in any order: the order of every row.",
+            "items": {"type": "string"},
+            "minItems": 1,
+            "uniqueItems": True,
+        },
+        "points": {"type": "array", "description": "Samples in order of time.", "items": _point(), "minItems": 2},
+    }
+    return titled_schema("dhkit motion file", _closed(properties, description, ["joint_names", "points"]))
+
+
+def _point() -> dict[str, Any]:
+    positions, velocities, accelerations = ROWS
+    properties = {
+        positions: ROW | {"description": "Joint values, rad and m, one a joint."},
+        velocities: ROW_OR_NONE | {"description": "Joint rates, rad/s and m/s; in all points or in none."},
+        accelerations: ROW_OR_NONE | {"description": "Joint accelerations, rad/s^2 and m/s^2; only with velocities."},
+        "effort": {"description": "Joint torques, N m and N; not read."},
+        "time_from_start": _duration(),
+    }
+    return _closed(properties, "A sample of the motion.", [positions, "time_from_start"]) | {
+        "if": {"properties": {accelerations: ROW}, "required": [accelerations]},
+        "then": {"properties": {velocities: ROW}, "required": [velocities]},
+    }
+
+
+def _duration() -> dict[str, Any]:
+    """Return the schema of a time: seconds and nanoseconds, under the keys of one version of ROS."""
+    properties: dict[str, Any] = {}
+    for whole, part in TIMES:
+        properties |= {whole: WHOLE | {"description": "Whole seconds."}, part: WHOLE | {"description": "Nanoseconds."}}
+    duration = _closed(properties, "Time of the sample, greater than that of the one before.")
+    return duration | {"anyOf": [{"required": [*keys]} for keys in TIMES]}
+
+
+def _closed(properties: dict[str, Any], description: str, required: list[str] | None = None) -> dict[str, Any]:
+    """Return the schema of a mapping that has no other keys."""
+    known = {"type": "object", "description": description, "properties": properties, "additionalProperties": False}
+    return known | ({"required": required} if required else {})

@@ -1,0 +1,101 @@
+"""Where output goes: pipes that lack letters, named pipes and devices; and what help says."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import threading
+
+import pytest
+import typer
+
+from dhkit import Arm
+from dhkit.cli.main import app
+from dhkit.cli.streams import _plain
+
+COMMANDS = typer.main.get_command(app).commands
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("info puma560", "theta"),
+        ("ik puma560 --like ready --near ready", "-> nearest"),
+        ("ik --help", "Print every way"),
+        ("info puma560 --json", '"name": "puma560"'),
+    ],
+)
+def test_letters_that_a_pipe_lacks_are_replaced(encoding, command, words):
+    env = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "dhkit", *command.split()], capture_output=True, env=env, check=False, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    text = done.stdout.decode(encoding)
+    assert words in text
+    if "--json" in command:
+        assert json.loads(text)["source"] == Arm.load("puma560").description.source
+
+
+def test_letters_become_plain_ones():
+    assert "".join(map(_plain, "θ α Θ → ² ½ é ─│ 関")) == "theta alpha Theta -> 2 12 e -| ?"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+@pytest.mark.parametrize("command", ["build planar2r", "equations planar2r"])
+def test_a_named_pipe_is_written_through_and_stays(command, tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text()))
+    reader.start()
+    subprocess.run([sys.executable, "-m", "dhkit", *command.split(), "-o", str(pipe)], check=True, timeout=60)
+    reader.join(10)
+    assert len(read[0]) > 100
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
+def test_a_stream_that_goes_into_a_file_is_written_through(tmp_path):
+    path = tmp_path / "both.txt"
+    command = f"'{sys.executable}' -m dhkit equations planar2r -o /dev/stdout"
+    with path.open("w") as file:
+        file.write("before\n")
+        file.flush()
+        subprocess.run(shlex.split(command), stdout=file, check=True, timeout=60)
+    text = path.read_text()
+    assert text.startswith("before\nM11 = ")
+    assert text.endswith("wrote /dev/stdout\n")
+
+
+def test_a_device_is_written_through():
+    done = subprocess.run(
+        [sys.executable, "-m", "dhkit", "equations", "planar2r", "-o", "/dev/stdout"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert "M22 = m2*l2^2/3" in done.stdout
+
+
+def test_summaries_are_whole():
+    done = subprocess.run([sys.executable, "-m", "dhkit", "--help"], capture_output=True, text=True, check=True)
+    listed = " ".join(done.stdout.split("Commands:")[1].split())
+    assert "..." not in listed
+    for name, command in COMMANDS.items():
+        assert f"{name} {' '.join(command.help.split(chr(10) * 2)[0].split())}" in listed
+
+
+def test_options_of_one_meaning_have_one_name():
+    for name, command in COMMANDS.items():
+        for option in command.params:
+            if option.name == "output":
+                assert option.opts == ["--output", "-o"], name
+            assert not set(option.opts) & {"--out", "--outfile", "--file", "--deg", "--n-samples"}, name
+            if option.name == "form":
+                assert option.opts == ["--format"], name
+            if "--json" in option.opts:
+                assert option.help == "Print JSON for machines.", name
