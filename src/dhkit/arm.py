@@ -16,13 +16,13 @@ from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
     from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
-    from dhkit.description import Body
+    from dhkit.description import Body, Payload
     from dhkit.description.table import Quantity
     from dhkit.grading import GradeReport, Rubric
     from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
-    from dhkit.planning import Certificate, Constraint, Distances, ObjectiveLike, Payload, Planner, Scene
+    from dhkit.planning import Certificate, Constraint, Distances, ObjectiveLike, Planner, Scene
     from dhkit.planning.solver import ProgressCall
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
@@ -160,9 +160,11 @@ class Arm:
         return Arm(describe.with_base(self._description, T))
 
     def with_payload(
-        self, mass: Quantity, com: Sequence[Quantity] = (0, 0, 0), inertia: ArrayLike | None = None
+        self, mass: Quantity | Payload, com: Sequence[Quantity] = (0, 0, 0), inertia: ArrayLike | None = None
     ) -> Arm:
         """Return this arm with a load, kg, its com in the tool's frame; see :func:`dhkit.description.with_payload`."""
+        if isinstance(mass, describe.Payload):
+            return Arm(mass.carried(self._description))
         return Arm(describe.with_payload(self._description, mass, com, inertia))
 
     def with_parameters(self, **values: Quantity) -> Arm:
@@ -841,6 +843,7 @@ class Arm:
         intervals: int = 200,
         time_limit: float = 10.0,
         progress: ProgressCall | None = None,
+        payload: Payload | None = None,
     ) -> Trajectory:
         """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
         from dhkit.planning import along_path
@@ -855,20 +858,20 @@ class Arm:
             intervals=intervals,
             time_limit=time_limit,
             progress=progress,
+            payload=payload,
         )
 
     def certify(
         self,
         motion: Trajectory,
         limits: Limits | None = None,
-        friction: bool | Friction = False,
+        friction: bool | Friction | None = None,
         payload: Payload | None = None,
     ) -> Certificate:
         """Check a motion against limits, the arm's own unless given; see :func:`dhkit.planning.certify`."""
-        from dhkit.dynamics import Friction
         from dhkit.planning import certify
 
-        return certify(self._description, motion, limits, Friction.chosen(friction), payload)
+        return certify(self._description, motion, limits, friction, payload)
 
     def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
         """Return how far the links are from obstacles, and from each other; see :func:`dhkit.planning.distance`."""
@@ -1009,10 +1012,7 @@ class Arm:
         return f"<Arm {self.name}: {self._description.kinds}, {self._description.convention.value} DH>"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        warnings = "".join(f"<div>warning: {escape(warning)}</div>" for warning in self._description.warnings)
-        return f"<b>{self.name}</b>{self.dh._repr_html_()}{warnings}"
+        return self._description._repr_html_()
 
 
 def _listed(pushes: Sequence[Push]) -> tuple[Push, ...]:

@@ -333,7 +333,7 @@ class AtOnce:
 
 def test_a_search_that_takes_long_says_how_far_it_is(monkeypatch, plan):
     """The line is there from the start; what it said last is drawn when it ends, however fast the search was."""
-    monkeypatch.setattr("dhkit.cli.patience.threading.Timer", AtOnce)
+    monkeypatch.setattr("dhkit.cli.progress.threading.Timer", AtOnce)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     monkeypatch.setenv("TERM", "xterm")
     status, _, err = plan("planar2r", "--to", "1", "0.5", "--intervals", "48")

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from scipy.io import savemat
 
-from dhkit import Arm, FrictionCompensation, PDGravity, SimulationResult
+from dhkit import Arm, FrictionCompensation, Payload, PDGravity, SimulationResult
 from dhkit.cli import main
 from dhkit.cli.simulation_task import chosen_motion
 from dhkit.viewer import View
@@ -214,3 +214,17 @@ def test_a_motion_of_another_arm_or_a_simulation_is_no_motion(dhkit, tmp_path):
     path = ARM.simulate(None, duration=0.01, q0=[0.1, 0.2]).save(tmp_path / "run.npz")
     status, _, err = dhkit("simulate", "planar2r", "--motion", path)
     assert status == 2 and "a dhkit simulation; expected a trajectory" in err
+
+
+def test_a_motion_brings_its_payload(dhkit, tmp_path):
+    arm = Arm.load("planar2r")
+    load = Payload(1.2, (0.02, 0, 0))
+    path = arm.plan([0, 0], [1.0, 0.5], intervals=24, payload=load).save(tmp_path / "loaded.npz")
+    status, out, err = dhkit("simulate", "planar2r", "--motion", path, "--json")
+    assert status == 0, err
+    known = json.loads(out)["peak_error_rad"]
+    assert json.loads(dhkit("simulate", "planar2r", "--motion", path, "--payload", "1.2 @ 0.02 0 0", "--json")[1])[
+        "peak_error_rad"
+    ] == pytest.approx(known)
+    unknown = json.loads(dhkit("simulate", "planar2r", "--motion", path, "--unmodelled", "--json")[1])
+    assert max(unknown["peak_error_rad"]) > 10 * max(known)

@@ -1,17 +1,20 @@
 """Where output goes: pipes that lack letters, named pipes and devices; and what help says."""
 
+import contextlib
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
 import threading
 
+import numpy as np
 import pytest
 import typer
 
-from dhkit import Arm
-from dhkit.cli.main import app
+from dhkit import Arm, Limits
+from dhkit.cli.commands import app
 from dhkit.cli.streams import _plain
 
 COMMANDS = typer.main.get_command(app).commands
@@ -99,3 +102,42 @@ def test_options_of_one_meaning_have_one_name():
                 assert option.opts == ["--format"], name
             if "--json" in option.opts:
                 assert option.help == "Print JSON for machines.", name
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals")
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("plan puma560 --to nominal --intervals 96", "of 30 s to search"),
+        ("simulate puma560 --duration 30", "simulating"),
+    ],
+)
+def test_a_bar_shows_how_far_it_is(command, words):
+    ours, theirs = os.openpty()
+    program = [sys.executable, "-m", "dhkit", *command.split()]
+    process = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=theirs)
+    os.close(theirs)
+    shown = b""
+    with contextlib.suppress(OSError):  # the terminal's end
+        while part := os.read(ours, 65536):
+            shown += part
+    os.close(ours)
+    assert process.wait(60) == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+    assert words in text
+    assert "━" in text
+
+
+def test_what_is_not_limited_is_said():
+    done = subprocess.run(
+        [sys.executable, "-m", "dhkit", *["plan", "planar2r", "--to", "1", "1", "--intervals", "24"]],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "\nnot limited: acceleration, jerk\n" in done.stdout
+    arm = Arm.load("planar2r")
+    slow = Limits.of(arm.description, acceleration=[5, np.inf], jerk=100)
+    motion = arm.plan([0, 0], [1, 1], limits=slow, intervals=24)
+    assert motion.report.unlimited == ("acceleration of joint 2",)
+    assert "not limited: acceleration of joint 2" in str(motion.report)

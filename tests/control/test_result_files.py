@@ -76,12 +76,13 @@ def test_an_archive_holds_a_robot_that_nobody_knows_and_a_table_asks_for_it(tmp_
 def test_a_table_begins_as_promised(tmp_path):
     lines = swinging(ARM, 3).save(tmp_path / "run.csv").read_text().splitlines()
     assert lines[:2] == ["# dhkit simulation", f"# robot: planar2r {ARM.digest}"]
-    assert [line.split(":")[0] for line in lines[2:9]] == [
+    assert lines[2].startswith("# content: ")
+    assert [line.split(":")[0] for line in lines[3:10]] == [
         f"# {name}" for name in SIMULATION.arrays[8:] if name != "reference_poses"
     ]
     header = "t,q1,q2,qd1,qd2,qdd1,qdd2,tau1,tau2,tau_asked1,tau_asked2,reference_q1,reference_q2"
-    assert lines[9] == f"{header},reference_qd1,reference_qd2"
-    assert len(lines) == 13
+    assert lines[10] == f"{header},reference_qd1,reference_qd2"
+    assert len(lines) == 14
 
 
 def test_numpy_and_scipy_read_the_archives(tmp_path):
@@ -169,10 +170,12 @@ BAD_LINES = {
     "an infinite audit": (r"(# audit_drives:).*", r"\1 inf", "audit_drives has values that are not finite"),
     "one share": (r"(# saturated:).*", r"\1 0.5", r"saturated has shape \(1,\); expected \(2,\)"),
     "other columns": ("tau_asked1", "tau_wanted1", "columns t, q1, .*; expected t, q1, q2, .*tau_asked1"),
-    "a column too few": (",reference_qd2", "", "line 11: 15 values; expected 14, as in the header"),
-    "a word": (r"\n0,[^,]*,", "\n0,fast,", "line 11: q1 is 'fast'; expected a number"),
-    "NaN": (r"\n0,[^,]*,", "\n0,nan,", "line 11: q1 is nan; expected a finite number"),
+    "a column too few": (",reference_qd2", "", "line 12: 15 values; expected 14, as in the header"),
+    "a word": (r"\n0,[^,]*,", "\n0,fast,", "line 12: q1 is 'fast'; expected a number"),
+    "NaN": (r"\n0,[^,]*,", "\n0,nan,", "line 12: q1 is nan; expected a finite number"),
     "times that begin late": (r"\n0,", "\n0.1,", "t begins with 0.1 s; expected 0"),
+    "another number": (r"\n0,[^,]*,", "\n0,0.25,", "changed since dhkit wrote it: its digest differs"),
+    "no digest": (r"# content: .*\n", "", "no comment '# content: DIGEST' in its third line"),
     "no states": (r"\n[-\d][^#]*\Z", "\n", "no samples in it"),
 }
 

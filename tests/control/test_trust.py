@@ -119,7 +119,10 @@ def test_an_arm_begins_inside_its_stops():
     upper = ARM.description.numbers.upper
     q = START.copy()
     q[1] = upper[1] + 10
-    with pytest.raises(ValueError, match=r"q0: shoulder is 13\.93, its limits are .* and 3\.927; degrees\?"):
+    with pytest.raises(
+        ValueError,
+        match=r"q0: shoulder is 13\.93 rad \(2\.22 turns; were degrees meant\?\), above its upper limit, 3\.927 rad",
+    ):
         ARM.simulate(HOLD, START, 0.01, q)
     with pytest.raises(ValueError, match="the reference's first state: shoulder is 45"):
         ARM.simulate(HOLD, [0, 45, 0, 0, 0, 0], 0.01)

@@ -50,3 +50,24 @@ def test_jumps_between_pieces_are_seen(order, what):
 def test_a_motion_of_another_arm_is_refused():
     with pytest.raises(dhkit.DescriptionError, match="the trajectory is one of planar2r"):
         Arm.load("puma560").certify(Arm.load("planar2r").quintic([0, 0], [1, 1], 1.0))
+
+
+def test_a_motion_keeps_its_payload_and_friction(tmp_path):
+    arm = Arm.load("puma560")
+    load = dhkit.Payload(2.0, (0, 0, 0.05))
+    motion = arm.plan("ready", "nominal", payload=load, friction=True)
+    assert motion.payload == load and motion.friction is not None
+    assert motion.description == arm.description
+    again = Trajectory.load(motion.save(tmp_path / "loaded.npz"))
+    limits = arm.description.numbers.effort
+    for one in (motion, again, again.slowed(1.0), again.reversed().reversed()):
+        assert one.payload == load
+        share = np.abs(one.sample(n=2001).tau) / limits
+        assert 0.98 < share.max() < 1 + 1e-3
+    assert arm.certify(again).ok
+    assert not arm.certify(again, payload=dhkit.Payload(6.0)).ok
+    bare = again.carrying()
+    assert bare.payload is None and bare != again
+    assert np.abs(bare.tau(0.1) - again.tau(0.1)).max() > 0.1
+    with pytest.raises(ValueError, match="payload is None and then Payload"):
+        bare.then(again.reversed())

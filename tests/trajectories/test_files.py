@@ -8,10 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dhkit.description import from_dh, library_robot, robots, with_payload
+from dhkit.description import Payload, from_dh, library_robot, robots, with_payload
+from dhkit.dynamics import Friction, inverse_dynamics
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic
-from dhkit.trajectories.archives import mat_bytes, npz_bytes
+from dhkit.trajectories.archives import archive_bytes, mat_bytes, npz_bytes, read_archive
+from dhkit.trajectories.files import TRAJECTORY
 from file_checks import check_damaged, check_refused
 from trajectories_reference import continuous_motion
 
@@ -87,9 +89,11 @@ def test_tables_hold_samples_of_every_bit(name, suffix, tmp_path):
 def test_a_table_begins_as_promised(tmp_path):
     motion = cubic(ARM, [0, 0], [1, 1], duration=1.0)
     lines = motion.save(tmp_path / "motion.csv", rate=2).read_text().splitlines()
-    assert lines[:3] == ["# dhkit trajectory", f"# robot: planar2r {ARM.digest}", "t,q1,q2,qd1,qd2,qdd1,qdd2"]
-    assert lines[4] == "0.5,0.5,0.5,1.5,1.5,0,0"
-    assert len(lines) == 6
+    assert lines[:2] == ["# dhkit trajectory", f"# robot: planar2r {ARM.digest}"]
+    assert lines[2].startswith("# content: ")
+    assert lines[3] == "t,q1,q2,qd1,qd2,qdd1,qdd2"
+    assert lines[5] == "0.5,0.5,0.5,1.5,1.5,0,0"
+    assert len(lines) == 7
 
 
 def test_pyyaml_reads_what_is_written(tmp_path):
@@ -129,7 +133,7 @@ def test_a_table_of_an_unknown_robot_asks_for_it(suffix, tmp_path):
     assert Trajectory.load(path, arm).description is arm
 
 
-GOOD = {"format": "dhkit trajectory 1", "robot": "planar2r", "digest": ARM.digest}
+GOOD = {"format": "dhkit trajectory 1", "robot": "planar2r", "digest": ARM.digest, "content": "0" * 16}
 
 
 def values(**changed):
@@ -149,6 +153,13 @@ BAD_VALUES = [
     ({"breaks": np.array([0.0, np.nan])}, r"breaks has nan"),
     ({"coefficients": np.ones((1, 2, 3))}, r"coefficients has shape \(1, 2, 3\); expected \(1, p\+1, 2\)"),
     ({"coefficients": np.full((1, 2, 2), np.inf)}, r"coefficients has inf"),
+    ({"content": None}, r"no content in it"),
+    ({}, r"its numbers differ from those that were written; the file is damaged"),
+    ({"payload": np.ones(9)}, r"payload has shape \(9,\); expected \(10,\)"),
+    ({"payload": np.r_[-1.0, np.zeros(9)]}, r"payload: mass is -1 kg; expected none below 0"),
+    ({"payload": np.r_[np.nan, np.zeros(9)]}, r"payload: mass is nan; expected finite numbers"),
+    ({"friction": np.ones(2)}, r"friction has 2 numbers; expected its width alone"),
+    ({"friction": np.array([-1.0])}, r"friction: width is -1.0; expected 0, or a finite number"),
 ]
 
 
@@ -187,7 +198,7 @@ def test_bombs_are_not_unpacked(tmp_path):
             with archive.open(f"{key}.npy", "w", force_zip64=True) as member:
                 for _ in range(60):
                     member.write(bytes(1_000_000))
-    refused(path, r"unpacks to 360 MB; expected at most 200 MB")
+    refused(path, r"unpacks to 420 MB; expected at most 200 MB")
     import struct
     import zlib
 
@@ -248,3 +259,42 @@ def test_a_file_whose_motion_jumps_is_refused(suffix, order, what, tmp_path):
     Trajectory(arm, [0.0, 1.0, 2.0], coefficients).save(tmp_path / f"jump{suffix}")
     with pytest.raises(DescriptionError, match=rf"jump\{suffix}: joint 2: its {what} jumps from 0 to 0.001 at 1 s"):
         Trajectory.load(tmp_path / f"jump{suffix}")
+
+
+LOADS = [Payload(2.0, (0.01, 0.0, 0.05)), Payload(1.5, (0, 0, 0.1), np.diag([0.01, 0.02, 0.025])), Payload(0.3)]
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".csv", ".yaml"])
+@pytest.mark.parametrize("payload", LOADS)
+@pytest.mark.parametrize("friction", [None, Friction(0.05), Friction()])
+def test_payload_and_friction_stand_in_the_file(suffix, payload, friction, tmp_path):
+    motion = cubic(PUMA, np.zeros(6), np.full(6, 0.2), duration=0.4).carrying(payload, friction)
+    again = Trajectory.load(motion.save(tmp_path / f"motion{suffix}"))
+    assert (again.payload, again.friction) == (payload, friction)
+    assert again.description is PUMA
+    t = np.linspace(0, 0.4, 9)[1:-1]
+    loaded = payload.carried(PUMA)
+    expected = inverse_dynamics(loaded, motion.q(t), motion.qd(t), motion.qdd(t), friction=friction or False)
+    assert np.abs(again.tau(t) - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".csv", ".yaml"])
+def test_a_changed_number_is_noticed(suffix, tmp_path):
+    motion = cubic(ARM, [0, 0], [1, 1], duration=1.0).carrying(Payload(1.5))
+    path = motion.save(tmp_path / f"motion{suffix}")
+    if suffix in TABLES:
+        path.write_text(path.read_text().replace("payload: 1.5", "payload: 1.25"))
+        complaint = "changed since dhkit wrote it: its digest differs; Trajectory.read takes samples from elsewhere"
+    else:
+        archive = read_archive(suffix, path.read_bytes(), TRAJECTORY)
+        archive["payload"] = np.r_[1.25, np.zeros(9)]
+        path.write_bytes(archive_bytes(suffix, archive))
+        complaint = "its numbers differ from those that were written"
+    refused(path, complaint)
+    if suffix in TABLES:
+        path.write_bytes(motion.save(path).read_bytes().replace(b"\n", b"\r\n"))
+        assert Trajectory.load(path).payload == motion.payload
+    if suffix == ".csv":
+        text = path.read_text().splitlines()
+        path.write_text("\n".join(text[:-1]) + "\n")
+        assert Trajectory.read(path, ARM).duration <= 1.0  # a shortened table is one from elsewhere

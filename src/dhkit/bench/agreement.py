@@ -10,6 +10,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.bench.contenders import Task, Workload
 from dhkit.description import Array
+from dhkit.display import value_line
 
 __all__ = ["TOLERANCE", "Verdict", "judge"]
 
@@ -45,6 +46,9 @@ class Verdict:
     def __str__(self) -> str:
         error = "no answer" if self.error is None else f"{self.error:.0e}"
         return error if self.ok else f"DISAGREES: {error}"
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 def judge(workload: Workload, quantity: str, task: Task) -> Verdict:

@@ -14,6 +14,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
+from dhkit.display import counted, repr_line
 from dhkit.errors import from_checkout
 from dhkit.verification import random_states
 
@@ -96,6 +97,10 @@ class Workload:
                 return self.q, self.qd, self.tau
         return (self.q,)
 
+    def __repr__(self) -> str:
+        said = f"{counted(len(self.q), 'state')}, {counted(self.threads, 'thread')}"
+        return repr_line("Workload", self.arm.name, said)
+
 
 @dataclass(frozen=True)
 class Task:
@@ -112,6 +117,9 @@ class Task:
 
     prepare: Callable[[int], Call]
     answers: Callable[[int], Sequence[Array]]
+
+    def __repr__(self) -> str:
+        return "<Task>"
 
 
 @dataclass(frozen=True)
@@ -137,6 +145,9 @@ class Contender:
     mode: Mode
     setup: Callable[[Workload], Task]
     own: bool = False
+
+    def __repr__(self) -> str:
+        return repr_line("Contender", said=f"{self.quantity} by {self.name}, {self.mode.value}")
 
 
 def import_peer(module: str) -> Any:

@@ -15,6 +15,7 @@ from dhkit.arm import Arm
 from dhkit.bench.geometry import bare
 from dhkit.bench.peers.sympy_mechanics import lagranges_equations
 from dhkit.description import write_robot
+from dhkit.display import value_line
 from dhkit.dynamics import dynamics_graph
 from dhkit.symbolic import CasadiFunctions, derive, lagrangian, operation_count
 from dhkit.symbolic.exact.exact_arm import exact_arm
@@ -46,6 +47,9 @@ class Derivation:
         time = f"{self.seconds:.3g} s" if self.seconds is not None else f"not within {self.limit:g} s"
         return self.robot, self.what, time
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class Operations:
@@ -67,6 +71,9 @@ class Operations:
         """A line of a table under :attr:`COLUMNS`."""
         counts = (self.additions, self.multiplications, self.total, self.trigonometric)
         return self.program, *map(str, counts)
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 def operations(arm: Arm) -> list[Operations]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from dhkit.display import repr_line
 from dhkit.kernels import kernel_mode
 
 __all__ = ["Machine", "cores"]
@@ -82,6 +83,9 @@ class Machine:
             packages={name: found for name in PACKAGES if (found := _version(name))},
             kernels=kernel_mode(),
         )
+
+    def __repr__(self) -> str:
+        return repr_line("Machine", said=f"{self.processor}, {self.cores} cores, {self.python}")
 
 
 def cores() -> int:

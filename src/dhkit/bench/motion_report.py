@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Table, duration, listed_values, report_markdown, report_text
+from dhkit.bench.report import Missing, Table, duration, listed_values, report_html, report_markdown, report_text
+from dhkit.display import html_table, repr_line
 
 __all__ = ["MeshBuild", "MotionReport", "MotionRow"]
 
@@ -95,6 +96,14 @@ class MotionReport:
 
     def __str__(self) -> str:
         return report_text(self._title, self.machine.facts, self._tables, MEANING)
+
+    def __repr__(self) -> str:
+        return repr_line("MotionReport", self.robot, f"{self.pairs} random pairs, {len(self.rows)} rows")
+
+    def _repr_html_(self) -> str:
+        rows = [(f"{row.speed:g}", *row.cells) for row in self.rows]
+        table = html_table(("speed", *MotionRow.COLUMNS), rows, align="rlr")
+        return report_html(self._title, self.machine.facts, table)
 
     @property
     def _title(self) -> str:

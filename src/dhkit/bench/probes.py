@@ -26,6 +26,7 @@ from dhkit.bench.machine import cores
 from dhkit.bench.peers.dhkit_arm import method, new_output
 from dhkit.bench.rounds import lasting, repeated, rounds
 from dhkit.description import write_robot
+from dhkit.display import value_line
 
 __all__ = ["FirstCall", "PeakMemory", "ThreadScaling", "first_call", "peak_memory", "thread_scaling"]
 
@@ -60,6 +61,9 @@ class ThreadScaling:
     def cells(self) -> tuple[str, ...]:
         """A line of a table under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.dhkit:.2f}", f"{self.control:.2f}", f"{self.share:.2f}")
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,9 @@ class PeakMemory:
         arrays, peak = (f"{count / 1e6:.1f}" for count in (self.inputs + self.outputs, self.peak))
         return (self.quantity, self.called, arrays, peak, f"{self.share:.2f}")
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class FirstCall:
@@ -128,6 +135,9 @@ class FirstCall:
     def cells(self) -> tuple[str, ...]:
         """A line of a table under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.first:.2f}", f"{self.second:.2f}")
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadScaling:

@@ -12,6 +12,7 @@ from dhkit.bench.contenders import Mode
 from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
+from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 
 __all__ = [
     "BATCH",
@@ -24,8 +25,10 @@ __all__ = [
     "Table",
     "duration",
     "listed_values",
+    "report_html",
     "report_markdown",
     "report_text",
+    "standing",
 ]
 
 BATCH = 100_000
@@ -73,6 +76,10 @@ class Row:
     times_batch: float | None
     times_single: float | None
 
+    def __repr__(self) -> str:
+        said = f"{self.mode.value}, {duration(self.seconds)} an item"
+        return repr_line("Row", f"{self.quantity} by {self.contender}", said)
+
 
 @dataclass(frozen=True)
 class Missing:
@@ -93,6 +100,9 @@ class Missing:
     reason: str
     failed: bool = False
     own: bool = False
+
+    def __repr__(self) -> str:
+        return repr_line("Missing", f"{self.quantity} by {self.name}", self.reason)
 
 
 class Ending(Enum):
@@ -138,6 +148,9 @@ class Outcome:
         more = f" (and {len(self.causes) - 1} more)" if len(self.causes) > 1 else ""
         cause = f"; {self.causes[0]}{more}" if self.causes else ""
         return f"{self.quantity}: {self.ending.value}{cause}"
+
+    def __repr__(self) -> str:
+        return repr_line("Outcome", said=str(self))
 
 
 @dataclass(frozen=True)
@@ -194,6 +207,10 @@ class Requirement:
             measured,
             {True: "met", False: "MISSED", None: unjudged}[self.met],
         )
+
+    def __repr__(self) -> str:
+        what, required, measured, verdict = self.cells
+        return repr_line("Requirement", said=", ".join(filter(None, (what, required, measured, verdict))))
 
 
 @dataclass(frozen=True)
@@ -257,6 +274,29 @@ class BenchReport:
     def __str__(self) -> str:
         return report_text(self._title, self.machine.facts, self._tables, RATIO_MEANING)
 
+    def __repr__(self) -> str:
+        return repr_line("BenchReport", self.robot, f"{counted(len(self.rows), 'row')}, {standing(self.requirements)}")
+
+    def _repr_html_(self) -> str:
+        endings = {outcome.quantity: outcome.ending.value for outcome in self.outcomes}
+        rows = [(quantity, *self._fastest(quantity), endings.get(quantity, "")) for quantity in self._quantities]
+        headings = ("quantity", "dhkit, an item", "the fastest peer", "an item", "ended")
+        return report_html(
+            self._title, self.machine.facts, html_table(headings, rows, align="lrlrl"), self.requirements
+        )
+
+    @property
+    def _quantities(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(row.quantity for row in self.rows))
+
+    def _fastest(self, quantity: str) -> tuple[str, str, str]:
+        """Return dhkit's least time, and who of the peers that agree has the least, with it."""
+        rows = [row for row in self.rows if row.quantity == quantity]
+        own = min((row.seconds for row in rows if row.own), default=None)
+        peer = min((row for row in rows if not row.own and row.verdict.ok), key=lambda row: row.seconds, default=None)
+        least = "–" if own is None else duration(own)
+        return (least, "–", "–") if peer is None else (least, peer.contender, duration(peer.seconds))
+
     @property
     def _title(self) -> str:
         threads = "1 thread" if self.threads == 1 else f"{self.threads} threads"
@@ -267,10 +307,9 @@ class BenchReport:
     def _tables(self) -> list[Table]:
         """Headings, columns and cells of the tables that have something to show."""
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
-        quantities = dict.fromkeys(row.quantity for row in self.rows)
         tables: list[Table] = [
             (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
-            for quantity in quantities
+            for quantity in self._quantities
         ]
         tables += [
             ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
@@ -331,6 +370,19 @@ def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], m
     for heading, columns, cells in tables:
         parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
     return "\n".join([*parts, meaning, ""])
+
+
+def report_html(title: str, facts: Iterable[str], table: str, requirements: Sequence[Requirement] = ()) -> str:
+    """Return a report for a notebook: its main table, which is HTML already, and what is required."""
+    cells = [requirement.cells for requirement in requirements]
+    required = html_table(("what", "required", "measured", ""), cells) if cells else ""
+    return html_block(title, table, required, html_lines(list(facts)))
+
+
+def standing(requirements: Sequence[Requirement]) -> str:
+    """Return how many of what is required is met, of what could be judged."""
+    judged = [requirement.met for requirement in requirements if requirement.met is not None]
+    return f"{sum(judged)} of {counted(len(judged), 'requirement')} met"
 
 
 def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:

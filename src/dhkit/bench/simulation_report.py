@@ -6,7 +6,18 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Requirement, Table, duration, listed_values, report_markdown, report_text
+from dhkit.bench.report import (
+    Missing,
+    Requirement,
+    Table,
+    duration,
+    listed_values,
+    report_html,
+    report_markdown,
+    report_text,
+    standing,
+)
+from dhkit.display import html_table, repr_line
 
 __all__ = ["BatchRow", "IntegrationRow", "ModelCheck", "SimulationReport", "SingleRow", "Timing"]
 
@@ -176,6 +187,13 @@ class SimulationReport:
 
     def __str__(self) -> str:
         return report_text(self._title, self.machine.facts, self._tables, MEANING)
+
+    def __repr__(self) -> str:
+        return repr_line("SimulationReport", self.robot, f"{self.repeats} rounds, {standing(self.requirements)}")
+
+    def _repr_html_(self) -> str:
+        table = html_table(BatchRow.COLUMNS, [row.cells for row in self.batch], align="lr")
+        return report_html(self._title, self.machine.facts, table, self.requirements)
 
     @property
     def _title(self) -> str:

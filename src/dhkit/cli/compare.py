@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.outputs import FIGURES, check_outputs, write_figure
-from dhkit.cli.patience import Patience
+from dhkit.cli.progress import ProgressBar
 from dhkit.cli.simulate import facts_of
 from dhkit.cli.simulation_task import Task
 from dhkit.control import Comparison, Plant, compare
@@ -26,14 +26,14 @@ def run(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
         tuple(options.pop("pushes")),
     )
     names = list(task.controllers)
-    with Patience(f"simulating {names[0]}") as line:
+    with ProgressBar(f"simulating {names[0]}") as bar:
         compared = compare(
             task.arm.description,
             task.motion,
             names,
             task.bandwidth,
             task.damping,
-            lambda name: line.say(f"simulated {name}, {names.index(name) + 1} of {len(names)}"),
+            lambda name: bar.show(names.index(name) + 1, len(names), f"simulated {name}"),
             plant=plant,
             **options,
         )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
-from dhkit.cli.patience import Patience
+from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
@@ -52,12 +53,6 @@ class Task:
     intervals: int | None
     time_limit: float
     """s."""
-
-    @property
-    def loaded(self) -> Arm:
-        """The arm with what it carries."""
-        load = self.payload
-        return self.arm if load is None else self.arm.with_payload(load.mass, load.com)
 
     @property
     def shared(self) -> dict[str, Any]:
@@ -103,7 +98,7 @@ class Files:
         if self.figure is not None:
             from dhkit.viewer import plot
 
-            yield write_figure(plot(_carrying(task, motion)), self.figure)
+            yield write_figure(plot(motion), self.figure)
 
 
 def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> int:
@@ -118,12 +113,12 @@ def run(task: Task, files: Files, *, line: bool, degrees: bool, json: bool) -> i
     """
     files.check()
     try:
-        with Patience("making the program") as line_on_screen:
+        with ProgressBar("making the program") as bar:
+            began = time.monotonic()
 
             def watch(now: Progress) -> None:
-                line_on_screen.say(
-                    f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
-                )
+                said = f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
+                bar.show(time.monotonic() - began, task.time_limit, f"{said}, of {task.time_limit:g} s to search")
 
             motion = _along_line(task, watch) if line else _anyhow(task, watch)
     except PlanningError as error:
@@ -169,11 +164,10 @@ def _along_line(task: Task, watch: Callable[[Progress], None]) -> Trajectory:
     refused = {"--via": task.via, "obstacles": task.obstacles, "--self-collision": task.self_collision}
     if found := next((name for name, given in refused.items() if given), None):
         raise DescriptionError(f"--line: found {found} too; expected a motion straight from start to goal, without")
-    arm = task.loaded
+    arm = task.arm
     T_goal = task.goal if task.goal.shape == (4, 4) else arm.fk(task.goal)
     path = joint_path(arm.description, tool_line(arm.fk(task.start), T_goal), task.start, task.limits)
-    motion = arm.plan_path(path, progress=watch, **task.shared)
-    return replace(motion, description=task.arm.description)
+    return arm.plan_path(path, progress=watch, payload=task.payload, **task.shared)
 
 
 def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None:
@@ -192,6 +186,8 @@ def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None
     if worst is not None:
         say(f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s")
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {reached}")
+    if report.unlimited:
+        say(f"not limited: {', '.join(report.unlimited)}")
     if report.slow_down > 1:
         say(f"slowed down by {100 * (report.slow_down - 1):.3f} % to keep its limits between knots")
     if report.tightened:
@@ -224,7 +220,7 @@ def _print(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> None
 def _print_joints(task: Task, motion: Trajectory, degrees: bool) -> None:
     """Print where each joint begins and ends, and its largest rate and torque as shares of their limits."""
     numbers = task.arm.description.numbers
-    samples = _carrying(task, motion).sample(n=SAMPLES)
+    samples = motion.sample(n=SAMPLES)
     shares = [_shares(samples.qd, task.limits.velocity)]
     if np.isfinite(numbers.mass).all():
         shares.append(_shares(samples.tau, task.limits.torque))
@@ -242,11 +238,6 @@ def _shares(values: Array, limits: Array) -> list[str]:
     largest = np.abs(values).max(axis=0) / limits
     known = zip(largest, np.isfinite(limits), strict=True)
     return [f"{100 * share:.0f}" if limited else "no limit" for share, limited in known]
-
-
-def _carrying(task: Task, motion: Trajectory) -> Trajectory:
-    """Return the motion as one of the arm with its load: its torques are those."""
-    return replace(motion, description=task.loaded.description)
 
 
 def _facts(task: Task, motion: Trajectory, *, line: bool, degrees: bool) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
-from dhkit.cli.patience import Patience
+from dhkit.cli.progress import ProgressBar
 from dhkit.cli.simulation_task import Task
 from dhkit.cli.units import joint_entry
 from dhkit.control import SimulationResult
@@ -67,12 +67,12 @@ def run(task: Task, files: Files, *, degrees: bool, json: bool) -> int:
     begin = time.perf_counter()
     failure, result = "", None
     try:
-        with Patience("simulating") as line:
+        with ProgressBar("simulating") as bar:
             result = task.arm.simulate(
                 controller,
                 task.motion,
                 plant=task.plant,
-                progress=lambda k, n: line.say(f"simulating: {100 * k // n} %"),
+                progress=bar.show,
                 **task.options,
             )
     except SimulationError as error:

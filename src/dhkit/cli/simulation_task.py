@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.cli.arguments import columns, joint_values, numbers, payload
+from dhkit.cli.arguments import columns, joint_values, numbers
 from dhkit.cli.quickest import ends
 from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, make_controller
-from dhkit.description import Array
+from dhkit.description import Array, Payload
 from dhkit.dynamics import Friction
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, read_motion
@@ -122,20 +122,19 @@ def _has_limits(arm: Arm) -> bool:
     return bool(np.isfinite(numbers.velocity).any() or np.isfinite(numbers.effort).any())
 
 
-def moving_arm(arm: Arm, load: str | None, unmodelled: bool) -> tuple[Arm, Arm]:
-    """Return the arm that the controller knows, and the one that moves.
+def moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) -> tuple[Arm, Arm]:
+    """Return the arm that the controller knows, and the one that moves with what it carries.
 
     Raises
     ------
     DescriptionError
         No payload that could be unmodelled.
     """
-    carried = payload(load)
     if carried is None:
         if unmodelled:
             raise DescriptionError("--unmodelled: found no --payload; expected one that the controller does not know")
         return arm, arm
-    loaded = arm.with_payload(carried.mass, carried.com)
+    loaded = arm.with_payload(carried)
     return (arm if unmodelled else loaded), loaded
 
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import io
-import sys
-import time
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -14,6 +11,7 @@ from numpy.typing import NDArray
 
 from dhkit.arm import Arm
 from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError, ModelError
@@ -27,8 +25,6 @@ __all__ = ["run"]
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN = 12_000
 """Points on the page: more are slow without a graphics card."""
-PATIENCE = 1.0
-"""s: work that takes longer shows how far it is."""
 
 
 def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -> None:
@@ -36,8 +32,8 @@ def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -
     folder = output or Path("out") / arm.name
     if folder.exists() and not folder.is_dir():
         raise DescriptionError(f"{folder}: not a folder")
-    with _Bar("sampling") as bar:
-        space = sample(arm.description, samples, seed, progress=bar)
+    with ProgressBar("sampling") as bar:
+        space = sample(arm.description, samples, seed, progress=bar.show)
     folder.mkdir(parents=True, exist_ok=True)
     files = [_figure(space, folder / "workspace.png"), _page(arm, space, folder / "workspace.html")]
     if json:
@@ -45,38 +41,6 @@ def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -
         return
     _print(arm, space)
     say("\n" + "\n".join(f"wrote {file}" for file in files))
-
-
-class _Bar:
-    """A progress bar on stderr that appears when work takes long and someone is looking."""
-
-    def __init__(self, title: str) -> None:
-        self._title = title
-        self._start = time.monotonic()
-        self._bar: Any = None
-
-    def __call__(self, done: int, total: int) -> None:
-        if self._bar is None and sys.stderr.isatty() and time.monotonic() - self._start > PATIENCE:
-            self._open(total)
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done)
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _open(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        self._bar = Progress(console=Console(stderr=True), transient=True)
-        self._task = self._bar.add_task(self._title, total=total)
-        self._bar.start()
 
 
 def _print(arm: Arm, space: Workspace) -> None:

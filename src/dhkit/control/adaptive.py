@@ -7,10 +7,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.gains import effective_inertia, gain, positive
+from dhkit.control.gains import effective_inertia, gain, positive, told
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Description, Robot, description_of, require_bodies
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import counted, repr_line
 from dhkit.dynamics import inertial_parameters, mass_matrix, parameter_grouping, velocity_regressor
 from dhkit.errors import DescriptionError
 from dhkit.verification import random_motions
@@ -185,6 +186,10 @@ class Adaptive:
         wrong = estimate - true
         M = mass_matrix(self.description, q)
         return float(s @ M @ s + wrong @ np.linalg.solve(self.adaptation, wrong)) / 2
+
+    def __repr__(self) -> str:
+        said = f"{counted(len(self.estimate), 'parameter')}, {told(decay=self.decay, kd=self.kd)}"
+        return repr_line(type(self).__name__, self.description.name, said)
 
     def _reference(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array]:
         """Return qd_r and s."""

@@ -18,7 +18,7 @@ from dhkit.control.sensors import Sensors
 from dhkit.control.step_kernel import StepKernel
 from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
 from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description.robot import Robot, description_of, takes_robot
 from dhkit.dynamics import Friction
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
@@ -39,7 +39,7 @@ def simulate_batch(
     q0: ArrayLike | None = None,
     qd0: ArrayLike | None = None,
     rate: float = 1000.0,
-    arms: Sequence[Description] = (),
+    arms: Sequence[Robot] = (),
     plant_rate: float | None = None,
     *,
     friction: bool | Friction | None = None,
@@ -102,7 +102,7 @@ def simulate_batch(
         raise ValueError("rate is None; expected Hz: a batch is sampled")
     require_positive(rate=rate, plant_rate=plant_rate, duration=duration)
     check_whole("threads", threads, 1)
-    moving = tuple(arms) or (description,)
+    moving = tuple(map(description_of, arms)) or (description,)
     for arm in moving:
         if arm.kinds != description.kinds:
             raise ValueError(f"a plant has joints {arm.kinds}; expected {description.kinds}")

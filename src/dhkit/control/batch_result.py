@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from dhkit.control.result import EnergyAudit, SimulationResult
 from dhkit.description import Array, Description, write_atomically
+from dhkit.description.joint_words import joint_unit
+from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, potential_energy
 
 __all__ = ["BatchResult", "History"]
@@ -27,6 +29,9 @@ class History:
     reference_q: Array
     """Broadcast over the batch."""
     reference_qd: Array
+
+    def __repr__(self) -> str:
+        return repr_line("History", f"{len(self.q)} runs", counted(self.q.shape[1], "state"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +148,33 @@ class BatchResult:
         return path
 
     def __repr__(self) -> str:
-        error = "" if self.peak_error is None else f", largest error {np.nanmax(self.peak_error, initial=0.0):.3g}"
-        if self.failed.any():
-            error += f", {int(self.failed.sum())} failed"
-        return f"<BatchResult of {len(self)} x {self.arms[0].name}: {self.t[-1]:g} s in {len(self.t) - 1} steps{error}>"
+        said, unit = [self._span], joint_unit(self.arms[0].numbers.prismatic)
+        if self.peak_error is not None:
+            said.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
+        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*said, *self._odd]))
+
+    def _repr_html_(self) -> str:
+        known = {"peak error": self.peak_error, "RMS": self.rms_error, "at the end": self.final_error}
+        columns = {name: np.abs(values[~self.failed]) for name, values in known.items() if values is not None}
+        rows = [
+            (
+                joint.name,
+                *(f"{np.max(values[:, i], initial=0.0):.3g}" for values in columns.values()),
+                joint_unit([not joint.is_revolute]),
+            )
+            for i, joint in enumerate(self.arms[0].joints)
+        ]
+        headings, align = ("joint", *columns, ""), "l" + "r" * len(columns) + "l"
+        title = f"{len(self)} x {self.arms[0].name}: {', '.join([self._span, *self._odd])}"
+        return html_block(title, html_table(headings, rows, "Largest of all runs that did not fail", align))
+
+    @property
+    def _span(self) -> str:
+        return f"{self.t[-1]:g} s in {counted(len(self.t) - 1, 'step')}"
+
+    @property
+    def _odd(self) -> list[str]:
+        """How many runs failed, or left their limits, where some did."""
+        outside = 0 if self.outside is None else int(self.outside.sum())
+        counts = {"failed": int(self.failed.sum()), "outside their limits": outside}
+        return [f"{count} {what}" for what, count in counts.items() if count]

@@ -16,6 +16,7 @@ from dhkit.control.runs import PROGRESS_EVERY, Progress
 from dhkit.control.sensors import Measuring
 from dhkit.control.step_kernel import WORKS, StepKernel
 from dhkit.description import Array, Description
+from dhkit.description.arrays import number_array
 from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
 from dhkit.kernels import all_in_threads
@@ -184,7 +185,7 @@ class BatchRun:
             seen = self.measuring(q, qd)
         returned = called(self.controller, time, *seen, self._setpoint(k))
         try:
-            asked = np.ascontiguousarray(np.broadcast_to(np.asarray(returned, dtype=float), q.shape))
+            asked = np.ascontiguousarray(np.broadcast_to(number_array(returned, "torques", "(N, n)"), q.shape))
         except (TypeError, ValueError):
             raise SimulationError(
                 f"the controller returned {type(returned).__name__} of shape {np.shape(returned)} at {time:g} s;"

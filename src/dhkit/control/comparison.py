@@ -21,7 +21,9 @@ from dhkit.control.result import SimulationResult
 from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
 from dhkit.description import Array, Description
+from dhkit.description.joint_words import joint_unit
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError
 from dhkit.trajectories import Trajectory
 
@@ -86,9 +88,7 @@ class Comparison:
 
     def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return the headings and the rows of the table: errors of the joint that errs most, the tool's, torques."""
-        first = next(iter(self.results.values()), None)
-        prismatic = np.zeros(1, dtype=bool) if first is None else first.description.numbers.prismatic
-        unit = "m" if prismatic.all() else "rad or m" if prismatic.any() else "rad"
+        unit = self._unit
         headings = ("controller", f"largest error [{unit}]", "RMS", "at the end", "tool's largest [mm]", "torque [%]")
         return headings, [(name, *_row(result)) for name, result in self.results.items()]
 
@@ -121,6 +121,25 @@ class Comparison:
 
     def __str__(self) -> str:
         return self.table()
+
+    def __repr__(self) -> str:
+        peaks = {name: float(result.peak_error.max(initial=0.0)) for name, result in self.results.items()}
+        best = min(peaks, key=peaks.__getitem__, default=None)
+        said = [] if best is None else [f"least error {peaks[best]:.2g} {self._unit} by {best}"]
+        said += [f"{len(self.failures)} failed"] if self.failures else []
+        count = len(self.results) + len(self.failures)
+        return repr_line("Comparison", counted(count, "controller"), ", ".join(said))
+
+    def _repr_html_(self) -> str:
+        headings, rows = self.rows()
+        failed = [f"{name}: {reason}" for name, reason in self.failures.items()]
+        return html_block("Comparison", html_table(headings, rows, align="lr"), html_lines(failed))
+
+    @property
+    def _unit(self) -> str:
+        """Of the joints' errors."""
+        first = next(iter(self.results.values()), None)
+        return joint_unit([] if first is None else first.description.numbers.prismatic)
 
 
 def _row(result: SimulationResult) -> tuple[str, ...]:

@@ -8,11 +8,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
 from dhkit.dynamics import mass_matrix
 from dhkit.verification import random_motions
 
-__all__ = ["batch_of", "effective_inertia", "gain", "pd_gains", "pid_gains", "positive", "positive_each"]
+__all__ = [
+    "batch_of",
+    "effective_inertia",
+    "gain",
+    "pd_gains",
+    "pid_gains",
+    "positive",
+    "positive_each",
+    "told",
+]
 
 STATES = 256
 """Random configurations over which effective inertias are averaged."""
@@ -111,3 +120,21 @@ def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tupl
     if not (np.isfinite(a) and a >= 0):
         raise ValueError(f"integral is {integral!r}; expected a number, 0 or more")
     return w * w * (1 + 2 * z * a), a * w**3, w * (2 * z + a)
+
+
+def told(**gains: Array) -> str:
+    """Return gains in words, from the least to the largest of all joints.
+
+    Examples
+    --------
+    >>> told(kp=np.array([400.0, 400.0]), kd=np.array([40.0, 20.0]))
+    'kp 400, kd 20 to 40'
+    """
+    return ", ".join(f"{name} {_told(values)}" for name, values in gains.items())
+
+
+def _told(values: Array) -> str:
+    if values.ndim > 1:
+        return f"of shape {values.shape}"
+    least, most = float(np.min(values)), float(np.max(values))
+    return f"{least:.4g}" if least == most else f"{least:.4g} to {most:.4g}"

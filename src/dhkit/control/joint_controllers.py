@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.control.gains import batch_of, effective_inertia, gain, pid_gains, positive
+from dhkit.control.gains import batch_of, effective_inertia, gain, pid_gains, positive, told
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import repr_line
 
 __all__ = ["PID"]
 
@@ -137,6 +138,9 @@ class PID:
         tau = self._torques(error, self._integral, rate)
         self._integral = self._integral + np.where(self._grows(tau, error), error * step, 0.0)
         return tau
+
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, said=told(kp=self.kp, ki=self.ki, kd=self.kd))
 
     def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
         tau: Array = self.kp * error + self.ki * integral + self.kd * rate

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Description, Robot, description_of, joint_vector
+from dhkit.description.arrays import number_array
 from dhkit.description.robot import takes_robot
+from dhkit.display import repr_line
 from dhkit.dynamics import bias, gravity_torque, require_inertia
 from dhkit.symbolic import CasadiFunctions
 
@@ -122,10 +124,13 @@ class LQR:
         tau: Array = self._held - error @ self.K.T
         return tau
 
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, self.description.name, f"K of shape {self.K.shape}")
+
 
 def _weights(given: ArrayLike | None, default: Array, name: str) -> Array:
     size = len(default)
-    weights = np.asarray(default if given is None else given, dtype=float)
+    weights = number_array(default if given is None else given, name, f"({size},) or ({size}, {size})")
     weights = np.diag(weights) if weights.ndim == 1 else weights
     if weights.shape != (size, size) or not np.isfinite(weights).all():
         raise ValueError(f"{name} has shape {weights.shape}; expected ({size},) or ({size}, {size}), finite")

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.controller import continuous_law, reset
-from dhkit.control.gains import batch_of, effective_inertia, gain, pd_gains
+from dhkit.control.controller import continuous_law, name_of, reset
+from dhkit.control.gains import batch_of, effective_inertia, gain, pd_gains, told
 from dhkit.control.law import Law, Symbols
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of, require_bodies
+from dhkit.display import repr_line
 from dhkit.dynamics import Friction, friction_torque, gravity_torque, inverse_dynamics
 from dhkit.symbolic import InertialTable, recursive_gravity, recursive_inverse_dynamics
 
@@ -34,6 +35,9 @@ class _Proportional:
         n = self.description.n
         self.kp, self.kd = gain(kp, "kp", n), gain(kd, "kd", n)
         self.batch_shape = batch_of(self.kp, self.kd)
+
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, self.description.name, told(kp=self.kp, kd=self.kd))
 
     def _law(self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]) -> Law:
         """Return a law whose gains are kp and kd of each joint."""
@@ -188,6 +192,9 @@ class FrictionCompensation:
         """Return the torques, shape (n,)."""
         tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._loss(setpoint)
         return tau
+
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, self.description.name, f"{self.friction}, around {name_of(self.inner)}")
 
     def _loss(self, setpoint: Setpoint) -> Array:
         return friction_torque(self.description, setpoint.qd, self.friction)

@@ -7,10 +7,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.control.gains import gain, pd_gains, positive
+from dhkit.control.gains import gain, pd_gains, positive, told
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import repr_line
 from dhkit.dynamics import bias, mass_matrix, require_inertia
 from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.verification import random_motions
@@ -139,6 +140,9 @@ class OperationalSpace:
         force = np.linalg.solve(inverse, U.T @ a - sigma * (Vt @ a_0))
         tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / units + bias(description, q, qd)
         return tau
+
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, self.description.name, told(kp=self.kp, kd=self.kd))
 
     def _scaled(self, J: Array) -> Array:
         """Return the rows of Jacobians (..., 6, n) that are controlled, lengths over the reach."""

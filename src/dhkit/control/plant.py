@@ -15,6 +15,7 @@ from dhkit.control.pushes import Push
 from dhkit.control.step_kernel import StepKernel
 from dhkit.description import Array, Description
 from dhkit.description.robot import description_of
+from dhkit.display import counted, repr_line
 from dhkit.dynamics import (
     Friction,
     bias,
@@ -247,6 +248,12 @@ class Plant:
     def energy(self, q: Array, qd: Array) -> float:
         """Return kinetic and potential energy, J."""
         return self.kinetic_energy(q, qd) + float(potential_energy(self.description, q))
+
+    def __repr__(self) -> str:
+        friction = "no friction" if self.friction is None else str(self.friction)
+        stops = "no stops" if self.restitution is None else f"stops of restitution {self.restitution:g}"
+        pushes = counted(len(self.pushes), "push")
+        return repr_line("Plant", self.description.name, f"{friction}, {stops}, {pushes}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
-from dhkit.description.frames import carrying, number_array
+from dhkit.description.arrays import number_array
+from dhkit.description.frames import carrying
+from dhkit.display import value_line
 from dhkit.kinematics import forward_kinematics, frames
 
 __all__ = ["Push"]
@@ -66,3 +68,6 @@ class Push:
             turned = force if description.numbers.prismatic[i] else np.cross(place - axes[:3, 3], force) + moment
             tau[i] = axes[:3, 2] @ turned
         return tau
+
+    def __repr__(self) -> str:
+        return value_line(self)

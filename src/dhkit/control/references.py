@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from dhkit.control.tool_poses import joints_at_pose
 from dhkit.description import Array, Description, joint_vector
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import listed, repr_line, value_line
 from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.trajectories import Trajectory
 
@@ -46,6 +47,9 @@ class Setpoint:
         at_rest: Array = jacobian(self.description, self.q) @ self.qdd
         return at_rest + jacobian_dot(self.description, self.q, self.qd) @ self.qd
 
+    def __repr__(self) -> str:
+        return repr_line("Setpoint", self.description.name, f"q {listed(self.q)}, qd {listed(self.qd)}")
+
 
 @runtime_checkable
 class Reference(Protocol):
@@ -74,6 +78,9 @@ class Held:
         still = np.zeros((len(t), len(self.q)))
         return still + self.q, still, still.copy()
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -97,6 +104,9 @@ class Step:
         """Return one of the configurations for each time."""
         q = np.where((t >= self.time)[:, None], np.asarray(self.after), np.asarray(self.before))
         return q, np.zeros_like(q), np.zeros_like(q)
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +132,9 @@ class Sine:
         angle = rate * t[:, None] + np.asarray(self.phase)
         swing = amplitude * np.sin(angle)
         return centre + swing, amplitude * rate * np.cos(angle), -(rate**2) * swing
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 def _make_finite(reference: object, *names: str) -> None:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Description, Robot, description_of
+from dhkit.description.joint_words import joint_unit
+from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.kinematics import forward_kinematics
 
 __all__ = ["EnergyAudit", "ErrorNorms", "SimulationResult"]
@@ -48,6 +50,14 @@ class EnergyAudit:
         if not self.remains:
             return 0.0
         return abs(self.remains) / self.turnover if self.turnover != 0 else float("inf")
+
+    def __repr__(self) -> str:
+        said = f"{self.turnover:.4g} J turned over, {self.remains:.1e} J without account"
+        return repr_line("EnergyAudit", said=said)
+
+    def _repr_html_(self) -> str:
+        names = ("change", "drives", "pushes", "friction", "impacts", "remains", "turnover")
+        return html_table(names, [tuple(f"{getattr(self, name):.4g}" for name in names)], "Energy [J]", align="r")
 
 
 class ErrorNorms(NamedTuple):
@@ -168,10 +178,34 @@ class SimulationResult:
         return load_result(path, None if robot is None else description_of(robot))
 
     def __repr__(self) -> str:
-        return (
-            f"<SimulationResult of {self.description.name}: {self.t[-1]:g} s in {len(self.t) - 1} steps, largest error "
-            f"{self.peak_error.max(initial=0.0):.3g}>"
+        unit = joint_unit(self.description.numbers.prismatic)
+        error = f"largest error {self.peak_error.max(initial=0.0):.3g} {unit}"
+        return repr_line("SimulationResult", self.description.name, f"{self._span}, {error}")
+
+    def _repr_html_(self) -> str:
+        joints, peak, rms, final = self.description.joints, self.peak_error, self.rms_error, self.final_error
+        saturated = self.saturated if len(self.saturated) else np.mean(self.tau != self.tau_asked, axis=0)
+        rows = [
+            (
+                joint.name,
+                *(f"{x[i]:.3g}" for x in (peak, rms, final)),
+                joint_unit([not joint.is_revolute]),
+                f"{np.abs(self.tau[:, i]).max():.4g} {'N m' if joint.is_revolute else 'N'}",
+                f"{100 * saturated[i]:.3g} %",
+            )
+            for i, joint in enumerate(joints)
+        ]
+        headings = ("joint", "largest error", "RMS", "at the end", "", "largest torque", "saturated")
+        by = f" under {self.controller}" if self.controller else ""
+        return html_block(
+            f"{self.description.name}{by}: {self._span}",
+            html_table(headings, rows, align="lrrrlr"),
+            self.audit._repr_html_(),
         )
+
+    @property
+    def _span(self) -> str:
+        return f"{self.t[-1]:g} s in {counted(len(self.t) - 1, 'step')}"
 
 
 def _norms(error: Array) -> ErrorNorms:

@@ -67,7 +67,7 @@ def save_result(result: SimulationResult, path: str | Path) -> Path:
             raise ValueError(
                 f"{path}: a table has no room for the reference's poses of another arm; expected .npz or .mat"
             )
-        content = _csv(values, SIMULATION.comments(result.description)).encode()
+        content = SIMULATION.labelled(result.description, _csv(values)).encode()
     else:
         content = archive_bytes(suffix, SIMULATION.archived(result.description, values))
     if len(content) > SIMULATION.most:
@@ -97,11 +97,14 @@ def load_result(path: str | Path, description: Description | None = None) -> Sim
         if suffix == ".csv":
             text = decoded(content)
             robot = SIMULATION.robot_of_table(text, description)
-            values = _csv_values(text, robot.n)
+            checked = _checked(_csv_values(text, robot.n), robot.n)
+            SIMULATION.require_unchanged(text)
         else:
             values = read_archive(suffix, content, SIMULATION)
             robot = SIMULATION.robot_of_archive(values, description)
-        return _result(robot, _checked(values, robot.n))
+            checked = _checked(values, robot.n)
+            SIMULATION.require_whole(values)
+        return _result(robot, checked)
     except (DescriptionError, ValueError) as error:
         raise DescriptionError(f"{path}: {error}") from None
 
@@ -158,10 +161,10 @@ def _columns(n: int) -> tuple[str, ...]:
     return ("t", *(f"{name}{i}" for name in ROWS for i in range(1, n + 1)))
 
 
-def _csv(values: Mapping[str, Array], comments: tuple[str, ...]) -> str:
+def _csv(values: Mapping[str, Array]) -> str:
     n = values["q"].shape[1]
     numbers = [SATURATED, *(f"{AUDIT}{name}" for name in ENERGIES)]
-    comments += tuple(f"{name}: " + " ".join(f"{x:.17g}" for x in np.atleast_1d(values[name])) for name in numbers)
+    comments = tuple(f"{name}: " + " ".join(f"{x:.17g}" for x in np.atleast_1d(values[name])) for name in numbers)
     rows = np.concatenate([values["t"][:, None], *(values[name] for name in ROWS)], axis=1)
     return table_text(_columns(n), rows, comments)
 

@@ -17,6 +17,7 @@ from dhkit.control.result import EnergyAudit, SimulationResult
 from dhkit.control.sensors import Measuring
 from dhkit.control.timing import sampled_reference
 from dhkit.description import Array, Description
+from dhkit.description.arrays import number_array
 from dhkit.dynamics import kinetic_energy
 from dhkit.errors import SimulationError
 from dhkit.kinematics import forward_kinematics
@@ -210,7 +211,7 @@ class ContinuousRun(Run):
         if not isinstance(returned, tuple) or len(returned) != len(PAIR):
             raise SimulationError(f"the controller returned {type(returned).__name__} at {t:g} s; expected {PAIR}")
         asked = torques(returned[0], n, t)
-        derivative = np.asarray(returned[1], dtype=float).reshape(-1)
+        derivative = number_array(returned[1], "derivatives of the controller's states", "(m,)").reshape(-1)
         if not np.isfinite(derivative).all():
             raise SimulationError(f"the controller's states have derivatives that are not finite at {t:g} s")
         if derivative.shape != self.memory.shape:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import value_line
 
 __all__ = ["Sensors"]
 
@@ -70,6 +71,9 @@ class Sensors:
             if shape not in ((), (n,)):
                 raise ValueError(f"{name} has shape {shape}; expected a number, or ({n},)")
         return Measuring(self, period)
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 class Measuring:

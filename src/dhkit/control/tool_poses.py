@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Robot, check_pose, description_of, joint_vector
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import counted, repr_line
 from dhkit.errors import PlanningError, UnreachableError
 from dhkit.kinematics import classify, forward_kinematics, inverse_kinematics, solve_numerically
 from dhkit.trajectories import Trajectory, straight_line
@@ -95,6 +96,10 @@ class ToolPoses:
     def jumps(self) -> Array:
         """When accelerations' derivatives jump, s: at the poses, and where pieces of the joints' motion meet."""
         return np.concatenate([self._knots, *(self._knots[k] + m.breaks for k, m in enumerate(self._motions))])
+
+    def __repr__(self) -> str:
+        poses = f"{counted(len(self._knots), 'pose')} from {self._knots[0]:g} to {self.duration:g} s"
+        return repr_line("ToolPoses", description_of(self.robot).name, poses)
 
     @cached_property
     def _knots(self) -> Array:

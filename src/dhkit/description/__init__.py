@@ -16,6 +16,7 @@ from dhkit.description.library import library_robot, robots
 from dhkit.description.locking import lock
 from dhkit.description.named import Named
 from dhkit.description.numbers import Array, Numbers
+from dhkit.description.payload import Payload
 from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
 from dhkit.description.robot import Description, Robot, description_of
 from dhkit.description.robot_file import from_toml, read_robot
@@ -61,6 +62,7 @@ __all__ = [
     "Mesh",
     "Named",
     "Numbers",
+    "Payload",
     "Placement",
     "Robot",
     "Shape",

@@ -73,7 +73,7 @@ def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
         raise DescriptionError(
             f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
             f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
-            "or use with_uniform_links"
+            "or use with_uniform_links (--uniform-links in the command)"
         )
     return tuple(joint.bodies for joint in description.joints)
 

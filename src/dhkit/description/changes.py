@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.description.arrays import number_array
 from dhkit.description.bodies import moved_body, rod
 from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
 from dhkit.description.frames import one_each
@@ -210,7 +211,7 @@ def _origin(T: ExactPose) -> Vector:
 
 
 def _placement(T: ArrayLike, name: str) -> Placement:
-    matrix = np.asarray(T, dtype=float)
+    matrix = number_array(T, name, "(4, 4)")
     if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
         raise ValueError(f"{name}: found shape {matrix.shape}; expected a finite (4, 4) pose")
     xyz, (yaw, pitch, roll) = pose_parts(check_pose(matrix, name), order="ZYX")
@@ -229,7 +230,7 @@ def _rounded(angle: float) -> float:
 def _tensor(inertia: ArrayLike | None) -> Inertia:
     if inertia is None:
         return Inertia()
-    I = np.asarray(inertia, dtype=float)  # noqa: E741 - the field's letter
+    I = number_array(inertia, "payload: inertia", "(3, 3)")  # noqa: E741 - the field's letter
     if I.shape != (3, 3) or np.abs(I - I.T).max() > SYMMETRIC * np.abs(I).max():
         raise DescriptionError(f"payload: inertia has shape {I.shape}; expected a symmetric (3, 3) matrix")
     if not np.all(np.isfinite(I)):

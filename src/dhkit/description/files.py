@@ -16,7 +16,7 @@ __all__ = ["check_place", "read_bounded", "write_atomically"]
 STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
 
 
-def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes:
+def read_bounded(path: str | Path, most: int, expected: str = "a robot file") -> bytes:
     """Return a regular file's bytes; ``expected`` says in a message what it should be.
 
     Raises
@@ -24,6 +24,7 @@ def read_bounded(path: Path, most: int, expected: str = "a robot file") -> bytes
     DescriptionError
         No such file, not a regular file, unreadable, or longer than ``most`` bytes.
     """
+    path = Path(path)
     try:
         if not path.is_file():
             raise DescriptionError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
@@ -57,7 +58,7 @@ def check_place(path: Path) -> None:
         raise DescriptionError(f"{above}: cannot be written to")
 
 
-def write_atomically(path: Path, content: str | bytes, *, private: bool = False) -> None:
+def write_atomically(path: str | Path, content: str | bytes, *, private: bool = False) -> None:
     """Write a file under a temporary name and rename it: it is there whole, or not at all; folders are created.
 
     With ``private`` nobody else may read or write it, whatever the umask. A link is followed, and what is no file, such
@@ -68,6 +69,7 @@ def write_atomically(path: Path, content: str | bytes, *, private: bool = False)
     OSError
         It cannot be written; names the file or its folder.
     """
+    path = Path(path)
     data = content.encode() if isinstance(content, str) else content
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))

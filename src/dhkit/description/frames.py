@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.description.arrays import number_array
 from dhkit.description.numbers import Array
 from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
@@ -17,7 +18,6 @@ __all__ = [
     "joint_array",
     "joint_vector",
     "link_transforms",
-    "number_array",
     "one_each",
     "world_to_frames",
     "world_to_tool",
@@ -79,26 +79,6 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
     if not np.isfinite(vector).all():
         raise ValueError(f"{name} has values that are not finite: {vector.tolist()}")
     return vector
-
-
-def number_array(value: ArrayLike, name: str, shape: str) -> Array:
-    """Return numbers as a float64 array, itself where it is one.
-
-    Raises
-    ------
-    TypeError
-        Not numbers; names the argument and the shape expected.
-    """
-    if type(value) is np.ndarray and value.dtype == np.float64:
-        return value
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError
-        return array.astype(float, copy=False)
-    except (TypeError, ValueError):
-        found = repr(value)[:60] if isinstance(value, str) else f"{type(value).__name__} of other things"
-        raise TypeError(f"{name}: found {found}; expected numbers, shape {shape}") from None
 
 
 def one_each(value: ArrayLike, name: str, n: int) -> Array:

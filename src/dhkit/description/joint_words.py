@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from contextvars import ContextVar
 
-__all__ = ["DEGREES", "degrees_hint", "joint_words", "outside_words"]
+__all__ = ["DEGREES", "degrees_hint", "joint_unit", "joint_words", "outside_words"]
 
 DEGREES: ContextVar[bool] = ContextVar("dhkit_degrees", default=False)
 """Whether messages tell angles in degrees; the command sets it by ``--degrees``."""
@@ -38,6 +39,18 @@ def joint_words(value: float, *, slides: bool, digits: int = 6, rate: str = "") 
     if DEGREES.get():
         return f"{math.degrees(value):.{digits}g}°{rate}"
     return f"{value:.{digits}g} rad{rate}"
+
+
+def joint_unit(prismatic: Iterable[bool]) -> str:
+    """Return the unit of joint values: ``rad``, ``m``, or ``rad or m`` where some joints slide and others turn.
+
+    Examples
+    --------
+    >>> joint_unit([False, True]), joint_unit([True])
+    ('rad or m', 'm')
+    """
+    units = {"m" if slides else "rad" for slides in prismatic} or {"rad"}
+    return " or ".join(sorted(units, reverse=True))
 
 
 def degrees_hint(value: float, *, slides: bool) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
+from dhkit.display import LONGEST_LINE, counted, repr_line
+
 __all__ = ["Named"]
 
 V = TypeVar("V")
@@ -41,4 +43,8 @@ class Named(Mapping[str, V]):
         return Named, (self._items,)
 
     def __repr__(self) -> str:
-        return f"Named({self._items!r})"
+        whole = f"Named({self._items!r})"
+        # Those of arrays are long, and of many lines.
+        if len(whole) <= LONGEST_LINE and whole.isprintable() and "array(" not in whole:
+            return whole
+        return repr_line("Named", counted(len(self), "value"), ", ".join(self._items))

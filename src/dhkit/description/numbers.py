@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dhkit.description.parameters import resolved
 from dhkit.description.values import INERTIA_PLACES
+from dhkit.display import counted, repr_line
 from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
 
 if TYPE_CHECKING:
@@ -148,6 +149,9 @@ class Numbers:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
         return numbers
+
+    def __repr__(self) -> str:
+        return repr_line("Numbers", counted(len(self.a), "joint"), f"reach {self.reach:.4g} m")
 
 
 def matrix(placement: Placement, values: dict[str, Expression]) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.description.arrays import number_array
 from dhkit.description.numbers import Array
 
 __all__ = ["check_pose", "pose", "pose_parts", "pose_quaternion"]
@@ -120,7 +121,7 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     ValueError
         Not of shape (..., 4, 4), or some matrix is no rigid transform to 1e-6.
     """
-    array = np.asarray(T, dtype=float)
+    array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):
         raise ValueError(f"{name} has shape {array.shape}; expected (..., 4, 4)")
     R = array[..., :3, :3]
@@ -133,7 +134,7 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
 
 
 def _array(name: str, value: ArrayLike, size: int) -> Array:
-    array = np.asarray(value, dtype=float)
+    array = number_array(value, name, f"(..., {size})")
     if array.shape[-1:] != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {size})")
     return array

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
 
 from dhkit.description.named import Named
 from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units, Vector
+from dhkit.display import html_block, html_lines, repr_line
 from dhkit.expressions import Expression
 
 if TYPE_CHECKING:
@@ -114,6 +115,19 @@ class Description:
     def __getstate__(self) -> dict[str, Any]:
         """Leave the hash out: that of text differs from process to process."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
+
+    def __repr__(self) -> str:
+        bodies = sum(bool(joint.bodies) for joint in self.joints)
+        return repr_line(
+            f"Description {self.name}",
+            said=f"{self.kinds}, {self.convention.value} DH, bodies on {bodies} of {self.n} links",
+        )
+
+    def _repr_html_(self) -> str:
+        from dhkit.description.table import DHTable
+
+        warnings = [f"warning: {warning}" for warning in self.warnings]
+        return html_block(self.name, DHTable.of(self)._repr_html_(), html_lines(warnings))
 
 
 def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:

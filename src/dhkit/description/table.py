@@ -12,6 +12,7 @@ from dhkit.description.named import Named
 from dhkit.description.parameters import check_parameter_name
 from dhkit.description.robot import Description
 from dhkit.description.values import INERTIA_PLACES, Body, Convention, Inertia, Joint, JointType, Units
+from dhkit.display import counted, html_table, repr_line
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, exact, exact_angle, parse
 
@@ -21,6 +22,8 @@ Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
 """A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
 
 COLUMNS = ("theta", "d", "a", "alpha")
+LONGEST_ENTRY = 400
+"""Characters of an entry in a notebook and on a page of equations."""
 
 
 def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
@@ -241,14 +244,12 @@ class DHTable:
         ]
         return "\n".join([f"{self.convention.value} DH", lines[0], "  ".join("-" * w for w in widths), *lines[1:]])
 
-    def _repr_html_(self) -> str:
-        def cells(row: tuple[str, ...], tag: str) -> str:
-            escaped = (cell.replace("&", "&amp;").replace("<", "&lt;") for cell in row)
-            return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in escaped) + "</tr>"
+    def __repr__(self) -> str:
+        return repr_line("DHTable", counted(len(self.rows), "joint"), f"{self.convention.value} DH")
 
-        body = "".join(cells(row, "td") for row in self.rows)
-        caption = f"<caption>{self.convention.value} DH</caption>"
-        return f"<table>{caption}<thead>{cells(self.headings, 'th')}</thead><tbody>{body}</tbody></table>"
+    def _repr_html_(self) -> str:
+        caption = f"{self.convention.value} DH"
+        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=LONGEST_ENTRY)
 
     def latex(self) -> str:
         """Return the table as a LaTeX ``tabular``."""

@@ -7,6 +7,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeAlias
 
+from dhkit.display import counted, repr_line, value_line
 from dhkit.expressions import PI, ZERO, Expression, exact
 
 __all__ = [
@@ -102,6 +103,10 @@ class Inertia:
         """The symmetric 3x3 tensor."""
         return (self.xx, self.xy, self.xz), (self.xy, self.yy, self.yz), (self.xz, self.yz, self.zz)
 
+    def __repr__(self) -> str:
+        said = ", ".join(f"{key} {getattr(self, key)}" for key in INERTIA_PLACES)
+        return repr_line("Inertia", said=f"{said} kg m^2")
+
 
 @dataclass(frozen=True)
 class Body:
@@ -114,6 +119,9 @@ class Body:
     """The inertia is known to be impossible and kept as published: a warning, no error."""
     name: str = ""
     """Empty: the joint calls it ``body 1``, ``body 2`` ... by its place, where its link has several bodies."""
+
+    def __repr__(self) -> str:
+        return repr_line("Body", self.name, f"{self.mass} kg, centre of mass {_triple(self.com)} m")
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,11 @@ class Drive:
         """Rotor inertia as the joint sees it, kg m^2 (kg for a prismatic joint)."""
         return self.gear**2 * self.rotor_inertia
 
+    def __repr__(self) -> str:
+        against = " and ".join(map(str, self.coulomb))
+        said = f"gear {self.gear}, rotor {self.rotor_inertia} kg m^2, viscous {self.viscous} N m s, dry {against} N m"
+        return repr_line("Drive", said=said)
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -141,6 +154,9 @@ class Placement:
 
     xyz: Vector = ORIGIN
     rpy: Vector = ORIGIN
+
+    def __repr__(self) -> str:
+        return repr_line("Placement", said=f"xyz {_triple(self.xyz)} m, rpy {_triple(self.rpy)} rad")
 
 
 @dataclass(frozen=True)
@@ -151,12 +167,18 @@ class Mesh:
     scale: Vector = UNSCALED
     """Factors along the file's x, y and z; negative ones mirror."""
 
+    def __repr__(self) -> str:
+        return repr_line("Mesh", self.path, f"times {_triple(self.scale)}")
+
 
 @dataclass(frozen=True)
 class Box:
     """A box centred on the origin, edges in m."""
 
     size: Vector
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True)
@@ -166,6 +188,9 @@ class Cylinder:
     radius: Expression
     length: Expression
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class Capsule:
@@ -174,12 +199,18 @@ class Capsule:
     radius: Expression
     length: Expression
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class Sphere:
     """A ball around the origin, m."""
 
     radius: Expression
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 Geometry: TypeAlias = Mesh | Box | Cylinder | Capsule | Sphere
@@ -193,6 +224,10 @@ class Shape:
     placement: Placement = Placement()
     color: str | None = None
     """``#rrggbb``."""
+
+    def __repr__(self) -> str:
+        colour = "" if self.color is None else f", {self.color}"
+        return repr_line("Shape", type(self.geometry).__name__.lower(), f"at {_triple(self.placement.xyz)} m{colour}")
 
 
 @dataclass(frozen=True)
@@ -241,6 +276,10 @@ class Joint:
         """Whether the joint variable is an angle."""
         return self.type is JointType.REVOLUTE
 
+    def __repr__(self) -> str:
+        said = f"{self.type.value}, theta {self.theta}, d {self.d}, a {self.a}, alpha {self.alpha}"
+        return repr_line(f"Joint {self.name}" if self.name else "Joint", said=said)
+
 
 @dataclass(frozen=True)
 class Base:
@@ -251,6 +290,9 @@ class Base:
     body: Body | None = None
     """Moves nothing; holds what was locked to the base."""
 
+    def __repr__(self) -> str:
+        return repr_line("Base", said=f"at {_triple(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
+
 
 @dataclass(frozen=True)
 class Tool:
@@ -258,3 +300,10 @@ class Tool:
 
     placement: Placement = Placement()
     shapes: tuple[Shape, ...] = ()
+
+    def __repr__(self) -> str:
+        return repr_line("Tool", said=f"at {_triple(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
+
+
+def _triple(vector: Vector) -> str:
+    return f"({', '.join(map(str, vector))})"

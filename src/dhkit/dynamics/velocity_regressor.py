@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, repr_line
 from dhkit.dynamics.regressor import regressor
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
@@ -103,6 +104,10 @@ class ParameterGrouping:
 
     def __len__(self) -> int:
         return len(self.columns)
+
+    def __repr__(self) -> str:
+        columns = ", ".join(map(str, self.columns))
+        return repr_line("ParameterGrouping", counted(len(self), "base parameter"), f"columns {columns}")
 
 
 @takes_robot

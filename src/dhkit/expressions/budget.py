@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextvars import ContextVar, Token
 from types import TracebackType
 
+from dhkit.display import repr_line
 from dhkit.errors import ExpressionError
 
 __all__ = ["Budget", "budgeted", "spend"]
@@ -38,6 +39,9 @@ class Budget:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         _ACTIVE.reset(self._tokens.pop())
+
+    def __repr__(self) -> str:
+        return repr_line("Budget", said=f"{self.left} term products and sums left")
 
 
 _ACTIVE: ContextVar[Budget | None] = ContextVar("budget", default=None)

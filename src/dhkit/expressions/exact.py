@@ -16,6 +16,7 @@ from functools import cached_property
 from numbers import Integral, Rational, Real
 from typing import TypeAlias
 
+from dhkit.display import LONGEST_LINE, plain
 from dhkit.errors import ExpressionError
 from dhkit.expressions.budget import spend
 from dhkit.expressions.syntax import decimal_fraction
@@ -97,6 +98,9 @@ class Atom:
 
     def __str__(self) -> str:
         return self.text
+
+    def __repr__(self) -> str:
+        return f"Atom({plain(self.text, LONGEST_LINE - len('Atom()') - 2)!r})"
 
 
 Monomial: TypeAlias = tuple[tuple[Atom, int], ...]
@@ -201,8 +205,10 @@ class Expression:
             for atom, exponent in monomial:
                 base = atom.value()
                 if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
-                    raise ExpressionError(f"{self.text} divides by zero" + (", to rounding" if base else ""))
-                value *= base**exponent
+                    raise ExpressionError(
+                        f"{plain(self.text, SHOWN)} divides by zero" + (", to rounding" if base else "")
+                    )
+                value *= _power(base, exponent)
             total += value
         return total
 
@@ -210,7 +216,7 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{self.text} is no finite double") from None
+            raise ExpressionError(f"{plain(self.text, SHOWN)} is no finite double") from None
 
     @property
     def text(self) -> str:
@@ -224,7 +230,7 @@ class Expression:
         return self.written if self.written is not None else self.text
 
     def __repr__(self) -> str:
-        return f"Expression({str(self)!r})"
+        return f"Expression({plain(str(self), LONGEST_LINE - len('Expression()') - 2)!r})"
 
     def as_written(self, text: str) -> Expression:
         """Return the same value, to be shown as this text."""
@@ -259,7 +265,7 @@ class Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
-        spend(len(self.terms) * len(right))
+        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // WORD))
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -292,6 +298,35 @@ class Expression:
         return result
 
 
+def _bits(terms: Iterable[tuple[Monomial, Fraction]]) -> int:
+    """Return the size of the longest coefficient."""
+    return max((c.numerator.bit_length() + c.denominator.bit_length() for _, c in terms), default=0)
+
+
+def _power(base: Fraction, exponent: int) -> Fraction:
+    """Return a power of a number that is rounded itself, rounded to more digits than it has: exact ones grow long."""
+    if exponent < 0:
+        return 1 / _power(base, -exponent)
+    result = Fraction(1)
+    for bit in f"{exponent:b}":
+        result = _shortened(result * result * (base if bit == "1" else 1))
+    return result
+
+
+def _shortened(value: Fraction) -> Fraction:
+    size = value.numerator.bit_length() - value.denominator.bit_length()
+    if value.numerator.bit_length() + value.denominator.bit_length() <= 2 * POWER_BITS:
+        return value
+    scale = Fraction(2) ** (POWER_BITS - size)
+    return Fraction(round(value * scale)) / scale
+
+
+WORD = 256
+"""Bits of two coefficients whose product costs as much again as finding where it goes."""
+POWER_BITS = 400
+"""Of a power of pi or a function: 120 digits, twice those of pi."""
+SHOWN = 120
+"""Characters of an expression in a message."""
 CANCELLED = Fraction(1, 10**14)
 """Share of its terms' sizes below which a sum of rounded values may be zero: each is rounded to 1e-16."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dhkit.description import Description, library_robot, read_robot, robots
-from dhkit.description.robot import takes_robot
+from dhkit.description.robot import Robot, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
@@ -29,7 +29,7 @@ ONE = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
 
 def grade(
     path: str | Path,
-    robot: Description | None = None,
+    robot: Robot = None,
     rubric: Rubric | None = None,
     *,
     task: AnswerSheet | None = None,
@@ -45,7 +45,7 @@ def grade(
     path
         A file that ends in .toml, .py, .m, .tex or .ipynb.
     robot
-        What it is about; the sheet says so unless given.
+        What it is about, an arm or its description; the sheet says so unless given.
     rubric
         What counts as rounding.
     task
@@ -64,19 +64,20 @@ def grade(
         Its robot file describes no robot.
     """
     path, digits = Path(path), (rubric or Rubric()).digits
+    given = None if robot is None else description_of(robot)
     if path.suffix.lower() == ".ipynb" or path.suffix.lower() in LANGUAGES:
-        if robot is None:
+        if given is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
-        sheet = read_source(path, robot)
+        sheet = read_source(path, given)
     elif path.suffix.lower() == ".toml":
         sheet = read_sheet(path)
     else:
         raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected .toml, .py, .m, .tex or .ipynb")
-    about = robot or robot_of(sheet, path.parent)
+    about = given or robot_of(sheet, path.parent)
     if task is not None:
         sheet = replace(sheet, task=task.task, names=_names(sheet.names, task.names))
     report = judge(about, sheet, digits, seed=seed, explained=explain)
-    return replace(report, own_robot=robot is None)
+    return replace(report, own_robot=given is None)
 
 
 def _names(own: Names, given: Names) -> Names:
@@ -128,7 +129,7 @@ def grade_answers(
     return replace(report, sheet=None)
 
 
-def robot_of(sheet: AnswerSheet, folder: Path) -> Description:
+def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     """Return the robot that a sheet names: of the library, or a file in the sheet's own folder.
 
     Raises
@@ -138,6 +139,7 @@ def robot_of(sheet: AnswerSheet, folder: Path) -> Description:
     DescriptionError
         A file that describes no robot.
     """
+    folder = Path(folder)
     name = sheet.robot
     if not name:
         raise AnswerError(

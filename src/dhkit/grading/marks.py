@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.grading.answers.sheet import QUANTITY
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
@@ -21,6 +22,9 @@ class Mark:
     points: float
     most: float
     rule: str = ""
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,17 @@ class Marks:
     def without_rules(self) -> Marks:
         """Return the points alone: a rule may name the mistake that a student is to find."""
         return replace(self, entries=tuple(replace(mark, rule="") for mark in self.entries))
+
+    def __repr__(self) -> str:
+        return repr_line("Marks", said=self._sum)
+
+    def _repr_html_(self) -> str:
+        rows = [(mark.name, f"{mark.points:.4g}", f"{mark.most:.4g}", mark.rule) for mark in self.quantities]
+        return html_block(self._sum, html_table(("quantity", "points", "of", "rule"), rows, align="lrrl"))
+
+    @property
+    def _sum(self) -> str:
+        return f"{self.points:.4g} of {self.most:.4g} points"
 
 
 def marks(report: GradeReport, rubric: Rubric) -> Marks:

@@ -8,10 +8,14 @@ from dataclasses import asdict, dataclass, field
 from enum import Enum
 from typing import Any
 
+from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
+
 __all__ = ["Diagnosis", "Entry", "GradeReport", "Note", "NoteKind", "Verdict", "Witness"]
 
 
 MOST_NAMED = 6
+LONGEST_SHOWN = 400
+"""Characters of an answer, and of what is said about it, that a notebook shows."""
 
 
 class Verdict(Enum):
@@ -50,6 +54,11 @@ class Witness:
     state: Mapping[str, float]
     answer: float | None
     truth: float | None
+
+    def __repr__(self) -> str:
+        answer, truth = ("no value" if value is None else f"{value:.6g}" for value in (self.answer, self.truth))
+        state = ", ".join(f"{name} = {value:.4g}" for name, value in self.state.items())
+        return repr_line("Witness", said=f"answer {answer}, truth {truth}{f' at {state}' if state else ''}")
 
 
 @dataclass(frozen=True)
@@ -99,6 +108,22 @@ class Entry:
         """The entry as people write it, counted from 1: M12, g1, K."""
         return self.quantity + ("_" if any(k > 8 for k in self.index) else "").join(str(k + 1) for k in self.index)
 
+    def __repr__(self) -> str:
+        answer = f", {plain(self.answer, 60)}" if self.answer else ""
+        return repr_line("Entry", self.name, f"{self.verdict.value}{answer}")
+
+    def _repr_html_(self) -> str:
+        texts = {
+            "answer": self.answer,
+            "read as": self.read,
+            "why": self.statement,
+            "answer less the truth": self.difference or "",
+            "follows from": self.follows,
+            "witness": "" if self.witness is None else repr(self.witness)[1:-1].removeprefix("Witness: "),
+        }
+        rows = [(name, text) for name, text in texts.items() if text]
+        return html_block(f"{self.name}: {self.verdict.value}", html_table((), rows, longest=LONGEST_SHOWN))
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -133,6 +158,9 @@ class Diagnosis:
         if len(self.entries) > MOST_NAMED:
             return f"{', '.join(self.entries[: MOST_NAMED - 1])} and {len(self.entries) - MOST_NAMED + 1} more"
         return ", ".join(self.entries) or self.where
+
+    def __repr__(self) -> str:
+        return repr_line("Diagnosis", self.place, self.sentence)
 
 
 class NoteKind(Enum):
@@ -195,6 +223,10 @@ class Note:
     kind: NoteKind
     quantity: str = ""
     values: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        about = f" about {self.quantity}" if self.quantity else ""
+        return repr_line(f"Note {self.kind.value}{about}", said=", ".join(self.values))
 
 
 @dataclass(frozen=True)
@@ -352,3 +384,24 @@ class GradeReport:
     def to_json(self) -> str:
         """Return :meth:`data` as JSON."""
         return jsons.dumps(self.data(), ensure_ascii=False, allow_nan=False)
+
+    def __repr__(self) -> str:
+        return repr_line("GradeReport", self.robot or self.sheet or "", self._said)
+
+    def _repr_html_(self) -> str:
+        whose = " by ".join(filter(None, (self.robot or self.sheet, self.student)))
+        # The worst first: a table shows so many.
+        entries = sorted(self.entries, key=lambda entry: -entry.verdict.severity)
+        rows = [(entry.name, entry.verdict.value, entry.answer, entry.statement) for entry in entries]
+        table = html_table(("entry", "verdict", "answer", "why"), rows) if rows else ""
+        lines = [f"{found.place}: {found.sentence}" for found in self.diagnosis]
+        lines += [f"missing: {', '.join(self.missing)}"] if self.missing else []
+        return html_block(f"{whose}: {self._said}", table, html_lines(lines))
+
+    @property
+    def _said(self) -> str:
+        """The conclusion, and how many entries pass."""
+        if self.error:
+            return f"unreadable: {self.error}"
+        passed = sum(entry.verdict.passes for entry in self.entries)
+        return f"{self.conclusion}, {passed} of {counted(len(self.entries), 'answer')} right"

@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import plain_numbers, toml_document
+from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import QUANTITY
 
@@ -53,6 +54,9 @@ class Credit:
     mistakes: dict[str, Share] = Field(default_factory=dict, max_length=200)
     """Wrong by these mistakes, by name; goes before diagnosed."""
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True, config=STRICT)
 class Rubric:
@@ -80,7 +84,7 @@ class Rubric:
     """How much a report tells: everything (full), where to look (hint), or verdicts alone (verdict)."""
 
     @classmethod
-    def read(cls, path: Path) -> Rubric:
+    def read(cls, path: str | Path) -> Rubric:
         """Return the rubric of a TOML file.
 
         Raises
@@ -137,6 +141,10 @@ class Rubric:
         for name in self.credit.mistakes:
             if name not in known:
                 raise AnswerError(f"{place}credit.mistakes: no mistake {name[:80]!r}{_hint(name, sorted(known))}")
+
+    def __repr__(self) -> str:
+        weights = ", ".join(f"{name} {weight:g}" for name, weight in self.weights.items()) or "all alike"
+        return repr_line("Rubric", said=f"{self.points:g} points, feedback {self.feedback}, weights {weights}")
 
 
 def _entry_name(name: str) -> str | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
 from dhkit.kernels.kernel import Kernel
 
 __all__ = ["check_whole", "fill", "pose_rows", "result_array"]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.display import repr_line
 from dhkit.errors import DhkitError
 from dhkit.kernels.threads import all_in_threads
 from dhkit.symbolic import Graph
@@ -104,6 +105,9 @@ class Kernel:
                 self._look_up()
             if self._function is None and not self._failed:
                 self._compile()
+
+    def __repr__(self) -> str:
+        return repr_line(f"Kernel {self.name}", said="interpreted" if self._function is None else "compiled")
 
     def _function_for(self, count: int) -> CompiledFunction | None:
         """Return the machine code for a batch, or None if it is to be interpreted.

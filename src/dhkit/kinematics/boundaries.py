@@ -13,6 +13,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.description.robot import takes_robot
+from dhkit.display import repr_line
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane
@@ -51,6 +52,9 @@ class Boundary:
     """With joint 1 at zero, shape (k, 3), m."""
     circle: Array
     """What it is seen as along axis 1, shape (m, 3), m; m is 0 where it is no border from there."""
+
+    def __repr__(self) -> str:
+        return repr_line("Boundary", self.point, f"{self.name}, {len(self.section)} points")
 
 
 @takes_robot

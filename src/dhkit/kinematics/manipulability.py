@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.robot import takes_robot
+from dhkit.display import listed, repr_line
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 
@@ -52,6 +53,12 @@ class Ellipsoid:
     lengths: Array
     """Their lengths, shape (..., 3): (m/s or rad/s) per unit of joint rates, or (N or N m) per unit of joint torques;
     0 or infinite in a direction that the tool cannot move in."""
+
+    def __repr__(self) -> str:
+        shape = self.lengths.shape[:-1]
+        if shape:
+            return repr_line("Ellipsoid", said=f"a batch of shape {shape}")
+        return repr_line("Ellipsoid", said=f"half axes {listed(self.lengths)} about {listed(self.center)} m")
 
 
 @takes_robot

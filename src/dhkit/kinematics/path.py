@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_vector
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows
 from dhkit.kinematics.inverse import inverse_kinematics
@@ -65,10 +67,25 @@ class IKPath:
         return self.q
 
     def __repr__(self) -> str:
-        return (
-            f"<IKPath of {len(self.q)} poses: {len(self.switches)} switches, {len(self.lost)} lost, "
-            f"{len(self.near_singular)} near a singularity>"
-        )
+        return repr_line("IKPath", counted(len(self.q), "pose"), self._summary)
+
+    def _repr_html_(self) -> str:
+        named = dict.fromkeys(self.near_singular, "near a singularity")
+        named |= dict.fromkeys(self.switches, "switched") | dict.fromkeys(self.lost, "lost")
+        # Poses in a row of which the same is to be said share a line.
+        runs = groupby(enumerate(sorted(named)), lambda at: (at[1] - at[0], named[at[1]], self.branch[at[1]]))
+        rows = []
+        for (_, what, branch), run in runs:
+            places = [place for _, place in run]
+            where = str(places[0]) if len(places) == 1 else f"{places[0]} to {places[-1]}"
+            rows.append((where, what, branch or "–"))
+        table = html_table(("pose", "what", "branch"), rows) if rows else ""
+        return html_block(f"{counted(len(self.q), 'pose')}: {self._summary}", table)
+
+    @property
+    def _summary(self) -> str:
+        lost, near = len(self.lost), len(self.near_singular)
+        return f"{counted(len(self.switches), 'switch')}, {lost} lost, {near} near a singularity"
 
 
 @takes_robot

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, world_to_tool
 from dhkit.description.robot import takes_robot
+from dhkit.display import html_table, repr_line
 from dhkit.errors import ModelError
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
@@ -32,6 +33,8 @@ __all__ = ["Singularities", "determinant", "measures", "singular_configurations"
 BATCH, BATCHES = 256, 64
 """Random states tried at once, and how often, until enough are singular inside the limits."""
 STRETCHED = ("stretched", "folded")
+LONGEST_WORDS = 200
+"""Characters that a notebook shows of where a kind is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,12 @@ class Singularities:
 
     def __str__(self) -> str:
         return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
+
+    def __repr__(self) -> str:
+        return repr_line("Singularities", said=", ".join(self.kinds))
+
+    def _repr_html_(self) -> str:
+        return html_table(("singular", "where"), list(self.words.items()), longest=LONGEST_WORDS)
 
 
 @takes_robot

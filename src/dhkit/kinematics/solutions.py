@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array
+from dhkit.description.arrays import number_array
+from dhkit.display import MOST_ROWS, counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 
 __all__ = ["LIMIT_SLACK", "IKFlag", "IKSolutions", "IKStatus"]
@@ -18,6 +20,8 @@ __all__ = ["LIMIT_SLACK", "IKFlag", "IKSolutions", "IKStatus"]
 LIMIT_SLACK = 1e-9
 """rad or m: how far outside its limits a joint still counts as inside, for rounding."""
 TURN = 2 * np.pi
+FIRST = 5
+"""Poses of a batch that a notebook shows."""
 
 
 class IKStatus(IntEnum):
@@ -195,16 +199,71 @@ class IKSolutions:
         return len(self.branches)
 
     def __repr__(self) -> str:
-        counts = [f"{np.sum(self.status_code == status)} {status.name}" for status in IKStatus]
-        shown = ", ".join(count for count in counts if not count.startswith("0 "))
-        return f"<IKSolutions of {self.distance.size} poses, {len(self)} branches: {shown}>"
+        of = f"{counted(self.distance.size, 'pose')}, {counted(len(self), 'branch')}"
+        if self.distance.shape:
+            return repr_line("IKSolutions", of, ", ".join(f"{count} {status.name}" for status, count in self._counts))
+        return repr_line("IKSolutions", of, self._summary)
+
+    def _repr_html_(self) -> str:
+        return self._batch_html() if self.distance.shape else self._pose_html()
+
+    def _pose_html(self) -> str:
+        """Return the branches of one pose: angles in degrees, lengths in m."""
+        units = ["m" if slides else "°" for slides in self.prismatic]
+        scale = np.where(self.prismatic, 1.0, 180 / np.pi)
+        rows = []
+        for k, branch in enumerate(self.branches):
+            if self.valid[k]:
+                values = zip(self.q[k] * scale, self.prismatic, strict=True)
+                numbers = [f"{round(x, 4) + 0.0:.4f}" if slides else f"{round(x, 2) + 0.0:.2f}" for x, slides in values]
+                rows.append((branch, *numbers, "inside" if self.allowed[k] else "outside", _special(self.flags[k])))
+            elif len(self) <= MOST_ROWS:
+                rows.append((branch, *("–" for _ in units), "", "not reached"))
+        headings = ("branch", *(f"q{i} [{unit}]" for i, unit in enumerate(units, start=1)), "limits", "special")
+        table = html_table(headings, rows, align="l" + "r" * len(units) + "l") if self.valid.any() else ""
+        return html_block(f"{counted(len(self), 'branch')}: {self._summary}", table)
+
+    def _batch_html(self) -> str:
+        """Return how many poses ended how, and what became of the first."""
+        shape = self.distance.shape
+        counts = [(status.name, str(count)) for status, count in self._counts]
+        first = [tuple(int(k) for k in np.unravel_index(at, shape)) for at in range(min(FIRST, self.distance.size))]
+        rows = [
+            (
+                str(place[0] if len(place) == 1 else place),
+                IKStatus(int(self.status_code[place])).name,
+                str(int(self.valid[place].sum())),
+                str(int(self.allowed[place].sum())),
+                f"{self.distance[place]:.4g}" if self.distance[place] > 0 else "",
+            )
+            for place in first
+        ]
+        headings = ("pose", "status", "branches reached", "inside limits", "out of reach by [m]")
+        return html_block(
+            f"{counted(self.distance.size, 'pose')}, {counted(len(self), 'branch')}: q of shape {self.q.shape}",
+            html_table(("status", "poses"), counts, align="lr"),
+            html_table(headings, rows, align="llr", count=self.distance.size),
+        )
+
+    @property
+    def _summary(self) -> str:
+        """What became of one pose."""
+        status = IKStatus(int(self.status_code)).name
+        missed = f" by {float(self.distance):.4g} m" if self.distance > 0 else ""
+        return f"{status}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits"
+
+    @property
+    def _counts(self) -> list[tuple[IKStatus, int]]:
+        """How many poses have each status that occurs."""
+        counts = [(status, int(np.sum(self.status_code == status))) for status in IKStatus]
+        return [(status, count) for status, count in counts if count]
 
     def _near(self, q: ArrayLike | None) -> Array:
         """Return joint values of shape (..., n): given ones, or the middle of the limits, 0 where there are none."""
         if q is None:
             limited = np.isfinite(self.lower) & np.isfinite(self.upper)
             q = (np.where(limited, self.lower, 0.0) + np.where(limited, self.upper, 0.0)) / 2
-        near = np.asarray(q, dtype=float)
+        near = number_array(q, "joint values", "(..., n)")
         expected = (*self.distance.shape, self.q.shape[-1])
         if near.shape[-1:] == expected[-1:] and near.ndim <= len(expected):
             with contextlib.suppress(ValueError):
@@ -237,3 +296,9 @@ class IKSolutions:
             distance = float(self.distance[place])
             return f"{where}{others} is out of reach" + (f" by {distance:.4g} m" if distance > 0 else "")
         return f"{where}{others} is reached only outside the joint limits"
+
+
+def _special(flags: int) -> str:
+    """Return what is special about a branch besides its limits, in words."""
+    special = IKFlag(int(flags)) & ~IKFlag.out_of_limits
+    return ", ".join(str(flag.name) for flag in special)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention, Description, world_to_tool
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, html_block, html_lines, html_table, listed, repr_line
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
 
@@ -48,6 +49,9 @@ class Estimate:
         digits = max(0, -int(np.floor(np.log10(self.margin)))) if self.margin > 0 else 3
         return f"{self.value:.{digits}f} ± {self.margin:.{digits}f} {unit}"
 
+    def __repr__(self) -> str:
+        return repr_line("Estimate", said=str(self))
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -73,6 +77,11 @@ class Grid:
         outer, inner = np.count_nonzero(reached), np.count_nonzero(_without_border(reached))
         cell = self.edge**self.counts.ndim
         return Estimate(cell * (outer + inner) / 2, cell * (outer - inner) / 2, self.counts.ndim)
+
+    def __repr__(self) -> str:
+        cells = " x ".join(map(str, self.counts.shape))
+        said = f"{cells} of {self.edge:.3g} m, {np.count_nonzero(self.counts)} with points"
+        return repr_line("Grid", counted(self.counts.size, "cell"), said)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,7 +111,20 @@ class Workspace:
 
     def __repr__(self) -> str:
         estimate = "" if self.estimate is None else f", {self.estimate}"
-        return f"<Workspace of {self.description.name}: {self.samples} samples{estimate}>"
+        return repr_line("Workspace", self.description.name, f"{counted(self.samples, 'sample')}{estimate}")
+
+    def _repr_html_(self) -> str:
+        box, best = self.bounds, int(np.argmax(self.manipulability))
+        facts = [
+            ("samples", f"{self.samples}, seed {self.seed}"),
+            ("distance from axis 1", _range(self.radii)),
+            ("distance from frame 0", _range(self.distances)),
+            *((f"{axis}, world", _range((low, high))) for axis, low, high in zip("xyz", *box, strict=True)),
+            ("largest manipulability", f"{self.manipulability[best]:.4g} at {listed(self.positions[best])} m"),
+        ]
+        size = ("length", "area", "volume")[(self.grid.counts.ndim if self.grid is not None else 3) - 1]
+        facts += [] if self.estimate is None else [(size, str(self.estimate))]
+        return html_block(f"Workspace of {self.description.name}", html_table((), facts), html_lines(self.assumed))
 
     @property
     def samples(self) -> int:
@@ -324,3 +346,7 @@ def _radii(description: Description, positions: Array) -> tuple[float, float]:
 
 def _extremes(values: Array) -> tuple[float, float]:
     return float(values.min()), float(values.max())
+
+
+def _range(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.4g} to {ends[1]:.4g} m"

@@ -14,6 +14,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array, library_robot, pose, read_robot
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import plain_numbers, toml_document
+from dhkit.display import counted, html_block, html_table, plain, repr_line, value_line
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.kinematics import classify
 from dhkit.lab.assignment_form import AssignmentForm, GoalForm, PoseForm, StepForm, validated
@@ -55,6 +56,9 @@ class ToolAt:
         chord = float(np.linalg.norm(T[:3, :3] - self.T[:3, :3])) / np.sqrt(8.0)
         return not self.turned or bool(2 * np.arcsin(min(1.0, chord)) <= self.angle)
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True, eq=False)
 class JointsAt:
@@ -66,6 +70,9 @@ class JointsAt:
     def met(self, q: Array) -> bool:
         """Return whether joint values, shape (n,), are near enough; whole turns count."""
         return bool(np.abs(q - self.q).max() <= self.joint)
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +91,9 @@ class MotionBetween:
             return False
         ends = motion.q(np.array([0.0, motion.duration]))
         return bool(np.abs(ends - np.stack([self.begin, self.end])).max() <= self.joint)
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True)
@@ -111,6 +121,9 @@ class Goal:
     points: float
     condition: Condition
 
+    def __repr__(self) -> str:
+        return repr_line("Goal", said=f"{counted(self.points, 'point')}, {self.text}")
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -120,6 +133,9 @@ class Step:
     text: str
     panel: str | None
     goals: tuple[Goal, ...]
+
+    def __repr__(self) -> str:
+        return repr_line(f"Step {plain(self.title, 80)}", said=counted(len(self.goals), "goal"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +216,14 @@ class Assignment:
         """
         if arm.description.digest != self.arm.description.digest:
             raise DescriptionError(f"found {arm.name}; expected {self.arm.name} as the assignment has it")
+
+    def __repr__(self) -> str:
+        said = f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
+        return repr_line(f"Assignment {plain(self.title, 60)}", said=said)
+
+    def _repr_html_(self) -> str:
+        rows = [(step.title, f"{goal.points:g}", goal.text) for step in self.steps for goal in step.goals]
+        return html_block(f"{self.title}: {self.arm.name}", html_table(("step", "points", "goal"), rows, align="lrl"))
 
 
 def is_assignment(path: str | Path) -> bool:

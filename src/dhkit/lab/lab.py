@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from urllib.parse import urlsplit
 
 from dhkit.arm import Arm
+from dhkit.display import repr_line
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.control_panel import ControlPanel
@@ -72,16 +74,16 @@ class Lab:
         arm: Arm,
         port: int = 0,
         token: str | None = None,
-        own: Path | Sequence[str] | None = None,
+        own: str | Path | Sequence[str] | None = None,
         sandbox: str | None = None,
-        solid: Path | None = None,
+        solid: str | Path | None = None,
         assignment: Assignment | None = None,
     ) -> None:
         if assignment is not None:
             assignment.require(arm)
         self._lock = threading.RLock()
         self._closed = False
-        given = None if solid is None else Solid.read(solid)
+        given = None if solid is None else Solid.read(Path(solid))
         self.view = View(arm.description, answer=self.answer, port=port, token=token)
         self.desk = Desk(arm, self.view)
         if assignment is not None and assignment.start is not None:
@@ -200,6 +202,10 @@ class Lab:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        where = "closed" if self._closed else f"port {urlsplit(self.view.url).port}"
+        return repr_line("Lab", self.desk.arm.name, where)
 
     def _python(self, data: dict[str, Any]) -> dict[str, Any]:
         Fields("python", data, [])

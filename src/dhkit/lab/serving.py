@@ -30,9 +30,9 @@ def serve(
     block: bool = True,
     port: int | None = None,
     open_browser: bool = True,
-    own: Path | Sequence[str] | None = None,
+    own: str | Path | Sequence[str] | None = None,
     sandbox: str | None = None,
-    solid: Path | None = None,
+    solid: str | Path | None = None,
     assignment: Assignment | str | Path | None = None,
 ) -> Lab:
     """Open a lab in the browser.

@@ -31,6 +31,7 @@ from dhkit.description import (
 )
 from dhkit.description.assets import inside
 from dhkit.description.robot import Robot, description_of
+from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
@@ -86,6 +87,19 @@ class CadImport:
         except OSError as error:
             raise ModelError(f"{error.filename or target}: {error.strerror or error}") from None
         return tuple(target / name for name in names)
+
+    def __repr__(self) -> str:
+        triangles = sum(len(mesh.faces) for mesh in self.meshes.values())
+        said = f"shapes of {counted(len(self.meshes), 'link')}, {triangles} triangles"
+        return repr_line("CadImport", self.description.name, said)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (str(link), str(len(mesh.faces)), " x ".join(f"{x:.4g}" for x in np.ptp(mesh.bounds, axis=0)))
+            for link, mesh in self.meshes.items()
+        ]
+        table = html_table(("link", "triangles", "box around it [m]"), rows, align="rrl")
+        return html_block(f"{self.description.name} from CAD", table, html_lines(self.notes))
 
     def _write_all(self, folder: Path) -> list[str]:
         (folder / MESHES).mkdir()

@@ -8,6 +8,7 @@ from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
+from dhkit.display import counted, repr_line
 from dhkit.errors import ModelError
 from dhkit.model.urdf_chain import chain_tips, only_tip, tool_frame
 from dhkit.model.urdf_reader import read_urdf
@@ -42,6 +43,9 @@ class ExampleChain:
     base: str | None
     tip: str
     joints: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return repr_line(f"ExampleChain {self.name}", said=f"{counted(len(self.joints), 'joint')} to {self.tip}")
 
 
 @lru_cache(maxsize=1)

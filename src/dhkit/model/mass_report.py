@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.description.files import read_bounded
+from dhkit.display import repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.shape_inertia import MassProperties
 from dhkit.model.solidworks_report import REPORT, SolidWorksReport
@@ -43,8 +44,11 @@ class ReportedMass:
     source: str
     """File and line."""
 
+    def __repr__(self) -> str:
+        return repr_line("ReportedMass", self.part, f"{self.properties.mass:.4g} kg, {self.source}")
 
-def read_mass_report(path: Path) -> tuple[ReportedMass, ...]:
+
+def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     """Read a report of mass properties: ``.csv`` as a table, anything else as the text of SolidWorks.
 
     The table has a heading ``link, mass [kg], com_x [mm], com_y, com_z, Ixx [kg mm^2], Iyy, Izz, Ixy, Iyz, Ixz`` with
@@ -58,6 +62,7 @@ def read_mass_report(path: Path) -> tuple[ReportedMass, ...]:
     ModelError
         It cannot be read: one line with file, line, what was found and what was expected.
     """
+    path = Path(path)
     try:
         content = read_bounded(path, MAX_BYTES, "a report of mass properties")
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import INERTIA_PLACES, Array, Body, Inertia
+from dhkit.display import listed, repr_line
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
 from dhkit.model.closed_surface import FLAT, outwards, repaired, signed_volume, tetrahedra
@@ -50,6 +51,9 @@ class MassProperties:
         moments = {key: exact(float(self.inertia[place])) for key, place in INERTIA_PLACES.items()}
         return Body(exact(float(self.mass)), (x, y, z), Inertia(**moments), name=name)
 
+    def __repr__(self) -> str:
+        return repr_line(type(self).__name__, said=f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m")
+
 
 @dataclass(frozen=True, eq=False)
 class ShapeInertia(MassProperties):
@@ -60,6 +64,10 @@ class ShapeInertia(MassProperties):
     method: InertiaMethod
     notes: tuple[str, ...]
     """What was changed on the mesh, in words."""
+
+    def __repr__(self) -> str:
+        said = f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m, {self.volume:.4g} m^3 of {self.method.value}"
+        return repr_line("ShapeInertia", said=said)
 
 
 def shape_inertia(

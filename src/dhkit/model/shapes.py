@@ -21,6 +21,7 @@ from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import Array, matrix
 from dhkit.description.parameters import resolved
 from dhkit.description.robot import takes_robot
+from dhkit.display import repr_line
 from dhkit.expressions import Expression, exact, substitute
 
 __all__ = ["Part", "link_parts"]
@@ -76,6 +77,9 @@ class Part:
     """``#rrggbb``."""
     file: Path | None = None
     """The mesh's file; None for other geometry."""
+
+    def __repr__(self) -> str:
+        return repr_line("Part", f"link {self.link}", f"{type(self.geometry).__name__.lower()}, {self.color}")
 
 
 @takes_robot

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array
+from dhkit.display import repr_line
 
 __all__ = ["TriangleMesh", "joined_meshes", "same_vertices"]
 
@@ -97,6 +98,10 @@ class TriangleMesh:
         kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         colours = None if self.colours is None else self.colours[kept]
         return TriangleMesh(self.vertices[chosen], faces[kept], colours)
+
+    def __repr__(self) -> str:
+        size = f", {self.size:.4g} m across" if len(self.vertices) else ""
+        return repr_line("TriangleMesh", said=f"{len(self.faces)} triangles, {len(self.vertices)} vertices{size}")
 
 
 def joined_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:

@@ -1,11 +1,11 @@
 """Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
 
+from dhkit.description import Payload
 from dhkit.planning.along import along_path
 from dhkit.planning.certificate import Certificate, certify
 from dhkit.planning.constraints import Constraint, MotorPower, TorqueSpeedLine
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
-from dhkit.planning.payload import Payload
 from dhkit.planning.planner import Planner
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.solver import Progress

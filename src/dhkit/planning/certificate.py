@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Payload
 from dhkit.description.robot import takes_robot
+from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.payload import Payload
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
@@ -41,6 +41,9 @@ class Check:
     time: float
     """When, s."""
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -70,13 +73,36 @@ class Certificate:
         """The check that comes nearest to its limit, or exceeds it most; None where nothing is limited."""
         return max(self.checks, key=lambda check: check.excess, default=None)
 
+    def __repr__(self) -> str:
+        return repr_line("Certificate", said=self._summary)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (
+                check.what,
+                str(check.row + 1),
+                f"exceeded by {100 * check.excess:.2g} %" if check.excess > 0 else f"{-100 * check.excess:.2g} % left",
+                f"{check.time:.4g} s",
+            )
+            for check in sorted(self.checks, key=lambda check: -check.excess)
+        ]
+        headings = ("limit", "joint or row", "at worst", "at")
+        return html_block(f"Certificate: {self._summary}", html_table(headings, rows, align="lr"))
+
+    @property
+    def _summary(self) -> str:
+        if self.worst is None:
+            return f"nothing is limited, {self.states} states"
+        kept = "all limits kept" if self.ok else f"{self.worst.what} exceeded by {100 * self.violation:.2g} %"
+        return f"{kept}, in {self.states} states by {self.reference}"
+
 
 @takes_robot
 def certify(
     description: Description,
     motion: Trajectory,
     limits: Limits | None = None,
-    friction: Friction | None = None,
+    friction: bool | Friction | None = None,
     payload: Payload | None = None,
 ) -> Certificate:
     """Check a motion that comes from anywhere against limits, as planned motions are.
@@ -90,9 +116,9 @@ def certify(
     limits
         Of position, velocity, acceleration, jerk and torque; the robot's own unless given.
     friction
-        Torques of friction that drives must supply too; none unless given.
+        Torques of friction that drives must supply too, False for none; the motion's own unless given.
     payload
-        What the tool carries.
+        What the tool carries; the motion's own unless given.
 
     Raises
     ------
@@ -108,8 +134,10 @@ def certify(
     True
     """
     motion.require(description)
-    loaded = description if payload is None else payload.carried(description)
-    return Checker(loaded, limits or default_limits(description), friction=friction).check(motion)
+    carried = motion.payload if payload is None else payload
+    loaded = description if carried is None else carried.carried(description)
+    chosen = motion.friction if friction is None else Friction.chosen(friction)
+    return Checker(loaded, limits or default_limits(description), friction=chosen).check(motion)
 
 
 @dataclass(frozen=True, eq=False)

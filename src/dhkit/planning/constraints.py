@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.description.arrays import number_array
+from dhkit.display import value_line
 from dhkit.planning.point import Point
 from dhkit.planning.states import States
 
@@ -88,6 +90,9 @@ class MotorPower(Constraint):
         """Return the same of samples, shape (N, k)."""
         return states.tau * states.qd / _each(self.watts, states.n)
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class TorqueSpeedLine(Constraint):
@@ -120,6 +125,9 @@ class TorqueSpeedLine(Constraint):
         measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(self.no_load_speed, n)
         return measured
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 def _each(value: float | tuple[float, ...], n: int) -> Array:
     array = np.atleast_1d(np.array(value, dtype=float))
@@ -130,7 +138,7 @@ def _each(value: float | tuple[float, ...], n: int) -> Array:
 
 def positive(name: str, value: float | ArrayLike) -> float | tuple[float, ...]:
     """Return numbers that are positive; a ValueError names whose they are not."""
-    array = np.asarray(value, dtype=float)
+    array = number_array(value, name, "(n,)")
     if array.ndim > 1 or not array.size or not (array > 0).all():
         raise ValueError(f"{name}: {value!r}; expected positive numbers")
     return float(array) if array.ndim == 0 else tuple(array.tolist())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, check_pose, joint_array
+from dhkit.description.arrays import number_array
 from dhkit.description.joint_words import joint_words
 from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
 from dhkit.kinematics import inverse_kinematics, solve_numerically
@@ -66,7 +67,7 @@ def place(description: Description, value: ArrayLike | str, name: str) -> Place:
                 f"{name}: {description.name} has no configuration {value!r}; it has {', '.join(known) or 'none'}"
             )
         return Place(name, np.array(known[value]))
-    array = np.asarray(value, dtype=float)
+    array = number_array(value, name, f"({description.n},) or (4, 4)")
     if array.shape == (4, 4):
         try:
             return Place(name, None, check_pose(array))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.display import value_line
 from dhkit.planning.point import Point, gear_ratios
 from dhkit.planning.states import States
 
@@ -145,6 +146,9 @@ class Energy(Term):
         total: Array = np.sum(power, axis=1)
         return total
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class Objective:
@@ -221,6 +225,9 @@ class Objective:
         if all(term.weight == 1 for term in self.terms):
             return " + ".join(names)
         return " + ".join(f"{term.weight:g} {name}" for term, name in zip(self.terms, names, strict=True))
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 ObjectiveLike: TypeAlias = "str | Term | Objective"

@@ -11,9 +11,10 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array
+from dhkit.description import Array, Payload
 from dhkit.description.frames import world_to_tool
 from dhkit.description.robot import Robot, description_of
+from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
 from dhkit.planning.clear import Clear, Surroundings
@@ -31,16 +32,16 @@ from dhkit.planning.guess import leg_durations
 from dhkit.planning.mesh import LEAST, Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
-from dhkit.planning.payload import Payload
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.search import Found, Program, Search
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.states import prepare
 from dhkit.planning.task import FEW, Task, curve_for
-from dhkit.planning.wish import Wish, checked_limits, end_velocity, positive_seconds
+from dhkit.planning.wish import Wish, checked_limits, end_velocity
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
+from dhkit.trajectories.timing import check_duration
 
 __all__ = ["Planner"]
 
@@ -127,6 +128,11 @@ class Planner:
         self._programs: dict[tuple[object, ...], Program] = {}
         self._making = threading.Lock()
 
+    def __repr__(self) -> str:
+        return repr_line(
+            f"Planner of {self.description.name}", said=f"least {self.objective}, {self.intervals} intervals"
+        )
+
     def solve(
         self,
         start: ArrayLike | str,
@@ -200,13 +206,14 @@ class Planner:
             warm.require(description)
         if isinstance(via, str) or np.ndim(via[0] if len(via) else [[]]) == 0:
             via = [via]
+        check_duration(duration)
         names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
         places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
         if places[0].q is None:
             raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
         wish = Wish(
             checked_limits(description, self.limits if limits is None else limits),
-            positive_seconds("duration", duration),
+            duration,
             *(end_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
             payload,
             Surroundings.of(obstacles, clearance, self_collision),
@@ -236,10 +243,11 @@ class Planner:
             slow_down=best.slow_down,
             tightened=best.tightened,
             branches=branches,
+            unlimited=wish.limits.unlimited,
         )
         if compare:
             report = replace(report, classical=classical(task), coarse=self._coarse(task, best, deadline))
-        return replace(best.trajectory, report=report)
+        return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 
     # Programs
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.planning.certificate import Certificate
 
 __all__ = ["JOINTWISE", "BranchReport", "PlanReport"]
@@ -28,9 +29,10 @@ class BranchReport:
     """Why there is no motion."""
 
     def __str__(self) -> str:
-        if self.reason:
-            return f"{self.branch}: no motion: {self.reason}"
-        return f"{self.branch}: {'' if self.solved else 'at least '}{self.duration:.4f} s"
+        return f"{self.branch}: {'no motion: ' if self.reason else ''}{_told(self)}"
+
+    def __repr__(self) -> str:
+        return repr_line("BranchReport", said=str(self))
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,8 @@ class PlanReport:
     classical: tuple[tuple[str, float], ...] = ()
     """Durations of classical motions along the straight joint path under the same limits, s."""
     branches: tuple[BranchReport, ...] = ()
+    unlimited: tuple[str, ...] = ()
+    """Kinds of limits that the motion was planned without, such as ``acceleration``: it may jump there."""
 
     @property
     def sensitivity(self) -> float | None:
@@ -70,6 +74,33 @@ class PlanReport:
         """Return the limits that are reached and in what share of the time, the most active first."""
         named = [(f"{what} of {self._name(what, row)}", share) for what, row, share in self.certificate.active]
         return sorted(named, key=lambda item: -item[1])
+
+    def __repr__(self) -> str:
+        return repr_line("PlanReport", said=f"{self.duration:.4f} s, least {self.objective}, {self._certified}")
+
+    def _repr_html_(self) -> str:
+        facts = [("duration", f"{self.duration:.4f} s"), (f"cost ({self.objective})", f"{self.cost:.6g}")]
+        facts.append(("some limit is active", f"{100 * self.certificate.any_active:.0f} % of the time"))
+        facts += [(f"{name} active", f"{100 * share:.0f} % of the time") for name, share in self.active_limits()[:TOLD]]
+        if self.unlimited:
+            facts.append(("not limited", ", ".join(self.unlimited)))
+        if self.slow_down > 1:
+            facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3f} %"))
+        if self.coarse is not None:
+            facts.append((f"{self.coarse[0]} intervals cost", f"{100 * (self.sensitivity or 0):.2f} % more"))
+        facts += [(f"{name}, straight joint path", f"{duration:.4f} s") for name, duration in self.classical]
+        facts.append(("solved in", f"{self.solve_seconds:.3f} s, {self.iterations} iterations"))
+        branches = [(branch.branch, _told(branch), "chosen" if branch.chosen else "") for branch in self.branches]
+        return html_block(
+            f"{self.duration:.4f} s, least {self.objective}, {self._certified}",
+            html_table((), facts),
+            html_table(("branch", "duration", ""), branches) if branches else "",
+            html_lines([f"tightened: {', '.join(self.tightened)}"] if self.tightened else []),
+        )
+
+    @property
+    def _certified(self) -> str:
+        return "certified" if self.certificate.ok else f"exceeds a limit by {100 * self.certificate.violation:.2g} %"
 
     def _name(self, what: str, row: int) -> str:
         joint = self._joint(what, row)
@@ -100,6 +131,7 @@ class PlanReport:
             ],
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
             "any_active": certificate.any_active,
+            "unlimited": list(self.unlimited),
             "slow_down": self.slow_down,
             "tightened": list(self.tightened),
             "intervals": self.intervals,
@@ -139,6 +171,8 @@ class PlanReport:
             lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
         active = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:TOLD]) or "none"
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
+        if self.unlimited:
+            lines.append(f"not limited: {', '.join(self.unlimited)}")
         if self.coarse is not None:
             more = f"{100 * (self.sensitivity or 0):.2f} % more"
             lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")
@@ -151,3 +185,8 @@ class PlanReport:
             f"{self.solve_seconds:.3f} s (and {self.build_seconds:.2f} s to build)"
         )
         return "\n".join(lines)
+
+
+def _told(branch: BranchReport) -> str:
+    """Return a branch's duration, or why it has none."""
+    return branch.reason or f"{'' if branch.solved else 'at least '}{branch.duration:.4f} s"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.display import value_line
 
 if TYPE_CHECKING:
     import casadi
@@ -43,6 +46,9 @@ class Progress:
     seconds: float
     """Since the solution began."""
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 ProgressCall: TypeAlias = Callable[[Progress], object]
 """Called once an iteration; an exception in it ends the solution."""
@@ -72,16 +78,19 @@ class Solver:
     def __init__(self, program: dict[str, Any], legs: int, *, tolerance: float, expand: bool) -> None:
         import casadi
 
-        self._watch = _watch(program["x"].numel(), program["g"].numel(), program["p"].numel(), legs)
-        options = {
+        nx, ng, np_ = (program[name].numel() for name in ("x", "g", "p"))
+        options: dict[str, Any] = {
             "print_time": False,
             "expand": expand,
-            "iteration_callback": self._watch,
             "calc_lam_p": False,
             "show_eval_warnings": False,
             "ipopt": {**OPTIONS, "tol": tolerance},
         }
-        self._function = casadi.nlpsol("plan", "ipopt", program, options)
+        with _KeptInterrupt() as interrupt:
+            options["iteration_callback"] = self._watch = _watch(nx, ng, np_, legs)
+            self._function = casadi.nlpsol("plan", "ipopt", program, options)
+        if interrupt.raised is not None:
+            raise interrupt.raised
         self._turn = threading.Lock()
 
     def __call__(
@@ -106,18 +115,43 @@ class Solver:
             The deadline has passed.
         """
         with self._turn:
-            self._watch.begin(g_bounds, deadline, progress)
-            found = self._function(
-                x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
-            )
-            raised = self._watch.end()
+            with _KeptInterrupt() as interrupt:
+                self._watch.begin(g_bounds, deadline, progress, interrupt)
+                found = self._function(
+                    x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
+                )
+                raised = self._watch.end()
             stats = self._function.stats()
-        if raised is not None:
+        if raised := interrupt.raised or raised:
             raise raised
         x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
         misses = max(_outside(x, *x_bounds), _outside(g, *g_bounds))
         success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
         return Solution(x, g, success, status, iterations, misses, float(found["f"]))
+
+
+class _KeptInterrupt:
+    """Keeps what Ctrl-C raises until CasADi returns: raised while CasADi calls back, or Ipopt evaluates, it is lost."""
+
+    raised: BaseException | None = None
+
+    def __enter__(self) -> _KeptInterrupt:
+        self._handler = signal.getsignal(signal.SIGINT)
+        self._takes_turn = threading.current_thread() is threading.main_thread() and callable(self._handler)
+        if self._takes_turn:
+            signal.signal(signal.SIGINT, self._keep)
+        return self
+
+    def __exit__(self, *about: object) -> None:
+        if self._takes_turn:
+            signal.signal(signal.SIGINT, self._handler)
+
+    def _keep(self, number: int, frame: FrameType | None) -> None:
+        try:
+            if callable(self._handler):
+                self._handler(number, frame)
+        except BaseException as error:
+            self.raised = error
 
 
 def _outside(values: Array, low: Array, high: Array) -> float:
@@ -136,8 +170,14 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             casadi.Callback.__init__(self)
             self.construct("watch", {})
 
-        def begin(self, bounds: tuple[Array, Array], deadline: float, progress: ProgressCall | None) -> None:
-            self.bounds, self.deadline, self.progress = bounds, deadline, progress
+        def begin(
+            self,
+            bounds: tuple[Array, Array],
+            deadline: float,
+            progress: ProgressCall | None,
+            interrupt: _KeptInterrupt,
+        ) -> None:
+            self.bounds, self.deadline, self.progress, self.interrupt = bounds, deadline, progress, interrupt
             self.started, self.iteration, self.raised = time.perf_counter(), 0, None
 
         def end(self) -> BaseException | None:
@@ -160,6 +200,8 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             try:
                 if now > self.deadline:
                     raise Stopped
+                if self.interrupt.raised is not None:
+                    return [1]
                 if self.progress is not None:
                     values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))
                     duration = float(casadi.sum1(values["x"][:legs]))

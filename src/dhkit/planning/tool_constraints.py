@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.description.arrays import number_array
+from dhkit.display import value_line
 from dhkit.planning.constraints import Constraint, positive
 from dhkit.planning.point import Point
 from dhkit.planning.states import States
@@ -120,6 +122,9 @@ class ToolDirection(Constraint):
         cosine = (states.T_world_tool[:, :3, :3] @ np.array(self.axis)) @ parameters
         return np.asarray(_share_of_angle(cosine, self.tolerance))[:, None]
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True)
 class ToolOrientation(Constraint):
@@ -179,7 +184,7 @@ def _angle(name: str, value: float) -> None:
 
 
 def _unit(name: str, vector: ArrayLike) -> tuple[float, ...]:
-    array = np.asarray(vector, dtype=float)
+    array = number_array(vector, name, "(3,)")
     length = float(np.linalg.norm(array)) if array.shape == (3,) else 0.0
     if not 0 < length < math.inf:
         raise ValueError(f"{name}: {vector!r}; expected a vector of three numbers, not all 0")

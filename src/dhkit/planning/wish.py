@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.clear import Surroundings
-from dhkit.planning.payload import Payload
 from dhkit.trajectories import Limits
 
-__all__ = ["Wish", "checked_limits", "end_velocity", "positive_seconds"]
+__all__ = ["Wish", "checked_limits", "end_velocity"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,21 +51,6 @@ def checked_limits(description: Description, limits: Limits | None) -> Limits:
     if len(limits.lower) != description.n:
         raise ValueError(f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}")
     return limits
-
-
-def positive_seconds(name: str, value: float | None) -> float | None:
-    """Return a time, or None.
-
-    Raises
-    ------
-    ValueError
-        One that is not positive and finite.
-    """
-    if value is None:
-        return None
-    if not isinstance(value, Real) or not np.isfinite(float(value)) or not value > 0:
-        raise ValueError(f"{name} is {value!r}; expected a positive number, s")
-    return float(value)
 
 
 def end_velocity(description: Description, value: ArrayLike | None, name: str) -> Array:

@@ -9,13 +9,14 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
+from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
-from dhkit.programs.report import CheckReport, Part, listed, share_within
+from dhkit.programs.report import CheckReport, Part, share_within
 from dhkit.programs.rubric import CheckRubric, ControllerTask
 
 __all__ = ["check"]

@@ -10,11 +10,12 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array
+from dhkit.display import listed
 from dhkit.kinematics import classify
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
 from dhkit.programs.process import ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
-from dhkit.programs.report import Part, listed, share_within
+from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
 __all__ = ["score_inverse"]

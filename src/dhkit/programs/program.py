@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.display import repr_line
 from dhkit.programs.process import HERE, Limits, Process, ProgramError, printable
 
 if TYPE_CHECKING:
@@ -52,10 +53,13 @@ class Program:
         The file cannot be read, or what runs it is not installed.
     """
 
-    def __init__(self, source: Path | Sequence[str], limits: Limits | None = None, sandbox: str | None = None) -> None:
+    def __init__(
+        self, source: str | Path | Sequence[str], limits: Limits | None = None, sandbox: str | None = None
+    ) -> None:
         if os.name != "posix":
             raise ProgramError("programs run on Linux and macOS alone", "unreadable")
         self.limits = limits or Limits()
+        source = Path(source) if isinstance(source, str) else source
         self.name = source.name if isinstance(source, Path) else source[0]
         self.functions: tuple[str, ...] = ()
         self.imported: tuple[str, ...] = ()
@@ -162,6 +166,9 @@ class Program:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        return repr_line(f"Program {self.name}", said=", ".join(self.functions) or "not started")
 
     def _started(self) -> Process:
         if self._closed:

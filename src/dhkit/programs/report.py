@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.description import Array
+from dhkit.display import html_block, html_lines, html_table, repr_line, value_line
 
-__all__ = ["CheckReport", "Part", "listed", "share_within"]
+__all__ = ["CheckReport", "Part", "share_within"]
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,9 @@ class Part:
     most: float
     text: str
     details: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True)
@@ -86,12 +89,20 @@ class CheckReport:
         lines += [""] * bool(self.notes) + [f"note: {note}" for note in self.notes]
         return "\n".join([*lines, f"random states: seed {self.seed}"])
 
+    def __repr__(self) -> str:
+        said = f"{self.points:g} of {self.most:g} points, {', '.join(self.functions)}"
+        return repr_line("CheckReport", f"{self.program} against {self.robot}", said)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (function, part.name, f"{part.points:.3g} of {part.most:g}", part.text)
+            for function, parts in self.functions.items()
+            for part in parts
+        ]
+        title = f"{self.program} against {self.robot}: {self.points:g} of {self.most:g} points"
+        return html_block(title, html_table(("function", "part", "points", ""), rows), html_lines(self.notes))
+
 
 def share_within(value: float, bound: float) -> float:
     """Return the share of points for a value that should not exceed a bound: none at ten times the bound."""
     return float(np.clip(1 - np.log10(max(value, 1e-12) / bound), 0.0, 1.0))
-
-
-def listed(q: Array) -> str:
-    """Return joint values as a person reads them, rad and m."""
-    return "[" + ", ".join(f"{x:.4g}" for x in q) + "]"

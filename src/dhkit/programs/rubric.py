@@ -10,6 +10,7 @@ from pydantic.dataclasses import dataclass
 
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import plain_numbers, toml_document
+from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 
 __all__ = ["CheckRubric"]
@@ -25,6 +26,9 @@ class ForwardPoints:
     """Of ``fk``: poses that agree."""
 
     agrees: Points = 100.0
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -50,6 +54,9 @@ class InversePoints:
     singular: Points = 10.0
     time: Points = 10.0
     seconds: Positive = 0.01
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -80,6 +87,9 @@ class ControllerTask:
     payload: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     bound: Positive = 0.01
 
+    def __repr__(self) -> str:
+        return value_line(self)
+
 
 @dataclass(frozen=True, config=STRICT)
 class CheckRubric:
@@ -92,7 +102,7 @@ class CheckRubric:
     """Functions that are asked for; empty for those that a program has."""
 
     @classmethod
-    def read(cls, path: Path) -> CheckRubric:
+    def read(cls, path: str | Path) -> CheckRubric:
         """Read a rubric: a TOML file with tables ``[fk]``, ``[ik]`` and ``[controller]``.
 
         Raises
@@ -134,3 +144,8 @@ class CheckRubric:
             "controller": {"follows": self.controller.follows},
         }[function]
         return parts
+
+    def __repr__(self) -> str:
+        functions = self.wanted(("fk", "ik", "controller"))
+        points = ", ".join(f"{function} {sum(self.points(function).values()):g}" for function in functions)
+        return repr_line("CheckRubric", said=f"points of {points}")

@@ -16,6 +16,7 @@ from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols
 from dhkit.symbolic.ring import Element, Elements
+from dhkit.symbolic.ring.elements import READABLE
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
 
 __all__ = ["SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"]
@@ -74,8 +75,8 @@ class SymbolicMatrix:
     def __repr__(self) -> str:
         return f"<{self.name} of {self.kinematics.description.name}, shape {self.elements.shape}>"
 
-    def _repr_latex_(self) -> str:
-        return self.latex()
+    def _repr_latex_(self) -> str | None:
+        return self.latex() if sum(len(element) for element in self.elements.flat) <= READABLE else None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 
+from dhkit.display import repr_line, value_line
+
 __all__ = [
     "LINK_MISTAKES",
     "MISTAKES",
@@ -66,6 +68,9 @@ class Mistake:
     def __str__(self) -> str:
         return self.sentence
 
+    def __repr__(self) -> str:
+        return repr_line(f"Mistake {self.identity}", said=self.sentence)
+
 
 @dataclass(frozen=True)
 class MadeAt:
@@ -88,6 +93,9 @@ class MadeAt:
     def __str__(self) -> str:
         link = "" if self.link is None else f" at link {self.link}"
         return f"{self.identity}{link}" if self.body is None else f"{self.identity}{link}, {self.body}"
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from dhkit.description import Description
 from dhkit.description.robot import takes_robot
+from dhkit.display import repr_line
 from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, Symbols, exact_arm, point_inertia
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
@@ -101,7 +102,7 @@ class TextbookDerivation:
 
     def __repr__(self) -> str:
         made = ", ".join(sorted(map(str, self.mistakes))) or "no mistakes"
-        return f"<TextbookDerivation of {self.arm.description.name}: {made}>"
+        return repr_line("TextbookDerivation", self.arm.description.name, made)
 
     @cached_property
     def rotors(self) -> Element:

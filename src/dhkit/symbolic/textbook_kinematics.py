@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from dhkit.description import Body, Description, Placement
+from dhkit.display import repr_line
 from dhkit.expressions import ZERO, Expression, cos, exact_angle, sin
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm
 from dhkit.symbolic.exact.naming import Naming
@@ -146,7 +147,7 @@ class TextbookKinematics:
 
     def __repr__(self) -> str:
         made = ", ".join(sorted(map(str, self.mistakes))) or "no mistakes"
-        return f"<TextbookKinematics of {self.arm.description.name}: {made}>"
+        return repr_line("TextbookKinematics", self.arm.description.name, made)
 
     @cached_property
     def A(self) -> tuple[Elements, ...]:

@@ -89,6 +89,7 @@ def read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             _require_keys(members, kind)
+            keys = (*keys, *(key for key in kind.optional if key in members))
             size = sum(members[key].file_size for key in keys)
             if size > kind.most:
                 raise DescriptionError(f"unpacks to {size / 1e6:.0f} MB; expected at most {kind.most / 1e6:g} MB")
@@ -121,7 +122,8 @@ def read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
     """Return texts and arrays by name, as :func:`read_npz`."""
     variables = read_variables(content, kind.most)
     _require_keys(variables, kind)
-    found = {key: variables[key].value for key in (*TEXTS, *kind.arrays)}
+    keys = (*TEXTS, *kind.arrays, *(key for key in kind.optional if key in variables))
+    found = {key: variables[key].value for key in keys}
     for key, value in found.items():
         if isinstance(value, str) != (key in TEXTS):
             expected = "text" if key in TEXTS else "numbers"

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dhkit.description import Array, Description, write_atomically
+from dhkit.description import Array, Description, Payload, write_atomically
 from dhkit.errors import DescriptionError
+from dhkit.symbolic import Friction
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
@@ -37,8 +38,11 @@ TRAJECTORY = FileKind(
     "trajectory",
     arrays=("breaks", "coefficients"),
     most=200_000_000,
-    otherwise="; samples from elsewhere are read by Trajectory.read",
+    optional=("payload", "friction"),
+    otherwise="; Trajectory.read takes samples from elsewhere, the command files without dhkit's first line",
 )
+COMMENTS_LENGTH = 2_000
+"""Characters in which a table's payload and friction are searched: 11 numbers of 25 characters, and the label."""
 FIRST_LINE = 200
 """Bytes in which the first line of a table is looked for."""
 MOST_COEFFICIENTS = 65
@@ -61,7 +65,7 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
     Parameters
     ----------
     trajectory
-        The motion. Its report is not written.
+        The motion, with its payload and friction. Its report is not written.
     path
         The suffix decides: ``.npz`` and ``.mat`` hold every number and the robot; ``.csv`` holds samples
         ``t, q1 ..., qd1 ..., qdd1 ...``, and ``.yaml`` or ``.yml`` those of a ROS JointTrajectory, times in whole ns.
@@ -80,12 +84,15 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
     if suffix in ARCHIVES:
         if rate is not None:
             raise ValueError(f"rate is {rate!r}: {suffix} holds no samples; expected no rate")
-        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients}
+        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _beside(trajectory)
         write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
         return path
-    comments = TRAJECTORY.comments(trajectory.description)
+    comments = tuple(
+        f"{name}: {' '.join(f'{x:.17g}' for x in numbers.tolist())}" for name, numbers in _beside(trajectory).items()
+    )
     times = trajectory.sample_times(RATE if rate is None else rate)
-    write_atomically(path, (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments))
+    text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments)
+    write_atomically(path, TRAJECTORY.labelled(trajectory.description, text))
     return path
 
 
@@ -115,7 +122,9 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
         text = decoded(content)
         robot = TRAJECTORY.robot_of_table(text, description)
         samples = _table_samples(text, robot) if suffix == ".csv" else _message_samples(text, robot)
-        return samples.trajectory(robot)
+        motion = replace(samples.trajectory(robot), **_carried(_commented(text)))
+        TRAJECTORY.require_unchanged(text)
+        return motion
     except (DescriptionError, ValueError, TypeError) as error:
         raise DescriptionError(f"{path}: {error}") from None
 
@@ -247,9 +256,52 @@ def _from_archive(values: dict[str, Any], description: Description | None) -> Tr
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
         breaks = breaks.ravel()
-    motion = Trajectory(robot, breaks, coefficients)
+    motion = Trajectory(robot, breaks, coefficients, **_carried(values))
     _require_continuous(motion)
+    TRAJECTORY.require_whole(values)
     return motion
+
+
+def _beside(motion: Trajectory) -> dict[str, Array]:
+    """Return what a motion has beside its robot, as numbers: payload (10,), and friction's width (1,)."""
+    found = {}
+    if motion.payload is not None:
+        found["payload"] = motion.payload.numbers
+    if motion.friction is not None:
+        found["friction"] = np.array([motion.friction.width])
+    return found
+
+
+def _carried(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return payload and friction of the numbers of :func:`_beside`.
+
+    Raises
+    ------
+    DescriptionError, ValueError
+        Other numbers.
+    """
+    found: dict[str, Any] = {}
+    if "payload" in values:
+        found["payload"] = Payload.of_numbers(np.ravel(values["payload"]))
+    if "friction" in values:
+        width = np.ravel(values["friction"])
+        if width.shape != (1,):
+            raise DescriptionError(f"friction has {width.size} numbers; expected its width alone")
+        found["friction"] = Friction(float(width[0]))
+    return found
+
+
+def _commented(text: str) -> dict[str, Array]:
+    """Return the numbers of :func:`_beside` that a table's comments name."""
+    found = {}
+    for line in text[:COMMENTS_LENGTH].splitlines():
+        name, _, numbers = line.removeprefix("# ").partition(": ")
+        if line.startswith("# ") and name in TRAJECTORY.optional and name not in found:
+            try:
+                found[name] = np.array([float(word) for word in numbers.split()])
+            except ValueError:
+                raise DescriptionError(f"{name}: found {numbers[:40]!r}; expected numbers") from None
+    return found
 
 
 def _require_continuous(motion: Trajectory) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
 
 __all__ = ["check_times", "cubic_hermite", "interpolated", "quintic_hermite"]
 

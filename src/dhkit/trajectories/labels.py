@@ -1,11 +1,14 @@
-"""What a file of dhkit says about itself: its kind and its robot, in an archive's texts or a table's first comments."""
+"""What a file of dhkit says about itself, in an archive's texts or a table's first comments: kind, robot and digest."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from dhkit.description import Description, from_toml, library_robot, robots, to_toml
 from dhkit.description.files import read_bounded
@@ -13,8 +16,12 @@ from dhkit.errors import DescriptionError
 
 __all__ = ["TEXTS", "FileKind", "checked_suffix", "decoded"]
 
-TEXTS = ("format", "robot", "digest", "toml")
-"""Names of an archive's texts: its kind and version, the robot's name, its digest and its whole file."""
+TEXTS = ("format", "robot", "digest", "toml", "content")
+"""Names of an archive's texts: its kind and version, the robot's name, digest and whole file, the arrays' digest."""
+DIGITS = 16
+"""Of a digest of content: enough against damage and changes by hand, which is all that it is for."""
+CONTENT = "# content: "
+"""What a table's third line begins with."""
 LABEL_LENGTH = 1000
 """Characters in which a table's first two lines are searched."""
 
@@ -29,6 +36,8 @@ class FileKind:
     """Names of an archive's arrays of numbers."""
     most: int
     """Bytes that are read of a file, and that its content may take unpacked."""
+    optional: tuple[str, ...] = ()
+    """Names of arrays that an archive may have too."""
     otherwise: str = ""
     """What reads a table that does not name its robot, for messages."""
 
@@ -58,8 +67,34 @@ class FileKind:
 
     def archived(self, description: Description, arrays: Mapping[str, Any]) -> dict[str, Any]:
         """Return what an archive holds: the robot as texts, and arrays by name."""
-        texts = (self.version, description.name, description.digest, to_toml(description))
+        texts = (
+            self.version,
+            description.name,
+            description.digest,
+            to_toml(description),
+            self._digest_of_arrays(arrays),
+        )
         return dict(zip(TEXTS, texts, strict=True)) | dict(arrays)
+
+    def require_whole(self, values: Mapping[str, Any]) -> None:
+        """Refuse an archive whose arrays are not those that were written.
+
+        Raises
+        ------
+        DescriptionError
+            Their digest differs from the one in the archive.
+        """
+        if values["content"] != self._digest_of_arrays(values):
+            raise DescriptionError("its numbers differ from those that were written; the file is damaged")
+
+    def _digest_of_arrays(self, arrays: Mapping[str, Any]) -> str:
+        # Shapes are left out: MATLAB adds and drops axes of length 1.
+        found = hashlib.sha256()
+        for name in (*self.arrays, *self.optional):
+            if name in arrays:
+                numbers = np.ascontiguousarray(arrays[name], dtype="<f8")
+                found.update(f"{name} {numbers.size}\n".encode() + numbers.tobytes())
+        return found.hexdigest()[:DIGITS]
 
     def robot_of_archive(self, values: Mapping[str, Any], description: Description | None) -> Description:
         """Return the robot of an archive: the one given, the library's where it is equal, or the archive's own.
@@ -79,9 +114,24 @@ class FileKind:
         # The library's robot knows where its meshes are.
         return library_robot(own.name) if _in_library(own.name, own.digest) else own
 
-    def comments(self, description: Description) -> tuple[str, str]:
-        """Return a table's first two comments."""
-        return self.title, f"robot: {description.name} {description.digest}"
+    def labelled(self, description: Description, text: str) -> str:
+        """Return a table behind the comments that say what it is: kind, robot, digest of the lines that follow."""
+        robot = f"{description.name} {description.digest}"
+        return f"# {self.title}\n# robot: {robot}\n{CONTENT}{_digest_of_lines(text.splitlines())}\n{text}"
+
+    def require_unchanged(self, text: str) -> None:
+        """Refuse a table whose lines are not those that were written.
+
+        Raises
+        ------
+        DescriptionError
+            No digest in its third line, or another than that of the lines that follow.
+        """
+        lines = text.splitlines()
+        if len(lines) < 3 or not lines[2].startswith(CONTENT):
+            raise DescriptionError(f"no comment '{CONTENT}DIGEST' in its third line{self.otherwise}")
+        if lines[2].removeprefix(CONTENT).strip() != _digest_of_lines(lines[3:]):
+            raise DescriptionError(f"changed since dhkit wrote it: its digest differs{self.otherwise}")
 
     def robot_of_table(self, text: str, description: Description | None) -> Description:
         """Return the robot that a table's first two comments name: the one given, or the library's.
@@ -140,6 +190,11 @@ def decoded(content: bytes) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DescriptionError(f"byte {error.start} is not UTF-8; expected text") from None
+
+
+def _digest_of_lines(lines: Sequence[str]) -> str:
+    # Line by line: mail and version control change how lines end.
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:DIGITS]
 
 
 def _in_library(name: str, digest: str) -> bool:

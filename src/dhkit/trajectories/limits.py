@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
-from dhkit.description.frames import number_array, one_each
+from dhkit.description.arrays import number_array
+from dhkit.description.frames import one_each
+from dhkit.display import counted, html_table, repr_line
 
 __all__ = ["Limits"]
 
@@ -53,6 +55,18 @@ class Limits:
         if (self.lower > self.upper).any():
             i = int(np.flatnonzero(self.lower > self.upper)[0])
             raise ValueError(f"lower of joint {i + 1} is {self.lower[i]:g}, above upper, {self.upper[i]:g}")
+
+    @property
+    def unlimited(self) -> tuple[str, ...]:
+        """What is not limited: ``acceleration`` if it is of no joint, ``torque of joint 2`` if not of that one."""
+        found = []
+        for name in ("velocity", "acceleration", "jerk", "torque"):
+            free = np.flatnonzero(np.isinf(getattr(self, name)))
+            joints = ", ".join(str(i + 1) for i in free)
+            if len(free):
+                all_free = len(free) == len(self.velocity)
+                found.append(name if all_free else f"{name} of joint{'s' * (len(free) > 1)} {joints}")
+        return tuple(found)
 
     @classmethod
     def of(
@@ -123,3 +137,20 @@ class Limits:
 
     def __reduce__(self) -> tuple[type[Limits], tuple[Any, ...]]:
         return Limits, tuple(getattr(self, item.name) for item in fields(self))
+
+    def __repr__(self) -> str:
+        position = {"position": np.append(self.lower, self.upper)}
+        given = position | {item.name: getattr(self, item.name) for item in fields(self)[2:]}
+        limited = [name for name, limit in given.items() if np.isfinite(limit).any()]
+        return repr_line("Limits", counted(len(self.lower), "joint"), ", ".join(limited) or "unlimited")
+
+    def _repr_html_(self) -> str:
+        names = [item.name for item in fields(self)]
+        columns = [getattr(self, name) for name in names]
+        rows = [(str(i), *map(_told, row)) for i, row in enumerate(zip(*columns, strict=True), start=1)]
+        caption = "Limits: rad or m, over s, s² and s³; torques N m or N"
+        return html_table(("joint", *names), rows, caption, align="r")
+
+
+def _told(limit: float) -> str:
+    return f"{limit:.4g}" if np.isfinite(limit) else "unlimited"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, description_of
+from dhkit.display import counted, repr_line
 from dhkit.trajectories.pieces import Pieces, shifted
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
@@ -119,6 +120,10 @@ class JointPath:
         outer = shifted(self.coefficients[m], inner[:, 0] - self.breaks[m])
         inner[:, 0] = 0.0  # the path is expanded about where s is at each start
         return Trajectory(self.description, merged, _composed(outer, inner))
+
+    def __repr__(self) -> str:
+        pieces, powers = self.coefficients.shape[:2]
+        return repr_line("JointPath", self.description.name, f"{counted(pieces, 'piece')} of degree {powers - 1}")
 
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks, and the times at which s passes the path's."""

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import counted, repr_line
 
 __all__ = ["Pieces", "Side", "joined", "shifted"]
 
@@ -130,6 +131,10 @@ class Pieces:
             u = np.clip(u - step, low, high)
         u = np.concatenate([start, u], axis=1)
         return self.breaks[:-1, None, None] + u, self.at(u)
+
+    def __repr__(self) -> str:
+        pieces, powers, columns = self.coefficients.shape
+        return repr_line("Pieces", said=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
 
 
 def joined(first: Pieces, second: Pieces) -> tuple[Array, Array]:

@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Payload
+from dhkit.display import counted, html_table, repr_line
+from dhkit.symbolic import Friction
 
 __all__ = ["Samples"]
+
+FIRST = 5
+"""Times that a notebook shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +28,14 @@ class Samples:
     """Shape (N, n), per second."""
     qdd: Array
     """Shape (N, n), per second squared."""
+    payload: Payload | None = None
+    """What the tool carries."""
+    friction: Friction | None = None
+    """Friction that the torques overcome; None: none."""
 
     @cached_property
     def tau(self) -> Array:
-        """Joint torques without friction, shape (N, n), N m and N.
+        """Joint torques with the payload and friction, shape (N, n), N m and N.
 
         Raises
         ------
@@ -35,4 +44,22 @@ class Samples:
         """
         from dhkit.dynamics import inverse_dynamics
 
-        return inverse_dynamics(self.description, self.q, self.qd, self.qdd)
+        loaded = self.description if self.payload is None else self.payload.carried(self.description)
+        return inverse_dynamics(loaded, self.q, self.qd, self.qdd, friction=self.friction or False)
+
+    def __repr__(self) -> str:
+        return repr_line("Samples", self.description.name, self._summary)
+
+    def _repr_html_(self) -> str:
+        units = ["m" if slides else "rad" for slides in self.description.numbers.prismatic]
+        joints = zip(self.description.joints, units, strict=True)
+        headings = ("t [s]", *(f"{joint.name} [{unit}]" for joint, unit in joints))
+        rows = [(f"{t:.4g}", *(f"{x:.4f}" for x in q)) for t, q in zip(self.times[:FIRST], self.q[:FIRST], strict=True)]
+        caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
+        return html_table(headings, rows, caption, align="r", count=len(self.times))
+
+    @property
+    def _summary(self) -> str:
+        if not len(self.times):
+            return "0 times"
+        return f"{counted(len(self.times), 'time')} from {self.times[0]:.4g} to {self.times[-1]:.4g} s"

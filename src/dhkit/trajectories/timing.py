@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,8 @@ from dhkit.trajectories.trajectory import Trajectory
 
 __all__ = ["check_duration", "configuration", "default_limits", "timed"]
 
+SHORTEST, LONGEST = 1e-6, 1e6
+"""s: durations beyond these are slips, and their powers leave the range of doubles."""
 SLACK = 1e-9
 """By what share a duration may be shorter than its limits demand: rounding."""
 
@@ -66,9 +69,17 @@ def default_limits(description: Description) -> Limits:
 
 
 def check_duration(duration: float | None) -> None:
-    """Refuse a duration that is not positive and finite."""
-    if duration is not None and not 0 < duration < np.inf:
-        raise ValueError(f"duration is {duration!r}; expected a positive number of seconds")
+    """Refuse a duration that is not positive, or too long for what is computed with it.
+
+    Raises
+    ------
+    ValueError
+        Not a number from 1e-6 to 1e6 s.
+    """
+    if duration is None:
+        return
+    if not isinstance(duration, Real) or not SHORTEST <= duration <= LONGEST:
+        raise ValueError(f"duration is {duration!r}; expected {SHORTEST:g} to {LONGEST:g} s")
 
 
 def configuration(description: Description, value: ArrayLike | None, name: str) -> Array:

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, check_pose
+from dhkit.description.arrays import number_array
+from dhkit.display import repr_line
 
 __all__ = ["ToolCircle", "ToolLine", "ToolPath", "tool_circle", "tool_line"]
 
@@ -49,6 +51,10 @@ class ToolLine:
         """Return zeros, shape (N, 6)."""
         return np.zeros((len(s), 6))
 
+    def __repr__(self) -> str:
+        length, angle = np.linalg.norm(self.way), np.linalg.norm(self.turn)
+        return repr_line("ToolLine", said=f"{length:.4g} m, turned by {angle:.4g} rad")
+
 
 @dataclass(frozen=True, eq=False)
 class ToolCircle:
@@ -77,6 +83,12 @@ class ToolCircle:
         """Return how the twists change: towards the axis, shape (N, 6)."""
         towards = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
         return np.asarray(np.concatenate([towards, np.zeros_like(towards)], axis=1))
+
+    def __repr__(self) -> str:
+        angle = float(np.linalg.norm(self.turn))
+        radius = float(np.linalg.norm(np.cross(self.turn, self.T0[:3, 3] - self.centre))) / (angle or 1.0)
+        tool = "turning with it" if self.turning else "keeping its orientation"
+        return repr_line("ToolCircle", said=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}")
 
     def _radii(self, s: Array) -> Array:
         radii: Array = np.einsum("kij,j->ki", _rotations(s[:, None] * self.turn), self.T0[:3, 3] - self.centre)
@@ -162,7 +174,7 @@ def _pose(T: ArrayLike, name: str) -> Array:
 
 
 def _vector(value: ArrayLike, name: str) -> Array:
-    array = np.asarray(value, dtype=float)
+    array = number_array(value, name, "(3,)")
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"{name} has shape {array.shape}; expected (3,), finite values")
     return array

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, Robot, description_of
-from dhkit.description.frames import number_array
+from dhkit.description import Array, Description, Payload, Robot, description_of
+from dhkit.description.arrays import number_array
 from dhkit.description.joint_words import joint_words
 from dhkit.errors import DescriptionError
 from dhkit.kernels import check_whole
+from dhkit.symbolic import Friction
 from dhkit.trajectories.interpolation import interpolated
 from dhkit.trajectories.pieces import Pieces, Side, joined
 from dhkit.trajectories.samples import Samples
-
-if TYPE_CHECKING:
-    from dhkit.dynamics import Friction
 
 __all__ = ["Trajectory"]
 
@@ -45,6 +44,10 @@ class Trajectory:
         Shape (K, p+1, n), ascending powers, rad and m.
     report
         What its planner has to say; no part of equality.
+    payload
+        What the tool carries, beside the robot: torques count it.
+    friction
+        Friction that the drives overcome, beside the robot: torques count it.
 
     Raises
     ------
@@ -65,11 +68,16 @@ class Trajectory:
     breaks: Array
     coefficients: Array
     report: Any = None
+    payload: Payload | None = None
+    friction: Friction | None = None
     pieces: Pieces = field(init=False)
     """The same polynomials, without the robot."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "description", description_of(self.description))
+        object.__setattr__(self, "friction", Friction.chosen(self.friction))
+        if self.payload is not None and not isinstance(self.payload, Payload):
+            raise TypeError(f"payload is {self.payload!r}; expected Payload(mass, com, inertia)")
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
         for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
             object.__setattr__(self, name, value)
@@ -78,6 +86,17 @@ class Trajectory:
     def n(self) -> int:
         """The number of joints."""
         return self.description.n
+
+    @cached_property
+    def loaded(self) -> Description:
+        """The robot with the payload.
+
+        Raises
+        ------
+        DescriptionError
+            Its last link has no body to join it to.
+        """
+        return self.description if self.payload is None else self.payload.carried(self.description)
 
     @property
     def duration(self) -> float:
@@ -118,8 +137,17 @@ class Trajectory:
         """Return the derivatives of the accelerations, shape (..., n), as :meth:`qd`."""
         return self._derivative(t, 3, side)
 
-    def tau(self, t: ArrayLike, friction: bool | Friction = False, side: Side = "right") -> Array:
-        """Return joint torques by inverse dynamics, shape (..., n), N m and N.
+    def tau(self, t: ArrayLike, friction: bool | Friction | None = None, side: Side = "right") -> Array:
+        """Return joint torques by inverse dynamics with the payload, shape (..., n), N m and N.
+
+        Parameters
+        ----------
+        t
+            Times, any shape, s.
+        friction
+            In place of the motion's own; False: none.
+        side
+            As for :meth:`q`.
 
         Raises
         ------
@@ -129,7 +157,12 @@ class Trajectory:
         from dhkit.dynamics import inverse_dynamics
 
         q, qd, qdd = self.q(t, side), self.qd(t, side), self.qdd(t, side)
-        return inverse_dynamics(self.description, q, qd, qdd, friction=friction)
+        chosen = self.friction if friction is None else friction
+        return inverse_dynamics(self.loaded, q, qd, qdd, friction=False if chosen is None else chosen)
+
+    def carrying(self, payload: Payload | None = None, friction: bool | Friction | None = None) -> Trajectory:
+        """Return the same motion with another payload and friction, none unless given; without the report."""
+        return replace(self, report=None, payload=payload, friction=Friction.chosen(friction))
 
     def _derivative(self, t: ArrayLike, order: int, side: Side) -> Array:
         t = number_array(t, "t", "(...)")
@@ -153,7 +186,8 @@ class Trajectory:
             Not exactly one of both, a rate that is not positive and finite, or fewer than two samples.
         """
         times = self.sample_times(rate, n)
-        return Samples(self.description, times, self.q(times), self.qd(times), self.qdd(times))
+        values = self.q(times), self.qd(times), self.qdd(times)
+        return Samples(self.description, times, *values, self.payload, self.friction)
 
     def sample_times(self, rate: float | None = None, n: int | None = None) -> Array:
         """Return the times of :meth:`sample`, shape (N,), s."""
@@ -179,12 +213,16 @@ class Trajectory:
         if not np.isfinite(c) or c <= 0:
             raise ValueError(f"c is {c!r}; expected a positive number")
         powers = np.arange(self.coefficients.shape[1])[:, None]
-        return Trajectory(self.description, self.breaks * c, self.coefficients / float(c) ** powers)
+        return self._moved(self.breaks * c, self.coefficients / float(c) ** powers)
 
     def reversed(self) -> Trajectory:
         """Return the motion back, q(duration - t)."""
         back = self.pieces.backwards()
-        return Trajectory(self.description, back.breaks, back.coefficients)
+        return self._moved(back.breaks, back.coefficients)
+
+    def _moved(self, breaks: Array, coefficients: Array) -> Trajectory:
+        """Return another motion of the same robot, payload and friction."""
+        return replace(self, breaks=breaks, coefficients=coefficients, report=None)
 
     def then(self, other: Trajectory) -> Trajectory:
         """Return this motion with another behind it.
@@ -194,9 +232,16 @@ class Trajectory:
         DescriptionError
             The other is another robot's.
         ValueError
-            The other does not begin where this one ends, to 1e-9 rad or m; names the joint.
+            The other does not begin where this one ends, to 1e-9 rad or m; names the joint. Or it has another payload
+            or friction; see :meth:`carrying`.
         """
         other.require(self.description)
+        for what, own, theirs in (
+            ("payload", self.payload, other.payload),
+            ("friction", self.friction, other.friction),
+        ):
+            if own != theirs:
+                raise ValueError(f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it")
         end, start = self.q(self.duration), other.q(0.0)
         apart = np.flatnonzero(np.abs(end - start) > MEETS)
         if len(apart):
@@ -204,7 +249,7 @@ class Trajectory:
             name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])
             here, there = (joint_words(x, slides=slides, digits=9) for x in (end[i], start[i]))
             raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
-        return Trajectory(self.description, *joined(self.pieces, other.pieces))
+        return self._moved(*joined(self.pieces, other.pieces))
 
     @classmethod
     def from_samples(
@@ -294,6 +339,7 @@ class Trajectory:
             return NotImplemented
         return (
             self.matches(other.description)
+            and (self.payload, self.friction) == (other.payload, other.friction)
             and np.array_equal(self.breaks, other.breaks)
             and np.array_equal(self.coefficients, other.coefficients)
         )
@@ -302,11 +348,19 @@ class Trajectory:
         return hash((self.n, self.coefficients.shape, self.duration))
 
     def __reduce__(self) -> tuple[type[Trajectory], tuple[Any, ...]]:
-        return Trajectory, (self.description, self.breaks, self.coefficients, self.report)
+        return Trajectory, (
+            self.description,
+            self.breaks,
+            self.coefficients,
+            self.report,
+            self.payload,
+            self.friction,
+        )
 
     def __repr__(self) -> str:
         pieces, powers = self.coefficients.shape[:2]
+        load = "" if self.payload is None else f", carrying {self.payload.mass:.4g} kg"
         return (
             f"<Trajectory of {self.description.name}: {self.duration:.4g} s, {pieces} "
-            f"{'piece' if pieces == 1 else 'pieces'} of degree {powers - 1}>"
+            f"{'piece' if pieces == 1 else 'pieces'} of degree {powers - 1}{load}>"
         )

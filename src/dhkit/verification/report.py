@@ -6,8 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dhkit.display import html_block, html_lines, html_table, repr_line
+
 __all__ = ["Agreement", "VerificationReport", "printable"]
 
+MOST_SHOWN = 20
+"""Quantities that a notebook shows: all of an arm's own report."""
 MEASURE = (
     "Errors are largest differences of an entry at one state: of positions and linear Jacobians over the arm's reach "
     "(1 m at least), of rotations as they are, of all else over the reference's largest entry, or where that is small "
@@ -49,6 +53,10 @@ class Agreement:
         """The state in words, six digits."""
         named = (("q", self.q), ("qd", self.qd), ("qdd", self.qdd))
         return ", ".join(f"{name} = {[float(f'{x:.6g}') for x in vector]}" for name, vector in named if vector)
+
+    def __repr__(self) -> str:
+        verdict, most = "agrees" if self.ok else "DISAGREES", f"{self.tolerance:.0e}"
+        return repr_line("Agreement", self.quantity, f"{verdict}, error {self.error:.1e} of at most {most}")
 
 
 @dataclass(frozen=True)
@@ -92,6 +100,26 @@ class VerificationReport:
             figures = f"{agreement.error:8.1e}  of at most {agreement.tolerance:.0e}"
             lines.append(f"  {agreement.quantity:{width}}  {figures}  {verdict}")
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+    def __repr__(self) -> str:
+        wrong = [agreement.quantity for agreement in self.agreements if not agreement.ok]
+        said = f"DISAGREES in {', '.join(wrong)}" if wrong else f"{len(self.agreements)} quantities agree"
+        return repr_line("VerificationReport", self.robot, f"{said}, {self.samples} states")
+
+    def _repr_html_(self) -> str:
+        # Those that disagree first: a table shows so many.
+        worst = sorted(self.agreements, key=lambda agreement: agreement.ok)
+        rows = [
+            (
+                one.quantity,
+                f"{one.error:.1e}",
+                f"{one.tolerance:.0e}",
+                "agrees" if one.ok else f"DISAGREES at {one.state}",
+            )
+            for one in worst
+        ]
+        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=MOST_SHOWN)
+        return html_block(self._title, table, html_lines(self.notes))
 
     @property
     def _title(self) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
 __all__ = ["Motion", "random_motions", "random_states"]
@@ -22,6 +23,9 @@ class Motion(NamedTuple):
     q: Array
     qd: Array
     qdd: Array
+
+    def __repr__(self) -> str:
+        return repr_line("Motion", counted(len(self.q), "state"), counted(self.q.shape[-1], "joint"))
 
 
 @takes_robot

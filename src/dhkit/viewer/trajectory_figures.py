@@ -125,7 +125,7 @@ def _samples(trajectory: Trajectory) -> Samples:
     q, qd, qdd = (
         np.where(left, value(times, "left"), value(times)) for value in (trajectory.q, trajectory.qd, trajectory.qdd)
     )
-    return Samples(trajectory.description, times, q, qd, qdd)
+    return Samples(trajectory.description, times, q, qd, qdd, trajectory.payload, trajectory.friction)
 
 
 def _panels(trajectory: Trajectory, samples: Samples) -> list[Panel]:

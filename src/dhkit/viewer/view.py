@@ -16,6 +16,7 @@ from dhkit.description import Description
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
 from dhkit.description.robot import Robot, description_of
+from dhkit.display import repr_line
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
 from dhkit.viewer.motion import Motion, played_motion
@@ -452,6 +453,11 @@ class View:
         if widget is None:
             return {"text/html": framed_page(page, self._description.name), "text/plain": repr(self)}
         return widget._repr_mimebundle_(include=include, exclude=exclude)
+
+    def __repr__(self) -> str:
+        # Without the token: a notebook that is passed on would show it.
+        where = "closed" if self._closed else "no server yet" if self._server is None else f"port {self._server.port}"
+        return repr_line("View", self._description.name, where)
 
     def _snapshot(self) -> Snapshot:
         with self._lock:

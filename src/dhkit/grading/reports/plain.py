@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dhkit import display
+
 __all__ = ["plain", "points"]
 
 MOST = 4000
@@ -9,10 +11,8 @@ MOST = 4000
 
 
 def plain(text: str, most: int = MOST) -> str:
-    """Return text as one line of printable characters: no escapes, no controls, nothing that turns its direction."""
-    line = " ".join(text[: 2 * most].split())
-    line = "".join(character if character.isprintable() else "?" for character in line)
-    return line if len(line) <= most and len(text) <= 2 * most else f"{line[: most - 1]}…"
+    """Return text as one line of printable characters; see :func:`dhkit.display.plain`."""
+    return display.plain(text, most)
 
 
 def points(number: float) -> str:

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from dhkit.description import Description
 from dhkit.description.robot import takes_robot
+from dhkit.display import LONGEST_LINE, plain
 from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
 from dhkit.kinematics.closed_form.family import Family, Fit
@@ -59,7 +60,7 @@ class Classification:
         return self.words
 
     def __repr__(self) -> str:
-        return self.words
+        return plain(self.words, LONGEST_LINE)
 
 
 @takes_robot

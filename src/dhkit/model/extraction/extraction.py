@@ -30,7 +30,9 @@ from dhkit.description import (
     Tool,
     world_to_frames,
 )
+from dhkit.description.table import DHTable
 from dhkit.description.validation import MAX_JOINTS
+from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
 from dhkit.expressions import ZERO, Expression, exact
 from dhkit.model.extraction import numbers
@@ -87,6 +89,17 @@ class Extraction:
     notes: tuple[str, ...]
     changes: tuple[str, ...]
     decimals: int | None
+
+    def __repr__(self) -> str:
+        said = f"{self.description.kinds}, {self.description.convention.value} DH, off by {self.residual.largest:.1e}"
+        return repr_line("Extraction", self.description.name, said)
+
+    def _repr_html_(self) -> str:
+        kept = "as computed" if self.decimals is None else f"rounded to {self.decimals} decimals"
+        facts = [("residual", str(self.residual)), ("numbers", kept)]
+        lines = html_lines([*self.changes, *self.notes])
+        title = f"{self.description.name} from a URDF"
+        return html_block(title, html_table((), facts), DHTable.of(self.description)._repr_html_(), lines)
 
 
 def extract_dh(

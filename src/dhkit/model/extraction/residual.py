@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
+from dhkit.display import value_line
 from dhkit.errors import ModelError
 from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_model
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
@@ -53,6 +54,9 @@ class Residual:
         if self.mass_matrix is not None and self.gravity is not None:
             parts += [f"M {self.mass_matrix:.1e}", f"g {self.gravity:.1e}"]
         return f"{', '.join(parts)} over {self.states} random states"
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 class Original:

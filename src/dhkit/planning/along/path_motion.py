@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dhkit.description import Description
+from dhkit.description import Description, Payload
 from dhkit.description.robot import takes_robot
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_kept, require_path
@@ -17,9 +17,9 @@ from dhkit.planning.costs import cost_of
 from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
 from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import ProgressCall
-from dhkit.planning.wish import checked_limits, positive_seconds
+from dhkit.planning.wish import checked_limits
 from dhkit.trajectories import JointPath, Limits, Trajectory
-from dhkit.trajectories.timing import default_limits
+from dhkit.trajectories.timing import check_duration, default_limits
 
 __all__ = ["along_path"]
 
@@ -39,6 +39,7 @@ def along_path(
     intervals: int = 200,
     time_limit: float = 10.0,
     progress: ProgressCall | None = None,
+    payload: Payload | None = None,
 ) -> Trajectory:
     """Return the best motion along a path, from rest to rest; it stays on the path exactly.
 
@@ -66,6 +67,8 @@ def along_path(
         For all solutions together, s.
     progress
         Called once an iteration.
+    payload
+        What the tool carries.
 
     Returns
     -------
@@ -103,15 +106,16 @@ def along_path(
     wanted = Objective.of(objective)
     _require_objective(wanted, duration)
     limits = checked_limits(description, limits or default_limits(description))
-    require_path(description, path, limits)
-    task = TimingTask.of(description, path, wanted, duration, limits, tuple(constraints), intervals)
+    loaded = description if payload is None else payload.carried(description)
+    require_path(loaded, path, limits)
+    task = TimingTask.of(loaded, path, wanted, duration, limits, tuple(constraints), intervals)
     require_kept(task)
     building = time.perf_counter()
     for step in task.steps:
         _ = step.program
     built = time.perf_counter() - building
     found, *before = solved(task, began + time_limit, progress)
-    cost = cost_of(wanted, found.trajectory, description)
+    cost = cost_of(wanted, found.trajectory, loaded)
     report = PlanReport(
         objective=str(wanted),
         cost=cost,
@@ -125,12 +129,13 @@ def along_path(
         solve_seconds=time.perf_counter() - began - built,
         slow_down=found.slow_down,
         tightened=found.tightened,
+        unlimited=limits.unlimited,
     )
-    return replace(found.trajectory, report=report)
+    return replace(found.trajectory, description=description, report=report, payload=payload)
 
 
 def _require_objective(objective: Objective, duration: float | None) -> None:
-    positive_seconds("duration", duration)
+    check_duration(duration)
     if not all(isinstance(term, Time | Effort) for term in objective.terms):
         raise ValueError(f"objective is {objective}; expected time and effort along a path")
     if not objective.has_time and duration is None:

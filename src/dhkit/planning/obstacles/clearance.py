@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, repr_line
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import checked_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
@@ -37,6 +38,12 @@ class Distances:
     """Shape (..., K), m: the smallest distance from each obstacle, in the order given."""
     itself: Array
     """Shape (...), m: the smallest distance between two links; inf if it was not asked for."""
+
+    def __repr__(self) -> str:
+        if self.pair is None:
+            return repr_line("Distances", counted(self.distance.size, "state"), "nothing to check")
+        least = f"least {np.nanmin(self.distance):.4g} m, {self.pair[0]} and {self.pair[1]}"
+        return repr_line("Distances", counted(self.distance.size, "state"), least)
 
 
 @takes_robot

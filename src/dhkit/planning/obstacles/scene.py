@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Box, Capsule, Sphere, check_pose
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
+from dhkit.display import listed, repr_line, value_line
 from dhkit.expressions import exact
 
 __all__ = ["Floor", "Obstacle", "Scene", "Solid", "check_obstacles"]
@@ -126,6 +127,10 @@ class Obstacle:
         T_world_obstacle[:3, 3] = (first + last) / 2
         return cls._placed(Capsule(exact(r), exact(length)), T_world_obstacle, name)
 
+    def __repr__(self) -> str:
+        kind = type(self.geometry).__name__.lower()
+        return repr_line(f"Obstacle {self.name[:60]}", said=f"{kind} about {listed(self.centre)} m")
+
     @classmethod
     def _placed(cls, geometry: Solid, T_world_obstacle: Array, name: str) -> Obstacle:
         if not name:
@@ -182,6 +187,9 @@ class Floor:
         height = number_array(self.height, "floor: height", "()")
         if height.shape != () or not np.isfinite(height):
             raise ValueError(f"floor: height is {self.height!r}; expected a finite number, m")
+
+    def __repr__(self) -> str:
+        return value_line(self)
 
 
 Scene: TypeAlias = Sequence[Obstacle | Floor]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Box
-from dhkit.description.frames import number_array
+from dhkit.description.arrays import number_array
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 
 __all__ = ["BOX", "CAPSULE", "FLOOR", "ITSELF", "SceneSlots"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from dhkit.display import repr_line
 from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, about_z, plus, times
 
 if TYPE_CHECKING:
@@ -110,6 +111,10 @@ class Moments:
             self.xz + (x * rest[2] + z * h[0]),
             self.yz + (y * rest[2] + z * h[1]),
         )
+
+    def __repr__(self) -> str:
+        numbers = all(isinstance(entry, int | float | Fraction) for entry in self.entries)
+        return repr_line("Moments", said=f"mass {float(self.mass):.4g} kg" if numbers else "of symbols")
 
 
 def regrouped(links: Iterable[Moments], rows: Sequence[JointRow]) -> tuple[Moments, list[Moments]]:

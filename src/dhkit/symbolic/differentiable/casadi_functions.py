@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dhkit.description import Description
 from dhkit.description.robot import Robot, description_of
+from dhkit.display import repr_line
 from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
 from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleration
@@ -223,7 +224,7 @@ class CasadiFunctions:
     def __repr__(self) -> str:
         layers = [str(self._friction)] if self._friction is not None else []
         layers += ["payload"] * self._payload + ["wrench"] * self._wrench
-        return f"<CasADi functions of {self._description.name}{': ' if layers else ''}{', '.join(layers)}>"
+        return repr_line("CasADi functions", self._description.name, ", ".join(layers))
 
 
 def _function(name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]) -> casadi.Function:

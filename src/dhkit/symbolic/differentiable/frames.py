@@ -11,6 +11,7 @@ import numpy as np
 from dhkit.description import Array, Convention, Description
 from dhkit.description.frames import carrying
 from dhkit.description.robot import takes_robot
+from dhkit.display import counted, repr_line
 
 if TYPE_CHECKING:
     import casadi
@@ -57,6 +58,9 @@ class SymbolicTable:
         symbols = casadi.SX.sym("parameter", int(np.sum(~np.isin(numbers, FOLDED))))
         waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
         return cls._filled(description, [x if x in FOLDED else next(waiting) for x in numbers.tolist()]), symbols
+
+    def __repr__(self) -> str:
+        return repr_line("SymbolicTable", counted(self.n, "joint"), f"{self.convention.value} DH")
 
     @classmethod
     def _filled(cls, description: Description, entries: Sequence[Entry]) -> SymbolicTable:

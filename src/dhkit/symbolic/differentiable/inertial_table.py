@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention, Description, require_bodies
+from dhkit.display import counted, repr_line
 from dhkit.symbolic.differentiable.bodies import Moments, regrouped
 from dhkit.symbolic.differentiable.frames import FOLDED
 from dhkit.symbolic.differentiable.joint_frames import JointRow, joint_rows
@@ -61,6 +62,9 @@ class InertialTable:
         waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
         entries = [x if fold else next(waiting) for x, fold in zip(numbers[0].tolist(), folded, strict=True)]
         return cls._filled(descriptions[0], entries), symbols
+
+    def __repr__(self) -> str:
+        return repr_line("InertialTable", counted(self.n, "joint"))
 
     @classmethod
     def _filled(cls, description: Description, entries: Sequence[Scalar]) -> InertialTable:

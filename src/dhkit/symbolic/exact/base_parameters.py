@@ -18,6 +18,7 @@ import numpy as np
 
 from dhkit.description import Description, Named
 from dhkit.description.robot import takes_robot
+from dhkit.display import MOST_ROWS, counted, html_table, repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.composite import RigidBody, Step
@@ -30,6 +31,8 @@ __all__ = ["BaseParameters", "base_parameters"]
 
 SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
+READABLE, LONGEST_DEFINITION = 30, 200
+"""Terms and characters of a definition that a notebook shows."""
 MAX_TERMS = 60_000
 """Terms of M in all inertial parameters: three times a Jaco's, a minute on sympy's rings."""
 
@@ -65,7 +68,16 @@ class BaseParameters:
         return len(self.definitions)
 
     def __repr__(self) -> str:
-        return f"<BaseParameters of {self.full.description.name}: {', '.join(self.names)}>"
+        return repr_line("BaseParameters", f"{self.full.description.name}, {len(self)}", ", ".join(self.names))
+
+    def _repr_html_(self) -> str:
+        shown = {name: self.definitions[name] for name in self.names[:MOST_ROWS]}
+        rows = [
+            (name, str(element) if len(element) <= READABLE else counted(len(element), "term"))
+            for name, element in shown.items()
+        ]
+        caption = f"Base parameters of {self.full.description.name}"
+        return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=LONGEST_DEFINITION)
 
     def prove(self) -> Proof:
         """Decide whether the equations in base parameters are the full ones, by putting the definitions in.

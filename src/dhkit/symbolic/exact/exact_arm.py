@@ -18,6 +18,7 @@ from dhkit.description import (
     joint_array,
     require_bodies,
 )
+from dhkit.display import counted, repr_line
 from dhkit.expressions import ZERO, Expression, exact_angle
 from dhkit.symbolic.exact.naming import BodyNumbers, LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
@@ -161,6 +162,10 @@ class ExactArm:
         for k, element in enumerate(listed):
             numbers[..., k] = element.value(values[element.ring])
         return numbers.reshape((*batch, *shape))
+
+    def __repr__(self) -> str:
+        said = f"{counted(self.n, 'joint')}, {', '.join(self.ring.constants) or 'in numbers'}"
+        return repr_line("ExactArm", self.description.name, said)
 
 
 @lru_cache(maxsize=32)

@@ -13,19 +13,19 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
 from dhkit.description.robot import takes_robot
+from dhkit.display import repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
 from dhkit.symbolic.ring import Element, Elements, RingError
+from dhkit.symbolic.ring.elements import READABLE
 from dhkit.symbolic.textbook import TextbookDerivation, derive
 
 __all__ = ["Lagrangian", "Proof", "lagrangian"]
 
 _HALF = Fraction(1, 2)
-_SHOWN = 200
-"""Terms of a mass matrix that is shown unasked."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +47,7 @@ class Proof:
         return all(element.is_zero for element in self.difference.flat)
 
     def __repr__(self) -> str:
-        return f"<Proof: {self}>"
+        return repr_line("Proof", said=f"{'proved' if self else 'NOT TRUE'}: {self.statement}")
 
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:
@@ -230,15 +230,15 @@ class Lagrangian:
 
     def __str__(self) -> str:
         size = sum(len(element) for element in self.M.flat)
-        if size <= _SHOWN:
+        if size <= READABLE:
             return self.text()
         return f"{self.description.name}: M qdd + C qd + g = tau, M of {size} terms; .text(('g',)) prints a part"
 
     def __repr__(self) -> str:
-        return f"<Lagrangian of {self.description.name}: {', '.join(self.arm.ring.constants[:12]) or 'in numbers'}>"
+        return repr_line("Lagrangian", self.description.name, ", ".join(self.arm.ring.constants) or "in numbers")
 
     def _repr_latex_(self) -> str | None:
-        return self.latex() if sum(len(element) for element in self.M.flat) <= _SHOWN else None
+        return self.latex() if sum(len(element) for element in self.M.flat) <= READABLE else None
 
     # Proofs
 

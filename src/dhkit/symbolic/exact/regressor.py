@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dhkit.display import repr_line
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof
 from dhkit.symbolic.ring import Elements, RingError
 
@@ -32,7 +33,7 @@ class Regressor:
     Y: Elements
 
     def __repr__(self) -> str:
-        return f"<Regressor of {self.lagrangian.description.name}: {' x '.join(map(str, self.Y.shape))}>"
+        return repr_line("Regressor", self.lagrangian.description.name, " x ".join(map(str, self.Y.shape)))
 
     @property
     def theta(self) -> Elements:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
+from dhkit.display import counted, repr_line
+
 if TYPE_CHECKING:
     import casadi
 
@@ -177,6 +179,10 @@ class Graph:
     def renamed(self, name: str) -> Graph:
         """Return the same program under another name."""
         return replace(self, name=name)
+
+    def __repr__(self) -> str:
+        inputs, outputs = (", ".join(variable.name for variable in x) for x in (self.inputs, self.outputs))
+        return repr_line(f"Graph {self.name}", said=f"{counted(len(self.nodes), 'node')}, ({inputs}) -> ({outputs})")
 
 
 class _Builder:

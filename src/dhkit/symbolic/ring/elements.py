@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.display import LONGEST_LINE, plain, repr_line
 from dhkit.errors import DhkitError
 from dhkit.expressions import exact
 from dhkit.symbolic.ring.polynomials import Monomial
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Element", "Elements", "RingError", "Scalar", "element_array", "translated"]
 
+READABLE = 200
+"""Terms that are shown unasked."""
 MAX_TERMS = 300_000
 """Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
 TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
@@ -160,12 +163,14 @@ class Element:
         return plain_text(self)
 
     def __repr__(self) -> str:
-        return f"Element({self})"
+        if len(self) > READABLE:
+            return repr_line("Element", f"{len(self)} terms")
+        return f"Element({plain(str(self), LONGEST_LINE - len('Element()'))})"
 
-    def _repr_latex_(self) -> str:
+    def _repr_latex_(self) -> str | None:
         from dhkit.symbolic.equations import latex_text
 
-        return f"${latex_text(self)}$"
+        return f"${latex_text(self)}$" if len(self) <= READABLE else None
 
     # Calculus
 

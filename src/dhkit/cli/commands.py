@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, cast
+from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperGroup
@@ -21,7 +21,10 @@ from dhkit.description.files import check_place
 from dhkit.description.joint_words import DEGREES
 from dhkit.errors import DescriptionError, DhkitError
 
-__all__ = ["main"]
+__all__ = ["run"]
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 """Click's base of usage errors: newer typers carry a click of their own, which ``import click`` is not."""
@@ -63,11 +66,26 @@ def _degrees(text: str) -> Any:
 
 
 Degrees = Annotated[bool, _degrees("Angles in and out are in degrees.")]
+Uniform = Annotated[
+    bool, typer.Option("--uniform-links", help="Thin uniform rods of 1 kg each for links, in place of their bodies.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
-def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command and exit with its status."""
+def _arm(robot: str, uniform: bool) -> Arm:
+    """Return a robot by name or file, perhaps with rods for links."""
+    arm = Arm.load(robot)
+    return arm.with_uniform_links() if uniform else arm
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit status.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Somebody pressed Ctrl-C.
+    """
     accept_every_letter()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
     logging.getLogger("dhkit").setLevel(logging.INFO)  # says what takes seconds, such as compiling
@@ -75,25 +93,27 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
     except (DhkitError, ValueError) as error:
-        _fail(str(error))
+        return _refused(str(error))
     except UsageError as error:
         message: str = error.format_message()  # type: ignore[attr-defined]
         if type(error).__name__ == "NoArgsIsHelpError":
             sys.stderr.write(f"{message}\n")
-            sys.exit(2)
-        _fail(message)
+            return 2
+        return _refused(message)
     except OSError as error:
-        _fail(f"{error.filename or 'output'}: {error.strerror or error}")
-    except (typer.Abort, KeyboardInterrupt):
-        _fail("interrupted", status=130)
+        return _refused(f"{error.filename or 'output'}: {error.strerror or error}")
+    except typer.Abort:
+        raise KeyboardInterrupt from None
     finally:
         DEGREES.reset(degrees)
-    sys.exit(status if isinstance(status, int) else 0)
+    if status == INTERRUPTED:  # which some versions of typer make of Ctrl-C
+        raise KeyboardInterrupt
+    return status if isinstance(status, int) else 0
 
 
-def _fail(message: str, status: int = 2) -> NoReturn:
+def _refused(message: str) -> int:
     sys.stderr.write(f"dhkit: {' '.join(message.split())}\n")
-    sys.exit(status)
+    return 2
 
 
 def _version(wanted: bool) -> None:
@@ -143,10 +163,11 @@ def build(
     mesh_prefix: Annotated[
         str | None, typer.Option(help="What it names its meshes by, as package://my_robot/meshes/; meshes/.")
     ] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> None:
     """Write a robot's URDF, with its meshes beside it."""
-    arm = Arm.load(robot)
+    arm = _arm(robot, uniform)
     path = output or Path(f"{arm.name}.urdf")
     if path.suffix == ".toml":
         raise DescriptionError(f"{path}: a URDF would overwrite a robot file; expected another name")
@@ -313,6 +334,7 @@ def plan(
     ] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> int:
     """Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.
@@ -321,7 +343,7 @@ def plan(
     """
     from dhkit.cli import plan as plan_command
 
-    arm = Arm.load(robot)
+    arm = _arm(robot, uniform)
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
     if sum(given is not None for given in (to, *pose.values())) != 1:
         raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
@@ -367,7 +389,11 @@ Rate = Annotated[float, typer.Option(help="Calls of the controller, Hz.")]
 PlantRate = Annotated[float | None, typer.Option(help="Steps of the integration, Hz; those of the controller.")]
 Load = Annotated[
     str | None,
-    typer.Option("--payload", metavar="KG [@ X Y Z]", help="What it carries, centre of mass in the tool's frame, m."),
+    typer.Option(
+        "--payload",
+        metavar="KG [@ X Y Z]",
+        help="What it carries, centre of mass in the tool's frame, m; what the motion was planned with unless given.",
+    ),
 ]
 Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller does not know of the payload.")]
 FrictionOption = Annotated[
@@ -414,6 +440,7 @@ def simulate(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> int:
     """Simulate an arm under a controller; exit status 1 where the run does not get to its end."""
@@ -421,9 +448,10 @@ def simulate(
     from dhkit.cli import simulation_task as asked
     from dhkit.control import Sensors
 
-    arm, plant = asked.moving_arm(Arm.load(robot), load, unmodelled)
+    bare = _arm(robot, uniform)
     sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
-    followed, named = asked.chosen_motion(arm, motion, start, to, duration, degrees, columns)
+    followed, named = asked.chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = asked.moving_arm(bare, payload(load) or followed.payload, unmodelled)
     task = asked.Task(
         arm=arm,
         plant=plant,
@@ -466,6 +494,7 @@ def compare(
     push: PushOption = None,
     degrees: Annotated[bool, _degrees("Angles in are in degrees.")] = False,
     figure: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> int:
     """Compare controllers on one motion; exit status 1 where one does not get to its end."""
@@ -473,8 +502,9 @@ def compare(
     from dhkit.cli import simulation_task as asked
     from dhkit.control import CONTROLLERS
 
-    arm, plant = asked.moving_arm(Arm.load(robot), load, unmodelled)
-    followed, named = asked.chosen_motion(arm, motion, start, to, duration, degrees, columns)
+    bare = _arm(robot, uniform)
+    followed, named = asked.chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = asked.moving_arm(bare, payload(load) or followed.payload, unmodelled)
     task = asked.Task(
         arm=arm,
         plant=plant,
@@ -585,6 +615,7 @@ def verify(
     tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the end of the only chain.")] = None,
     tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> int:
     """Hold our kinematics and dynamics against Pinocchio's; exit status 1 where they disagree.
@@ -594,7 +625,7 @@ def verify(
     from dhkit.cli import verify as verify_command
 
     return verify_command.run(
-        Arm.load(robot),
+        _arm(robot, uniform),
         samples,
         seed,
         urdf=urdf,
@@ -669,12 +700,15 @@ def equations(
         bool, typer.Option("--base-parameters", help="The fewest inertial parameters, and what they stand for.")
     ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
+    uniform: Uniform = False,
     json: Json = False,
 ) -> None:
     """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."""
     from dhkit.cli import equations as equations_command
 
-    equations_command.run(Arm.load(robot), what=what, form=form, symbols=symbols, base=base, output=output, json=json)
+    equations_command.run(
+        _arm(robot, uniform), what=what, form=form, symbols=symbols, base=base, output=output, json=json
+    )
 
 
 @app.command()

@@ -1,0 +1,86 @@
+"""A load in the tool, as a value: what a motion is planned with and what its torques carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dhkit.description.arrays import number_array
+from dhkit.description.changes import with_payload
+from dhkit.description.numbers import Array
+from dhkit.description.robot import Description
+from dhkit.description.values import INERTIA_PLACES
+from dhkit.display import value_line
+from dhkit.errors import DescriptionError
+
+__all__ = ["Payload"]
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A rigid load that the tool carries.
+
+    Raises
+    ------
+    DescriptionError
+        Other shapes, numbers that are not finite, or a negative mass.
+    TypeError
+        Not numbers.
+
+    Examples
+    --------
+    >>> Payload(2, com=(0, 0, 0.05))
+    Payload(mass=2.0, com=(0.0, 0.0, 0.05), inertia=None)
+    """
+
+    mass: float
+    """kg."""
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Centre of mass in the tool's frame, m."""
+    inertia: tuple[tuple[float, ...], ...] | None = None
+    """Shape (3, 3), about the centre of mass in the tool's axes, kg m^2; None: a point."""
+
+    def __post_init__(self) -> None:
+        tensor = np.zeros((3, 3)) if self.inertia is None else self.inertia
+        for name, value, shape in (("mass", self.mass, ()), ("com", self.com, (3,)), ("inertia", tensor, (3, 3))):
+            array = number_array(value, f"payload: {name}", str(shape))
+            if array.shape != shape:
+                raise DescriptionError(f"payload: {name} has shape {array.shape}; expected {shape}")
+            if not np.isfinite(array).all():
+                raise DescriptionError(f"payload: {name} is {value!r}; expected finite numbers")
+            listed = array.tolist()
+            kept = tuple(map(tuple, listed)) if array.ndim == 2 else tuple(listed) if array.ndim else listed
+            object.__setattr__(self, name, None if name == "inertia" and not array.any() else kept)
+        if self.mass < 0:
+            raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
+
+    def carried(self, description: Description) -> Description:
+        """Return an arm with the load joined to its last link.
+
+        Raises
+        ------
+        DescriptionError
+            A load that is none: an impossible inertia; or a last link without a body.
+        """
+        return with_payload(description, self.mass, self.com, self.inertia)
+
+    @property
+    def numbers(self) -> Array:
+        """Mass, centre of mass, and xx, yy, zz, xy, yz, xz, shape (10,)."""
+        tensor = np.zeros((3, 3)) if self.inertia is None else np.array(self.inertia)
+        return np.array([self.mass, *self.com, *(tensor[place] for place in INERTIA_PLACES.values())], dtype=float)
+
+    @classmethod
+    def of_numbers(cls, numbers: Array) -> Payload:
+        """Return the payload of :attr:`numbers`."""
+        if numbers.shape != (10,):
+            raise DescriptionError(f"payload has shape {numbers.shape}; expected (10,)")
+        tensor = np.zeros((3, 3))
+        for value, (i, j) in zip(numbers[4:], INERTIA_PLACES.values(), strict=True):
+            tensor[i, j] = tensor[j, i] = value
+        x, y, z = numbers[1:4].tolist()
+        return cls(float(numbers[0]), (x, y, z), tuple(map(tuple, tensor.tolist())))
+
+    def __repr__(self) -> str:
+        return value_line(self)
