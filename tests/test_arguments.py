@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import os
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import argument_table
 import dhkit
 from dhkit import (
     Arm,
     control,
     description,
     dynamics,
+    grading,
     kinematics,
     model,
     planning,
+    programs,
     symbolic,
     trajectories,
     verification,
@@ -97,6 +103,8 @@ def test_what_is_no_robot_is_said():
         kinematics.forward_kinematics("puma560", Q)
 
 
+LINE = dhkit.pose((0, 0, 0.02))
+CENTRE = Arm.load("puma560").fk("nominal")[:3, 3] + [0, 0, 0.05]
 POSITIONS = {
     "fk": lambda arm, q: arm.fk(q),
     "frames": lambda arm, q: arm.frames(q),
@@ -121,6 +129,27 @@ POSITIONS = {
     "trapezoidal": lambda arm, q: arm.trapezoidal(q, np.zeros(6), 2.0).q(0.4),
     "simulate": lambda arm, q: arm.simulate(q0=q, duration=0.01).q,
     "frames of the description": lambda arm, q: description.world_to_frames(arm, q),
+    "link transforms": lambda arm, q: description.link_transforms(arm, q),
+    "within_limits": lambda arm, q: arm.ik(arm.fk("ready")).within_limits(q),
+    "nearest": lambda arm, q: arm.ik(arm.fk("ready")).nearest(q),
+    "require": lambda arm, q: arm.ik(arm.fk("ready")).require(q),
+    "ik_chunks": lambda arm, q: next(arm.ik_chunks(arm.fk("ready")[None], seed=q))[1].q,
+    "spline": lambda arm, q: arm.spline([q, "ready"]).q(0.2),
+    "straight_line": lambda arm, q: arm.straight_line(arm.fk("nominal"), LINE @ arm.fk("nominal"), q).q(0.1),
+    "circle": lambda arm, q: arm.circle(arm.fk("nominal"), CENTRE, [1, 0, 0], 0.3, q0=q).q(0.1),
+    "joint path": lambda arm, q: dhkit.JointPath.straight(arm.description, q, np.zeros(6)).q(0.5),
+    "plan": lambda arm, q: arm.plan(q, "ready", intervals=12, compare=False).q(0.1),
+    "plan via": lambda arm, q: arm.plan("zero", "ready", via=[q], intervals=12, compare=False).q(0.3),
+    "compare": lambda arm, q: arm.compare(arm.quintic(q, "ready", 1.0), ("pid",), q0=q, duration=0.01).results["pid"].q,
+    "simulate_batch": lambda arm, q: arm.simulate_batch(q0=q, duration=0.01, friction=False).peak_error,
+    "hold": lambda arm, q: arm.simulate(reference=q, duration=0.01).q,
+    "LQR": lambda arm, q: dhkit.LQR(arm, q).K,
+    "PID.tuned": lambda arm, q: dhkit.PID.tuned(arm, q=q).kp,
+    "ToolPoses": lambda arm, q: dhkit.ToolPoses(
+        arm, [arm.fk("nominal"), LINE @ arm.fk("nominal")], [0, 1], q0=q
+    ).sampled(np.array([0.5]))[0],
+    "ellipsoid": lambda arm, q: kinematics.velocity_ellipsoid(arm, q).axes,
+    "regressor": lambda arm, q: dynamics.regressor(arm, q, np.ones(6), np.ones(6)),
 }
 
 
@@ -169,6 +198,46 @@ def test_a_method_has_the_options_and_defaults_of_its_function(method, function)
     for name, option in options.items():
         if option.kind is option.KEYWORD_ONLY and name not in ("plant", "compare"):
             assert own[name].default == option.default, name
+
+
+def test_no_public_function_takes_a_thing_otherwise_than_the_others():
+    odd = {row.name: row.odd for row in argument_table.rows() if row.odd}
+    assert odd == {}
+
+
+def test_the_table_of_arguments_is_that_of_the_signatures():
+    """To bring it up to date: DHKIT_WRITE_TABLES=1 pytest tests/test_arguments.py."""
+    path = Path(__file__).parent.parent / "docs" / "arguments.md"
+    if os.environ.get("DHKIT_WRITE_TABLES"):
+        path.write_text(argument_table.table(), "utf-8")
+    assert path.read_text("utf-8") == argument_table.table()
+
+
+@pytest.mark.parametrize("path", [str, Path])
+def test_files_are_named_by_text_or_path(path, tmp_path):
+    arm = Arm.load("planar2r")
+    file = path(tmp_path / "arm.toml")
+    arm.save(file)
+    assert Arm.load(file) == arm
+    motion = arm.quintic([0, 0], [1, 1], 1.0)
+    assert trajectories.Trajectory.load(motion.save(path(tmp_path / "motion.npz")), arm) == motion
+    (tmp_path / "rubric.toml").write_text("points = 10")
+    assert grading.Rubric.read(path(tmp_path / "rubric.toml")).points == 10
+    (tmp_path / "masses.csv").write_text("link, mass [kg]\n1, 2\n2, 3\n")
+    with suppress(dhkit.ModelError):  # what is in it is not the question here
+        model.read_mass_report(path(tmp_path / "masses.csv"))
+    (tmp_path / "mine.py").write_text("def fk(q):\n    return q\n")
+    assert programs.Program(path(tmp_path / "mine.py")).name == "mine.py"
+    (tmp_path / "answer.toml").write_text('format = 1\n[answer]\ng2 = "m2*g*l2*c12/2"\n')
+    for robot in (arm, arm.description):
+        assert grading.grade(path(tmp_path / "answer.toml"), robot).verdict.value == "incomplete"
+
+
+def test_batches_take_arms_too():
+    arm = Arm.load("planar2r")
+    heavy = arm.with_payload(1.0)
+    both = control.simulate_batch(arm, arms=[arm, heavy], duration=0.02, friction=False)
+    assert both.arms == (arm.description, heavy.description)
 
 
 def test_a_rubric_decides_how_many_digits_count():

@@ -81,7 +81,7 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
         (lambda arm: forward_kinematics(arm, 1.0), ValueError, r"q has shape \(\)"),
         (lambda arm: forward_kinematics(arm, "raedy"), ValueError, "no configuration 'raedy'"),
         (lambda arm: forward_kinematics(arm, [[1, 2], [3]]), TypeError, "expected numbers"),
-        (lambda arm: forward_kinematics(arm, ["1"] * 6), TypeError, "expected numbers"),
+        (lambda arm: forward_kinematics(arm, ["1"] * 6), ValueError, "no configuration '1'"),
         (lambda arm: forward_kinematics(arm, np.zeros(6) + 1j), TypeError, "expected numbers"),
         (lambda arm: forward_kinematics(arm, [None] * 6), TypeError, "expected numbers"),
         (lambda arm: forward_kinematics(arm, np.zeros(6), out=[1]), ValueError, "out is list"),

@@ -206,5 +206,5 @@ def test_the_workspace_command_says_where(capsys, tmp_path):
             assert all(f"{kind}: {words}" in out for kind, words in found.words.items())
             continue
         told = json.loads(out)["singularities"]
-        assert told["elbow"] == {"joint": 3, "values": list(found.values["elbow"]), "words": found.words["elbow"]}
+        assert told["elbow"] == {"joint": 3, "values_rad": list(found.values["elbow"]), "words": found.words["elbow"]}
         assert told["shoulder"]["joint"] is None

@@ -213,6 +213,8 @@ def reference_of(
         raise TypeError(f"reference is the class {reference.__name__}; expected an object of it")
     if isinstance(reference, Reference):
         return reference
+    if isinstance(reference, str):
+        return Held(joint_vector(description, reference, "reference"))
     array = number_array(reference, "reference", f"a motion, ({description.n},) or (4, 4)")
     if array.shape == (4, 4):
         near = None if q0 is None else joint_vector(description, q0, "q0")

@@ -30,7 +30,7 @@ Frames = TypeVar("Frames", Array, list[Any])
 
 
 def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
-    """Return an array of joint values, shape (..., n); where they are positions, ``q`` may name a configuration.
+    """Return an array of joint values, shape (..., n); positions may be given by names of configurations, or in a list.
 
     Raises
     ------
@@ -41,6 +41,12 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
     """
     if isinstance(q, str) and not name.startswith(RATES):
         return configuration(description, q, name)
+    if isinstance(q, (list, tuple)) and any(isinstance(row, str) for row in q):
+        rows = [joint_array(description, row, name) for row in q]
+        if any(row.shape != rows[0].shape for row in rows):
+            shapes = ", ".join(str(row.shape) for row in rows)
+            raise ValueError(f"{name} has rows of shapes {shapes}; expected equal ones")
+        return np.stack(rows)
     array = number_array(q, name, "(..., n)")
     if array.ndim == 0 or array.shape[-1] != description.n:
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")

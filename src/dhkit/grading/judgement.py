@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dhkit.description import Description, library_robot, read_robot, robots
-from dhkit.description.robot import Robot, takes_robot
+from dhkit.description.robot import Robot, description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of

@@ -38,7 +38,6 @@ def collect(
     branches, met
         As of :class:`dhkit.kinematics.IKSolutions`.
     """
-    numbers = description.numbers
     valid = np.asarray(~np.isnan(q).any(axis=-1))
     found = valid.any(axis=-1)
     status = np.where(posed, np.where(found, IKStatus.ok, IKStatus.out_of_reach), IKStatus.not_a_pose)
@@ -50,9 +49,7 @@ def collect(
         distance=np.where(posed, np.where(found, 0.0, distance), np.nan),
         branches=branches,
         met=met,
-        lower=numbers.lower,
-        upper=numbers.upper,
-        prismatic=numbers.prismatic,
+        description=description,
     )
 
 

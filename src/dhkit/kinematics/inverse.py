@@ -87,7 +87,6 @@ def inverse_kinematics(
             status.reshape(count, 1),
         ]
         solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
-    numbers = description.numbers
     return IKSolutions(
         q=q,
         valid=valid.view(np.bool_),
@@ -96,9 +95,7 @@ def inverse_kinematics(
         distance=distance,
         branches=fit.branches,
         met=fit.met,
-        lower=numbers.lower,
-        upper=numbers.upper,
-        prismatic=numbers.prismatic,
+        description=description,
     )
 
 

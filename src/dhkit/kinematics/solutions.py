@@ -10,8 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array
-from dhkit.description.arrays import number_array
+from dhkit.description import Array, Description, joint_array
 from dhkit.display import MOST_ROWS, counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 
@@ -71,11 +70,23 @@ class IKSolutions:
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
     """Which coordinates of a pose the arm meets: all six, or fewer for arms of fewer freedoms."""
-    lower: Array
-    """The joints' limits, shape (n,), rad and m; infinite where there are none."""
-    upper: Array
-    prismatic: NDArray[np.bool_]
-    """Which joints slide, shape (n,)."""
+    description: Description
+    """The robot."""
+
+    @property
+    def lower(self) -> Array:
+        """The joints' lower limits, shape (n,), rad and m; -inf where there are none."""
+        return self.description.numbers.lower
+
+    @property
+    def upper(self) -> Array:
+        """The joints' upper limits, shape (n,), rad and m; inf where there are none."""
+        return self.description.numbers.upper
+
+    @property
+    def prismatic(self) -> NDArray[np.bool_]:
+        """Which joints slide, shape (n,)."""
+        return self.description.numbers.prismatic
 
     @property
     def status(self) -> NDArray[np.str_]:
@@ -263,7 +274,7 @@ class IKSolutions:
         if q is None:
             limited = np.isfinite(self.lower) & np.isfinite(self.upper)
             q = (np.where(limited, self.lower, 0.0) + np.where(limited, self.upper, 0.0)) / 2
-        near = number_array(q, "joint values", "(..., n)")
+        near = joint_array(self.description, q, "joint values")
         expected = (*self.distance.shape, self.q.shape[-1])
         if near.shape[-1:] == expected[-1:] and near.ndim <= len(expected):
             with contextlib.suppress(ValueError):

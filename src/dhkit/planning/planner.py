@@ -204,8 +204,8 @@ class Planner:
             if not isinstance(warm, Trajectory):
                 raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
             warm.require(description)
-        if isinstance(via, str) or np.ndim(via[0] if len(via) else [[]]) == 0:
-            via = [via]
+        if isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0):
+            via = [via]  # one place alone
         check_duration(duration)
         names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
         places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
