@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import os
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -67,6 +68,8 @@ def test_every_function_of_a_description_takes_an_arm():
 
 
 Q = [0.3, 0.4]
+MOTION = Path(tempfile.mkdtemp()) / "motion.npz"
+Arm.load("planar2r").quintic([0, 0], [1, 1], 1.0).save(MOTION)
 CALLS = {
     "fk": lambda arm: kinematics.forward_kinematics(arm, Q),
     "ik": lambda arm: kinematics.inverse_kinematics(arm, arm.fk(Q)).q,
@@ -88,6 +91,14 @@ CALLS = {
     "urdf": model.urdf_text,
     "pinocchio": lambda arm: model.pinocchio_model(arm).nq,
     "joint array": lambda arm: description.joint_array(arm, Q),
+    "Limits.of": lambda arm: trajectories.Limits.of(arm).velocity,
+    "DHTable.of": lambda arm: str(description.DHTable.of(arm)),
+    "symbolic table": lambda arm: repr(symbolic.SymbolicTable.of(arm)),
+    "moving plant": lambda arm: Arm.load("planar2r").simulate(plant=arm, duration=0.01).q,
+    "plants": lambda arm: Arm.load("planar2r").simulate_batch(plant=[arm], duration=0.01).peak_error,
+    "replace": lambda arm: View(Arm.load("puma560")).replace(arm, [0.1, 0.2]) or 0,
+    "read_motion": lambda arm: trajectories.read_motion(MOTION, arm).duration,
+    "lab": lambda arm: dhkit.lab.Lab(arm).desk.arm.name,
 }
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from numpy.typing import ArrayLike
 
 from dhkit import description as describe
-from dhkit.description import Array, Description, DHTable, Named
+from dhkit.description import Array, Description, DHTable, Named, Robot
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
@@ -506,7 +506,7 @@ class Arm:
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
         rate: float | None = 1000.0,
-        plant: Arm | None = None,
+        plant: Robot = None,
         plant_rate: float | None = None,
         *,
         friction: bool | Friction = False,
@@ -535,7 +535,12 @@ class Arm:
         from dhkit.control import Plant, simulate
         from dhkit.dynamics import Friction
 
-        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, _listed(pushes))
+        moved = Plant(
+            describe.description_of(self if plant is None else plant),
+            Friction.chosen(friction),
+            restitution,
+            _listed(pushes),
+        )
         return simulate(
             self._description,
             controller,
@@ -560,7 +565,7 @@ class Arm:
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
         rate: float = 1000.0,
-        plant: Arm | Sequence[Arm] | None = None,
+        plant: Robot | Sequence[Robot] = None,
         plant_rate: float | None = None,
         *,
         friction: bool | Friction | None = None,
@@ -583,7 +588,7 @@ class Arm:
         """
         from dhkit.control import simulate_batch
 
-        arms = () if plant is None else [plant] if isinstance(plant, Arm) else plant
+        arms = () if plant is None else plant if isinstance(plant, (list, tuple)) else [plant]
         return simulate_batch(
             self._description,
             controller,
@@ -592,7 +597,7 @@ class Arm:
             q0,
             qd0,
             rate,
-            [arm.description for arm in arms],
+            [describe.description_of(arm) for arm in arms],
             plant_rate,
             friction=friction,
             keep=keep,
@@ -608,7 +613,7 @@ class Arm:
         controllers: Sequence[str] | Mapping[str, Any] | None = None,
         bandwidth: float = 20.0,
         damping: float = 1.0,
-        plant: Arm | None = None,
+        plant: Robot = None,
         *,
         friction: bool | Friction = False,
         restitution: float | None = 0.0,
@@ -634,7 +639,12 @@ class Arm:
         from dhkit.control import CONTROLLERS, Plant, compare
         from dhkit.dynamics import Friction
 
-        moved = Plant((plant or self).description, Friction.chosen(friction), restitution, _listed(pushes))
+        moved = Plant(
+            describe.description_of(self if plant is None else plant),
+            Friction.chosen(friction),
+            restitution,
+            _listed(pushes),
+        )
         chosen = tuple(CONTROLLERS) if controllers is None else controllers
         return compare(
             self._description,

@@ -141,3 +141,34 @@ def test_what_is_not_limited_is_said():
     motion = arm.plan([0, 0], [1, 1], limits=slow, intervals=24)
     assert motion.report.unlimited == ("acceleration of joint 2",)
     assert "not limited: acceleration of joint 2" in str(motion.report)
+
+
+SHELL = f"'{sys.executable}' -m dhkit"
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "words"),
+    [
+        ("fk puma560 nominal >&-", 0, ""),
+        ("fk puma560 99 0 0 0 0 0 2>&-", 0, "tool "),
+        ("fk puma560 99 0 0 0 0 0 2>/dev/full", 0, "tool "),
+        ("fk puma560 nowhere 2>/dev/full", 2, ""),
+        ("equations planar2r -o /dev/full", 2, ""),
+    ],
+)
+def test_streams_that_take_nothing_lose_nothing_else(command, status, words):
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"{SHELL} {command}"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == status
+    assert words in done.stdout
+    assert "Traceback" not in done.stderr
+    if "equations" in command:
+        assert done.stderr == "dhkit: /dev/full: No space left on device\n"
+
+
+@pytest.mark.parametrize("command", ["robots", "robots --json", "info puma560"])
+def test_a_reader_that_goes_away_is_no_answer_of_no(command):
+    first = subprocess.Popen([sys.executable, "-m", "dhkit", *command.split()], stdout=subprocess.PIPE)
+    first.stdout.close()
+    assert first.wait(60) == 141

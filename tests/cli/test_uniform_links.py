@@ -34,6 +34,10 @@ def test_rods_stand_in_for_bodies(command, robot, capsys):
     if command.startswith("plan"):
         rods = Arm.load(robot).with_uniform_links()
         assert Trajectory.load(f"{robot}.npz", rods).matches(rods.description)
+        for shown in (["play", str(robot), f"{robot}.npz", "--html", f"{robot}.html"],):
+            with pytest.raises(SystemExit) as ended:
+                main([*shown, "--uniform-links"])
+            assert ended.value.code == 0
     if command.startswith("equations"):
         assert "M22 = m2/75" in capsys.readouterr().out
 

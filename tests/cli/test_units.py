@@ -127,3 +127,19 @@ def test_a_table_in_degrees_that_is_read_as_radians_is_noticed():
     assert not Arm.from_dh([(0, 0, 0.4, 0)], limits=[(-6.3, 6.3)]).description.warnings
     assert not Arm.from_dh([(0, 0, 0.4, 0)], kinds="P", limits=[(-90, 90)]).description.warnings
     assert "are angles in degrees?" in Arm.from_dh(rows)._repr_html_()
+
+
+@pytest.mark.parametrize("value", ["90deg", "90*deg", "pi/2", "90°"])
+def test_units_beside_degrees_are_refused(dhkit, value):
+    status, _, err = dhkit("fk", "planar2r", value, "0", "--degrees")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "expected bare numbers, which are degrees with --degrees" in err
+
+
+def test_comparisons_and_the_names_of_motions_are_in_degrees(dhkit):
+    words = ("compare", "planar2r", "--from", "zero", "--controllers", "pd", "--duration", "1")
+    degrees, radians = (dhkit(*words, "--to", *to)[1] for to in (("20", "20", "--degrees"), ("0.349066", "0.349066")))
+    assert "to (20°, 20°)" in degrees and "largest error [°]" in degrees
+    assert "to (0.3491 rad, 0.3491 rad)" in radians and "largest error [rad]" in radians
+    errors = [float(text.split("\npd")[1].split()[0]) for text in (degrees, radians)]
+    assert errors[0] == pytest.approx(np.degrees(errors[1]), rel=0.1)

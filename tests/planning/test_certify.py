@@ -71,3 +71,78 @@ def test_a_motion_keeps_its_payload_and_friction(tmp_path):
     assert np.abs(bare.tau(0.1) - again.tau(0.1)).max() > 0.1
     with pytest.raises(ValueError, match="payload is None and then Payload"):
         bare.then(again.reversed())
+
+
+def roots_between_states(count=24):
+    """Return coefficients of a joint's value whose rate vanishes at so many even times, and is 3 between them."""
+    polynomial = np.polynomial.polynomial
+    rate = polynomial.polyfromroots(np.linspace(0, 1, count))
+    s = np.linspace(0, 1, 20_001)
+    return polynomial.polyint(rate) * 3 / np.abs(polynomial.polyval(s, rate)).max()
+
+
+def motion_of(*columns):
+    coefficients = np.zeros((1, max(map(len, columns)), 2))
+    for i, column in enumerate(columns):
+        coefficients[0, : len(column), i] = column
+    return Trajectory(ARM.description, [0, 1], coefficients)
+
+
+ARM = Arm.load("planar2r")
+FREE = {"torque": np.inf, "velocity": np.inf, "acceleration": np.inf}
+NOT_KEPT = {
+    "jumps of acceleration where jerk is limited": (
+        ARM.trapezoidal([0, 0], [0.5, 0.5]),
+        Limits.of(ARM.description, jerk=0.01),
+        "jump of acceleration",
+    ),
+    "jerk inside an interval": (
+        motion_of([0, 0, 0, 0, 60 / 24, -60 / 60]),
+        Limits.of(ARM.description, jerk=1.0, **FREE),
+        "jerk",
+    ),
+    "an upper limit alone": (
+        ARM.quintic([0, 0], [2, 0.5], duration=5),
+        Limits.of(ARM.description, lower=-np.inf, upper=0.1),
+        "position",
+    ),
+    "a rate between states": (
+        motion_of(roots_between_states()),
+        Limits.of(ARM.description, velocity=1.0, torque=np.inf),
+        "velocity",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NOT_KEPT)
+def test_what_is_not_kept_is_seen(name):
+    motion, limits, what = NOT_KEPT[name]
+    certificate = ARM.certify(motion, limits)
+    assert not certificate.ok
+    assert what in [check.what for check in certificate.checks if check.excess > 0]
+
+
+def test_planned_motions_with_limited_jerk_stay_certified():
+    limits = Limits.of(ARM.description, jerk=200, acceleration=20)
+    motion = ARM.plan([0, 0], [1, 1], limits=limits, intervals=24, compare=False)
+    assert ARM.certify(motion, limits).ok
+
+
+def test_arguments_are_checked():
+    motion = ARM.quintic([0, 0], [1, 1])
+    one = Arm.from_dh([(0, 0, 0.5, 0)], kinds="R", name="one")
+    with pytest.raises(ValueError, match="limits are of 1 joints; expected 2"):
+        ARM.certify(motion, Limits.of(one))
+    for wrong in ((None,), ("m.npz",), (motion, {"velocity": 1}), (motion, None, None, 2.0)):
+        with pytest.raises(TypeError, match="expected"):
+            ARM.certify(*wrong)
+
+
+def test_a_table_read_as_samples_keeps_its_payload(tmp_path):
+    motion = ARM.quintic("zero", "ready", duration=0.35).carrying(dhkit.Payload(6.0))
+    text = motion.save(tmp_path / "loaded.csv").read_text()
+    for changed in (text, f"\n{text}", text.replace("# dhkit", "#  DHkit"), text.replace("# payload:", "#payload :")):
+        (tmp_path / "changed.csv").write_text(changed)
+        again = Trajectory.read(tmp_path / "changed.csv", ARM)
+        assert again.payload == motion.payload
+        assert not ARM.certify(again).ok

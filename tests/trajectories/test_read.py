@@ -168,7 +168,7 @@ def test_what_is_wrong_with_a_table_is_named(text, complaint, tmp_path):
         ("    sec: 1\n", "", r"points\[1\].time_from_start: expected sec and nanosec"),
         ("    sec: 1\n    nanosec: 500000000\n", "    sec: 0\n    nanosec: 0\n", r"times do not increase"),
         ("  velocities: []\n", "  velocities: [1, 2]\n", r"points\[1\]: expected positions, and velocities .* as in"),
-        ("points:", "pionts:", r"no joint_names and points in it"),
+        ("points:", "pionts:", r"unknown key 'pionts'; expected header, joint_names, points"),
         ("    sec: 0\n", "    sec: &a 0\n", r"line 3: found 'sec: &a 0'; expected a number or a name"),
         ("    sec: 0\n", "   sec: 0\n", r"line 4: found 'nanosec: 0'; expected"),
         ("    sec: 0\n", "\tsec: 0\n", r"line 3: .*expected"),

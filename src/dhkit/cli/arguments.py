@@ -35,6 +35,8 @@ __all__ = [
 
 LARGEST = 10_000
 """Bytes of a file with a matrix at most."""
+UNIT = re.compile(r"deg|°|\bpi\b", re.IGNORECASE)
+"""Of an angle, in an expression."""
 PLUS = re.compile(r"(?<![\d.][eE])\+")
 """Between two terms, not in 1e+4."""
 
@@ -88,6 +90,8 @@ def joint_values(
         raise DescriptionError(f"no such option: {typo}")
     if len(listed) != arm.n:
         raise DescriptionError(f"{len(listed)} {what}; expected {arm.n} for {arm.name}")
+    if degrees and (found := next((word for word in listed if UNIT.search(word)), None)):
+        raise DescriptionError(f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees")
     values = numbers(listed, what, [arm.n])
     values = np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
     return _told(arm, values, what, outside)

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from dhkit import __version__
 from dhkit.arm import Arm
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
-from dhkit.cli.output import print_json, say
+from dhkit.cli.output import ReaderGone, print_json, say
 from dhkit.cli.streams import accept_every_letter
 from dhkit.description.files import check_place
 from dhkit.description.joint_words import DEGREES
@@ -23,6 +23,8 @@ from dhkit.errors import DescriptionError, DhkitError
 
 __all__ = ["run"]
 
+GONE = 141
+"""Exit status where whoever read the output went away, as shells have it."""
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as shells have it."""
 
@@ -100,6 +102,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
             sys.stderr.write(f"{message}\n")
             return 2
         return _refused(message)
+    except ReaderGone:
+        return GONE
     except OSError as error:
         return _refused(f"{error.filename or 'output'}: {error.strerror or error}")
     except typer.Abort:
@@ -434,8 +438,12 @@ def simulate(
     restitution: Restitution = 0.0,
     no_stops: NoStops = False,
     push: PushOption = None,
-    noise: Annotated[float, typer.Option(min=0, help="Standard deviation of measured joint values, rad and m.")] = 0.0,
-    resolution: Annotated[float, typer.Option(min=0, help="Of the encoders, on the joints' side, rad and m.")] = 0.0,
+    noise: Annotated[
+        float, typer.Option(min=0, help="Standard deviation of measured joint values, rad and m; rad always.")
+    ] = 0.0,
+    resolution: Annotated[
+        float, typer.Option(min=0, help="Of the encoders, on the joints' side, rad and m; rad always.")
+    ] = 0.0,
     degrees: Degrees = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
@@ -492,7 +500,7 @@ def compare(
     restitution: Restitution = 0.0,
     no_stops: NoStops = False,
     push: PushOption = None,
-    degrees: Annotated[bool, _degrees("Angles in are in degrees.")] = False,
+    degrees: Degrees = False,
     figure: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
     uniform: Uniform = False,
     json: Json = False,
@@ -531,11 +539,12 @@ def play(
     html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
     columns: Columns = None,
     degrees: Annotated[bool, _degrees("Samples from elsewhere have degrees.")] = False,
+    uniform: Uniform = False,
 ) -> int:
     """Play a motion or a simulation in the browser, or write a page of it."""
     from dhkit.cli import play as play_command
 
-    return play_command.run(Arm.load(robot), file, html, degrees=degrees, names=columns)
+    return play_command.run(_arm(robot, uniform), file, html, degrees=degrees, names=columns)
 
 
 @app.command(cls=gathering({"--at": None}))
@@ -551,13 +560,14 @@ def picture(
     rate: Annotated[float, typer.Option(min=1, max=50, help="Pictures a second of a GIF.")] = 15.0,
     frames: Annotated[bool, typer.Option("--frames", help="Draw the DH frames.")] = False,
     degrees: Annotated[bool, _degrees("Angles are in degrees.")] = False,
+    uniform: Uniform = False,
 ) -> int:
     """Write a picture of an arm, or of a motion: PNG files or a GIF; no browser is needed."""
     from dhkit.cli import picture as picture_command
 
     words = None if at is None else [at]
     return picture_command.run(
-        Arm.load(robot),
+        _arm(robot, uniform),
         output,
         at=words,
         motion=motion,

@@ -45,16 +45,16 @@ def run(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
         facts = {name: facts_of(task.arm, result, degrees=degrees) for name, result in compared.results.items()}
         print_json({"robot": task.arm.name, "controllers": facts, "failures": dict(compared.failures)})
     else:
-        _print(task, compared)
+        _print(task, compared, degrees=degrees)
         if figure is not None and compared.results:
             say(f"\nwrote {figure}")
     return 1 if compared.failures else 0
 
 
-def _print(task: Task, compared: Comparison) -> None:
+def _print(task: Task, compared: Comparison, *, degrees: bool) -> None:
     say(f"{task.arm.name}: {task.about}, {task.rate}, {task.bandwidth:g} rad/s", "bold")
     say("")
-    headings, rows = compared.rows()
+    headings, rows = compared.rows(degrees=degrees)
     print_table(headings, rows)
     for name, reason in compared.failures.items():
         say(f"\n{name}: {reason}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
@@ -12,16 +13,31 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-__all__ = ["finite", "print_json", "print_table", "say"]
+__all__ = ["ReaderGone", "finite", "print_json", "print_table", "say"]
 
 PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables then do not break."""
 
 
+class ReaderGone(Exception):  # noqa: N818 - no error: whoever read had enough
+    """The output goes to a pipe that nobody reads any more."""
+
+
+class _Output(Console):
+    def on_broken_pipe(self) -> None:
+        raise _gone()
+
+
+def _gone() -> ReaderGone:
+    """Return what ends the command; what is written from now on goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return ReaderGone()
+
+
 def console() -> Console:
     """Return a console on today's stdout, as wide as the terminal."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
-    return Console(width=width, highlight=False, soft_wrap=True)
+    return _Output(width=width, highlight=False, soft_wrap=True)
 
 
 def say(text: str, style: str = "") -> None:
@@ -32,7 +48,11 @@ def say(text: str, style: str = "") -> None:
 def print_json(value: Any, indent: int | None = None) -> None:
     """Print a value as one JSON document; NaN and infinities are null."""
     plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text
-    sys.stdout.write(json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent) + "\n")
+    try:
+        sys.stdout.write(json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent) + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise _gone() from None
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:

@@ -14,6 +14,7 @@ from dhkit.cli.arguments import columns, joint_values, numbers
 from dhkit.cli.quickest import ends
 from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, make_controller
 from dhkit.description import Array, Payload
+from dhkit.description.joint_words import joint_words
 from dhkit.dynamics import Friction
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, read_motion
@@ -106,7 +107,7 @@ def chosen_motion(
         raise DescriptionError("--from and --to are the same; expected two configurations")
     if duration is None:
         duration = max(SHORTEST, 2 * arm.quintic(here, there).duration) if _has_limits(arm) else SHORTEST
-    words = f"quintic from {start or _name_of(arm, here)} to {goal or _name_of(arm, there)}"
+    words = f"quintic from {_name_of(arm, here)} to {_name_of(arm, there)}"
     return arm.quintic(here, there, duration), words
 
 
@@ -114,7 +115,8 @@ def _name_of(arm: Arm, q: Array) -> str:
     """Return a configuration's name, or its values."""
     known = {"zero": np.zeros(arm.n)} | dict(arm.configurations)
     found = next((name for name, values in known.items() if np.array_equal(values, q)), None)
-    return found or "(" + ", ".join(f"{round(float(x), 3) + 0.0:g}" for x in q) + ")"
+    slides = arm.description.numbers.prismatic.tolist()
+    return found or "(" + ", ".join(joint_words(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
 
 
 def _has_limits(arm: Arm) -> bool:

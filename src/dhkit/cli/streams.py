@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import codecs
+import contextlib
 import io
+import os
 import sys
 import unicodedata
+from pathlib import Path
+from typing import Any, TextIO, cast
 
 __all__ = ["accept_every_letter"]
 
@@ -16,9 +20,33 @@ PLAIN = dict(zip("→←↑↓−–≤≥·…′", ("->", "<-", "^", "v", "-",
 def accept_every_letter() -> None:
     """Have stdout and stderr replace letters that their encoding lacks, as cp1252 lacks theta, in place of failing."""
     codecs.register_error("dhkit.plain", _replaced)
+    if sys.stdout is None:  # closed by the shell
+        sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - to the end
+    if sys.stderr is None:
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="dhkit.plain")
+    sys.stderr = cast(TextIO, _Forgiving(sys.stderr))
+
+
+class _Forgiving:
+    """A stream for messages: where they cannot be written, nothing else is lost."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with contextlib.suppress(OSError):
+            self._stream.flush()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:

@@ -86,11 +86,17 @@ class Comparison:
     failures: Mapping[str, str]
     """Why the others did not."""
 
-    def rows(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return the headings and the rows of the table: errors of the joint that errs most, the tool's, torques."""
-        unit = self._unit
+    def rows(self, *, degrees: bool = False) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return the headings and the rows of the table: errors of the joint that errs most, the tool's, torques.
+
+        Parameters
+        ----------
+        degrees
+            Whether errors of angles are in degrees.
+        """
+        unit = self._unit.replace("rad", "°") if degrees else self._unit
         headings = ("controller", f"largest error [{unit}]", "RMS", "at the end", "tool's largest [mm]", "torque [%]")
-        return headings, [(name, *_row(result)) for name, result in self.results.items()]
+        return headings, [(name, *_row(result, degrees)) for name, result in self.results.items()]
 
     def table(self, style: str = "text") -> str:
         """Return the table as ``text``, ``markdown`` or ``latex``; torques are shares of the drives' limits.
@@ -142,10 +148,11 @@ class Comparison:
         return joint_unit([] if first is None else first.description.numbers.prismatic)
 
 
-def _row(result: SimulationResult) -> tuple[str, ...]:
+def _row(result: SimulationResult, degrees: bool) -> tuple[str, ...]:
+    scale = np.where(result.description.numbers.prismatic | (not degrees), 1.0, 180 / np.pi)
     effort = result.description.numbers.effort
     share = 100 * float((np.abs(result.tau).max(axis=0) / effort).max())
-    errors = (result.peak_error.max(), result.rms_error.max(), np.abs(result.final_error).max())
+    errors = [float((scale * np.abs(x)).max()) for x in (result.peak_error, result.rms_error, result.final_error)]
     tool = 1000 * result.tool_norms.peak
     torque = f"{share:.0f}" if np.isfinite(effort).any() else "no limit"
     return (*(f"{error:.2g}" for error in errors), f"{tool:.0f}" if tool >= LARGE else f"{tool:.2g}", torque)

@@ -18,6 +18,8 @@ def number_array(value: ArrayLike, name: str, shape: str) -> NDArray[np.float64]
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name}: found a masked array; expected numbers, shape {shape}")
     try:
         array = np.asarray(value)
     except ValueError:  # rows of different lengths

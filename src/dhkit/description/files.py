@@ -45,6 +45,8 @@ def check_place(path: Path) -> None:
     DescriptionError
         A folder of the path is a file, or the nearest one that exists cannot be written to.
     """
+    if path.is_dir():
+        raise DescriptionError(f"{path}: is a folder; expected a file's name")
     above = path.absolute().parent
     try:
         while not above.exists():
@@ -76,8 +78,12 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     path.parent.mkdir(parents=True, exist_ok=True)
     if not private:
         if path.absolute().parts[1:2] in (("dev",), ("proc",)) or (path.exists() and not path.is_file()):
-            with _opened(path) as stream:
-                stream.write(data)
+            try:
+                with _opened(path) as stream:
+                    stream.write(data)
+            except OSError as error:
+                error.filename = str(path)
+                raise
             return
         path = path.resolve()
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

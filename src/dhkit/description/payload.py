@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description.arrays import number_array
-from dhkit.description.changes import with_payload
+from dhkit.description.changes import SYMMETRIC, with_payload
 from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
 from dhkit.description.values import INERTIA_PLACES
@@ -49,6 +49,8 @@ class Payload:
                 raise DescriptionError(f"payload: {name} has shape {array.shape}; expected {shape}")
             if not np.isfinite(array).all():
                 raise DescriptionError(f"payload: {name} is {value!r}; expected finite numbers")
+            if shape == (3, 3) and np.abs(array - array.T).max() > SYMMETRIC * np.abs(array).max():
+                raise DescriptionError("payload: inertia is not symmetric")
             listed = array.tolist()
             kept = tuple(map(tuple, listed)) if array.ndim == 2 else tuple(listed) if array.ndim else listed
             object.__setattr__(self, name, None if name == "inertia" and not array.any() else kept)

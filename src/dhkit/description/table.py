@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 from dhkit.description.named import Named
 from dhkit.description.parameters import check_parameter_name
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, Robot, description_of
 from dhkit.description.values import INERTIA_PLACES, Body, Convention, Inertia, Joint, JointType, Units
 from dhkit.display import counted, html_table, repr_line
 from dhkit.errors import DescriptionError, ExpressionError
@@ -215,8 +215,9 @@ class DHTable:
     latex_rows: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def of(cls, description: Description) -> DHTable:
-        """Read a description's table, in the units of its file."""
+    def of(cls, description: Robot) -> DHTable:
+        """Read a robot's table, in the units of its file."""
+        description = description_of(description)
         # An expression is in metres, and then so is the whole table.
         symbolic = any(joint.a.symbols or joint.d.symbols for joint in description.joints)
         units = Units() if symbolic else description.units

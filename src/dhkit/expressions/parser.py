@@ -86,7 +86,7 @@ def _named(text: str, names: Collection[str]) -> Expression:
         return CONSTANTS[text]
     close = difflib.get_close_matches(text, [*names, *CONSTANTS], n=1)
     hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join([*names, *CONSTANTS][:12])}"
-    raise ExpressionError(f"unknown name {text!r}; {hint}")
+    raise ExpressionError(f"unknown name {text[:80]!r}; {hint}")
 
 
 def _power(base: Expression, exponent: Expression) -> Expression:

@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from dhkit.arm import Arm
+from dhkit.description import Robot, description_of
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
@@ -71,7 +72,7 @@ class Lab:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: Robot,
         port: int = 0,
         token: str | None = None,
         own: str | Path | Sequence[str] | None = None,
@@ -79,6 +80,7 @@ class Lab:
         solid: str | Path | None = None,
         assignment: Assignment | None = None,
     ) -> None:
+        arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
         if assignment is not None:
             assignment.require(arm)
         self._lock = threading.RLock()

@@ -10,8 +10,7 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
-from dhkit.arm import Arm
-from dhkit.description import write_atomically
+from dhkit.description import Robot, write_atomically
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
@@ -25,7 +24,7 @@ LONGEST_TOKEN = 100
 
 
 def serve(
-    arm: Arm,
+    arm: Robot,
     *,
     block: bool = True,
     port: int | None = None,

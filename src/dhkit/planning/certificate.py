@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,8 @@ __all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker", "certify", "po
 
 POINTS = 24
 """States an interval, both its ends included: more than anybody will ask for."""
+SPREAD = 4
+"""States an interval for each coefficient of its polynomials: extremes of those of high degree lie close together."""
 ACCEPTED = 5e-7
 """By what share of a limit a certified motion may exceed it: half of what is promised."""
 ACTIVE = 0.99
@@ -67,6 +70,14 @@ class Certificate:
     def ok(self) -> bool:
         """Whether all limits are kept, up to half a millionth."""
         return self.violation <= ACCEPTED
+
+    def worsened(self, checks: Sequence[Check]) -> Certificate:
+        """Return the same with other checks of the same limits, where those are worse."""
+        by_name = {check.what: check for check in self.checks}
+        for check in checks:
+            if check.what not in by_name or check.excess > by_name[check.what].excess:
+                by_name[check.what] = check
+        return replace(self, checks=tuple(by_name.values()))
 
     @property
     def worst(self) -> Check | None:
@@ -133,11 +144,21 @@ def certify(
     >>> certify(arm, quintic(arm, [0, 0], [1.0, 0.5])).ok
     True
     """
+    if not isinstance(motion, Trajectory):
+        raise TypeError(f"motion is {type(motion).__name__}; expected a Trajectory")
+    for name, value, kind in (("limits", limits, Limits), ("payload", payload, Payload)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} is {type(value).__name__}; expected {kind.__name__}(...)")
     motion.require(description)
+    limits = limits or default_limits(description)
+    if limits.velocity.shape != (description.n,):
+        raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {description.n}")
     carried = motion.payload if payload is None else payload
     loaded = description if carried is None else carried.carried(description)
     chosen = motion.friction if friction is None else Friction.chosen(friction)
-    return Checker(loaded, limits or default_limits(description), friction=chosen).check(motion)
+    points = max(POINTS, SPREAD * motion.coefficients.shape[1])
+    certificate = Checker(loaded, limits, friction=chosen, points=points).check(motion)
+    return certificate.worsened(_extremes(motion, limits, points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +217,7 @@ class Checker:
         """
         lower, upper = self.limits.lower, self.limits.upper
         size = position_sizes(self.limits)
-        if not np.isfinite(upper - lower).any():
+        if not (np.isfinite(lower) | np.isfinite(upper)).any():
             return np.full(states.q.shape, -np.inf)
         with np.errstate(invalid="ignore"):
             excess = np.stack([(lower - states.q) / size, (states.q - upper) / size])
@@ -215,9 +236,7 @@ class Checker:
         if np.isfinite(excess).any():
             checks.append(_check("position", excess, states.times))
         if np.isfinite(self.limits.jerk).any():
-            jerk = np.abs(_jerks(trajectory)) / self.limits.jerk
-            k, i = np.unravel_index(int(np.argmax(jerk)), jerk.shape)
-            checks.append(Check("jerk", float(jerk[k, i] - 1), int(i), float(trajectory.breaks[k // 2])))
+            checks.append(_largest_jerk(trajectory, self.limits.jerk))
         for what, use in self.peaks(states):
             checks.append(_check(what, use - 1, states.times))
             reached = use >= ACTIVE
@@ -280,12 +299,14 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     inner = trajectory.breaks[1:-1]
     if not len(inner):
         return None
-    found = []
+    found: list[Check] = []
     speeds = np.abs(trajectory.qd(trajectory.breaks)).max(axis=0)
     fastest = np.where(np.isfinite(limits.velocity), limits.velocity, np.maximum(speeds, 1e-3))
+    largest = max(float(np.abs(trajectory.qdd(trajectory.breaks)).max()), 1e-3)
     for what, values, size in (
         ("jump of position", trajectory.q, position_sizes(limits)),
         ("jump of velocity", trajectory.qd, fastest),
+        ("jump of acceleration", trajectory.qdd, np.where(np.isfinite(limits.jerk), largest, np.inf)),
     ):
         jumps = np.abs(values(inner, "right") - values(inner, "left")) / size
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
@@ -294,11 +315,30 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     return worst if worst.excess > ACCEPTED else None
 
 
-def _jerks(trajectory: Trajectory) -> Array:
-    """Return the jerks at both ends of every interval, shape (2 K, n)."""
-    breaks = trajectory.breaks
-    ends = [trajectory.jerk(breaks[:-1], "right"), trajectory.jerk(breaks[1:], "left")]
-    return np.stack(ends, axis=1).reshape(-1, trajectory.n)
+def _largest_jerk(trajectory: Trajectory, limit: Array) -> Check:
+    """Return where a motion's jerk uses most of its limit: at an end of an interval, or inside one of high degree."""
+    pieces = trajectory.pieces.differentiated(3)
+    degree = pieces.coefficients.shape[1] - 1
+    t, values = pieces.inside(2) if degree < 2 else pieces.turning(SPREAD * (degree + 1))
+    use = np.abs(values) / limit
+    k, p, i = np.unravel_index(int(np.argmax(use)), use.shape)
+    return Check("jerk", float(use[k, p, i] - 1), int(i), float(t[k, p] if t.ndim == 2 else t[k, p, i]))
+
+
+def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
+    """Return what positions, rates and accelerations use where they are extreme, found from so many points a piece."""
+    found = []
+    size = position_sizes(limits)
+    for order, what in enumerate(("position", "velocity", "acceleration")):
+        t, values = motion.pieces.differentiated(order).turning(points)
+        if order == 0:
+            excess = np.maximum(limits.lower - values, values - limits.upper) / size
+        else:
+            excess = np.abs(values) / getattr(limits, what) - 1
+        if np.isfinite(getattr(limits, what) if order else np.minimum(-limits.lower, limits.upper)).any():
+            k, p, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
+            found.append(Check(what, float(excess[k, p, i]), int(i), float(t[k, p, i])))
+    return found
 
 
 def _time_shares(trajectory: Trajectory, states: States) -> Array:

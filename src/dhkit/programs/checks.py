@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.description import Array
+from dhkit.description import Array, Robot, description_of
 from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.programs.caller import CLOSE, EXAMPLES, Caller
@@ -30,7 +30,7 @@ MOVED = 0.5
 
 
 def check(
-    arm: Arm,
+    arm: Robot,
     program: Program,
     rubric: CheckRubric | None = None,
     seed: int | None = None,
@@ -61,6 +61,7 @@ def check(
     DhkitError
         The arm lacks what is asked for, such as bodies for a controller.
     """
+    arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
     if not 1 <= samples <= 100_000:
         raise ValueError(f"samples is {samples}; expected 1 to 100000")
     program.start()

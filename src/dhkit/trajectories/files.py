@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dhkit.description import Array, Description, Payload, write_atomically
+from dhkit.description import Array, Description, Payload, Robot, description_of, write_atomically
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import Friction
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
-from dhkit.trajectories.ros_yaml import POINT, ROWS, TIMES, parse_message, trajectory_text
+from dhkit.trajectories.ros_yaml import MESSAGE, POINT, ROWS, TIMES, parse_message, trajectory_text
 from dhkit.trajectories.tables import check_columns, read_table, select_columns, table_text
 from dhkit.trajectories.trajectory import Trajectory
 
@@ -43,6 +44,7 @@ TRAJECTORY = FileKind(
 )
 COMMENTS_LENGTH = 2_000
 """Characters in which a table's payload and friction are searched: 11 numbers of 25 characters, and the label."""
+BESIDE = re.compile(r"^\s*#\s*(payload|friction)\s*:(.*)$", re.MULTILINE)
 FIRST_LINE = 200
 """Bytes in which the first line of a table is looked for."""
 MOST_COEFFICIENTS = 65
@@ -122,7 +124,7 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
         text = decoded(content)
         robot = TRAJECTORY.robot_of_table(text, description)
         samples = _table_samples(text, robot) if suffix == ".csv" else _message_samples(text, robot)
-        motion = replace(samples.trajectory(robot), **_carried(_commented(text)))
+        motion = samples.trajectory(robot)
         TRAJECTORY.require_unchanged(text)
         return motion
     except (DescriptionError, ValueError, TypeError) as error:
@@ -150,7 +152,7 @@ def written_by_dhkit(path: str | Path) -> str:
 
 def read_motion(
     path: str | Path,
-    description: Description,
+    description: Robot,
     *,
     degrees: bool = False,
     columns: Mapping[str, str] | None = None,
@@ -171,6 +173,7 @@ def read_motion(
     DescriptionError
         One line: what is wrong in the file.
     """
+    description = description_of(description)
     title = written_by_dhkit(path)
     if title not in ("", TRAJECTORY.title):
         raise DescriptionError(f"{path}: a {title}; expected a trajectory")
@@ -237,13 +240,15 @@ class _Read:
     """Shape (N,), s."""
     arrays: list[Array]
     """One to three, shape (N, n): values, rates, accelerations."""
+    beside: Mapping[str, Any] = field(default_factory=dict)
+    """Payload and friction."""
 
     def in_radians(self, description: Description) -> _Read:
         unit = np.where(description.numbers.prismatic, 1.0, np.pi / 180)
-        return _Read(self.times, [array * unit for array in self.arrays])
+        return replace(self, arrays=[array * unit for array in self.arrays])
 
     def trajectory(self, description: Description) -> Trajectory:
-        return Trajectory.from_samples(description, self.times, *self.arrays)
+        return replace(Trajectory.from_samples(description, self.times, *self.arrays), **self.beside)
 
 
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
@@ -293,14 +298,14 @@ def _carried(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _commented(text: str) -> dict[str, Array]:
     """Return the numbers of :func:`_beside` that a table's comments name."""
-    found = {}
-    for line in text[:COMMENTS_LENGTH].splitlines():
-        name, _, numbers = line.removeprefix("# ").partition(": ")
-        if line.startswith("# ") and name in TRAJECTORY.optional and name not in found:
-            try:
-                found[name] = np.array([float(word) for word in numbers.split()])
-            except ValueError:
-                raise DescriptionError(f"{name}: found {numbers[:40]!r}; expected numbers") from None
+    found: dict[str, Array] = {}
+    for name, numbers in BESIDE.findall(text[:COMMENTS_LENGTH]):
+        if name in found:
+            raise DescriptionError(f"{name} is there twice")
+        try:
+            found[name] = np.array([float(word) for word in numbers.split()])
+        except ValueError:
+            raise DescriptionError(f"{name}: found {numbers[:40]!r}; expected numbers") from None
     return found
 
 
@@ -352,11 +357,13 @@ def _samples(suffix: str, content: bytes, description: Description, columns: Map
 
 
 def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _Read:
-    return _Read(*select_columns(description, read_table(text), columns))
+    return _Read(*select_columns(description, read_table(text), columns), _carried(_commented(text)))
 
 
 def _message_samples(text: str, description: Description) -> _Read:
     message = parse_message(text)
+    if unknown := next((key for key in message if key not in MESSAGE), None):
+        raise DescriptionError(f"unknown key {unknown[:40]!r}; expected {', '.join(MESSAGE)}")
     names, points = message.get("joint_names"), message.get("points")
     own = [joint.name for joint in description.joints]
     if not isinstance(names, list) or not isinstance(points, list) or not points:
@@ -378,7 +385,8 @@ def _message_samples(text: str, description: Description) -> _Read:
         if rows[0] is None or (rows[1] is None and rows[2] is not None) or len(columns[-1]) != len(columns[0]):
             raise DescriptionError(f"points[{k}]: expected positions, and velocities and accelerations as in points[0]")
     arrays = np.array(columns)[:, :, order]
-    return _Read(np.array(times), [arrays[:, i] for i in range(arrays.shape[1])])
+    listed = [arrays[:, i] for i in range(arrays.shape[1])]
+    return _Read(np.array(times), listed, _carried(_commented(text)))
 
 
 def _seconds(value: Any, k: int) -> float:

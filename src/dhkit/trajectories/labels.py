@@ -115,9 +115,9 @@ class FileKind:
         return library_robot(own.name) if _in_library(own.name, own.digest) else own
 
     def labelled(self, description: Description, text: str) -> str:
-        """Return a table behind the comments that say what it is: kind, robot, digest of the lines that follow."""
-        robot = f"{description.name} {description.digest}"
-        return f"# {self.title}\n# robot: {robot}\n{CONTENT}{_digest_of_lines(text.splitlines())}\n{text}"
+        """Return a table behind the comments that say what it is: kind, robot, digest of robot and lines."""
+        robot = f"# robot: {description.name} {description.digest}"
+        return f"# {self.title}\n{robot}\n{CONTENT}{_digest_of_lines([robot, *text.splitlines()])}\n{text}"
 
     def require_unchanged(self, text: str) -> None:
         """Refuse a table whose lines are not those that were written.
@@ -130,7 +130,7 @@ class FileKind:
         lines = text.splitlines()
         if len(lines) < 3 or not lines[2].startswith(CONTENT):
             raise DescriptionError(f"no comment '{CONTENT}DIGEST' in its third line{self.otherwise}")
-        if lines[2].removeprefix(CONTENT).strip() != _digest_of_lines(lines[3:]):
+        if lines[2].removeprefix(CONTENT).strip() != _digest_of_lines([lines[1], *lines[3:]]):
             raise DescriptionError(f"changed since dhkit wrote it: its digest differs{self.otherwise}")
 
     def robot_of_table(self, text: str, description: Description | None) -> Description:
@@ -194,7 +194,7 @@ def decoded(content: bytes) -> str:
 
 def _digest_of_lines(lines: Sequence[str]) -> str:
     # Line by line: mail and version control change how lines end.
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:DIGITS]
+    return hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()[:DIGITS]
 
 
 def _in_library(name: str, digest: str) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.description.frames import one_each
 from dhkit.display import counted, html_table, repr_line
@@ -71,7 +71,7 @@ class Limits:
     @classmethod
     def of(
         cls,
-        description: Description,
+        description: Robot,
         *,
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
@@ -97,6 +97,7 @@ class Limits:
         >>> Limits.of(library_robot("planar2r"), acceleration=5).acceleration
         array([5., 5.])
         """
+        description = description_of(description)
         numbers, anything = description.numbers, np.full(description.n, np.inf)
         own = {
             "lower": numbers.lower,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ __all__ = ["Trajectory"]
 
 MEETS = 1e-9
 """rad and m: two motions whose ends are nearer to each other are joined."""
+SLOWEST = 1e12
+"""By what factor a motion may be slowed down, or its inverse: powers of larger ones leave the range of doubles."""
 MOST_SAMPLES = 1e8
 SAME_TIME = 1e-9
 """Of a sample's interval: a last sample nearer to the end than this is the end."""
@@ -210,7 +213,7 @@ class Trajectory:
         ValueError
             c is not positive and finite.
         """
-        if not np.isfinite(c) or c <= 0:
+        if not isinstance(c, Real) or not 1 / SLOWEST <= c <= SLOWEST:
             raise ValueError(f"c is {c!r}; expected a positive number")
         powers = np.arange(self.coefficients.shape[1])[:, None]
         return self._moved(self.breaks * c, self.coefficients / float(c) ** powers)

@@ -150,7 +150,7 @@ class View:
         self._q, self._played = q.copy(), None
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
-    def replace(self, description: Description, q: ArrayLike | None = None) -> None:
+    def replace(self, description: Robot, q: ArrayLike | None = None) -> None:
         """Show another arm in place of this one; what was drawn for the one before is taken away.
 
         Parameters
@@ -165,6 +165,7 @@ class View:
         ModelError
             A mesh that cannot be read.
         """
+        description = description_of(description)
         scene = self._scene(description)
         with self._lock:
             self._description = description
@@ -292,6 +293,7 @@ class View:
             Other shapes, another number of names, or colors below 0 or above 1.
         """
         states = np.zeros((0, self._description.n)) if q is None else joint_array(self._description, q)
+        states = states[None] if isinstance(q, str) else states
         if states.ndim != 2:
             raise ValueError(f"q has shape {states.shape}; expected (k, {self._description.n})")
         colors = ghost_tints(len(states)) if tints is None else color_bytes(tints, len(states), "tints")

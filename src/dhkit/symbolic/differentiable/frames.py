@@ -10,7 +10,7 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description
 from dhkit.description.frames import carrying
-from dhkit.description.robot import takes_robot
+from dhkit.description.robot import Robot, description_of, takes_robot
 from dhkit.display import counted, repr_line
 
 if TYPE_CHECKING:
@@ -45,15 +45,17 @@ class SymbolicTable:
     """The tool in frame n, likewise."""
 
     @classmethod
-    def of(cls, description: Description) -> SymbolicTable:
+    def of(cls, description: Robot) -> SymbolicTable:
         """Return the table of an arm, rounded once from its exact numbers."""
+        description = description_of(description)
         return cls._filled(description, table_numbers(description).tolist())
 
     @classmethod
-    def parametric(cls, description: Description) -> tuple[SymbolicTable, casadi.SX]:
+    def parametric(cls, description: Robot) -> tuple[SymbolicTable, casadi.SX]:
         """Return a table of symbols, and the symbols; their values are ``table_pattern(description)[1]``."""
         import casadi
 
+        description = description_of(description)
         numbers = table_numbers(description)
         symbols = casadi.SX.sym("parameter", int(np.sum(~np.isin(numbers, FOLDED))))
         waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())

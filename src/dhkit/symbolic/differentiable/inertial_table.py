@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array, Convention, Description, require_bodies
+from dhkit.description import Array, Convention, Description, Robot, description_of, require_bodies
 from dhkit.display import counted, repr_line
 from dhkit.symbolic.differentiable.bodies import Moments, regrouped
 from dhkit.symbolic.differentiable.frames import FOLDED
@@ -42,7 +42,7 @@ class InertialTable:
     """J: the potential energy of what has been regrouped to the base, zero at the world's origin."""
 
     @classmethod
-    def of(cls, description: Description) -> InertialTable:
+    def of(cls, description: Robot) -> InertialTable:
         """Return the table of an arm.
 
         Raises
@@ -50,6 +50,7 @@ class InertialTable:
         DescriptionError
             A link without a body.
         """
+        description = description_of(description)
         return cls._filled(description, _numbers(description).tolist())
 
     @classmethod
