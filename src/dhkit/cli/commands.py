@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -23,6 +24,9 @@ from dhkit.errors import DescriptionError, DhkitError
 
 __all__ = ["run"]
 
+SHOWN, LONGEST = 120, 600
+"""Characters of a word, and of a message: what was typed is echoed in it."""
+LONG_WORD = re.compile(rf"\S{{{2 * SHOWN},}}")
 GONE = 141
 """Exit status where whoever read the output went away, as shells have it."""
 INTERRUPTED = 130
@@ -116,7 +120,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refused(message: str) -> int:
-    sys.stderr.write(f"dhkit: {' '.join(message.split())}\n")
+    line = LONG_WORD.sub(lambda found: f"{found[0][:SHOWN]}…", " ".join(message.split()))
+    sys.stderr.write(f"dhkit: {line if len(line) <= LONGEST else f'{line[:LONGEST]}…'}\n")
     return 2
 
 

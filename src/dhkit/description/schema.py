@@ -250,7 +250,19 @@ class RobotForm(Form):
 
 def robot_schema() -> dict[str, Any]:
     """Return the JSON Schema of robot files, made from the definition that validates them."""
-    return titled_schema("dhkit robot file, format 1", RobotForm.model_json_schema())
+    from dhkit.description.parameters import NAME as PARAMETER
+    from dhkit.description.validation import BODY_NAME, NAME
+
+    schema = RobotForm.model_json_schema()
+    joint, body = (schema["$defs"][form]["properties"] for form in ("JointForm", "BodyForm"))
+    schema["properties"]["name"]["pattern"] = f"^{NAME.pattern}$"
+    joint["name"]["pattern"], body["name"]["pattern"] = f"^({NAME.pattern})?$", f"^({BODY_NAME.pattern})?$"
+    schema["properties"]["configurations"]["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
+    schema["properties"]["parameters"]["propertyNames"] = {"pattern": f"^{PARAMETER.pattern}$"}
+    for key in ("velocity", "effort"):
+        joint[key]["exclusiveMinimum"] = 0
+    body["mass"]["minimum"] = 0
+    return titled_schema("dhkit robot file, format 1", schema)
 
 
 def titled_schema(title: str, schema: Mapping[str, Any]) -> dict[str, Any]:

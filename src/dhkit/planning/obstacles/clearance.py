@@ -41,7 +41,8 @@ class Distances:
 
     def __repr__(self) -> str:
         if self.pair is None:
-            return repr_line("Distances", counted(self.distance.size, "state"), "nothing to check")
+            what = "nothing to check" if np.isinf(self.distance).all() else "no finite state"
+            return repr_line("Distances", counted(self.distance.size, "state"), what)
         least = f"least {np.nanmin(self.distance):.4g} m, {self.pair[0]} and {self.pair[1]}"
         return repr_line("Distances", counted(self.distance.size, "state"), least)
 
