@@ -318,24 +318,9 @@ def test_the_page_plays_the_motion_that_is_written(monkeypatch, plan, tmp_path):
     assert np.abs(played.q - motion.q(played.times)).max() < FLOAT32
 
 
-class AtOnce:
-    """A timer that does not wait."""
-
-    def __init__(self, seconds, function):
-        self.start = function
-
-    def cancel(self):
-        pass
-
-    def is_alive(self):
-        return False
-
-
-def test_a_search_that_takes_long_says_how_far_it_is(monkeypatch, plan):
+@pytest.mark.usefixtures("bar_at_once")
+def test_a_search_that_takes_long_says_how_far_it_is(plan):
     """The line is there from the start; what it said last is drawn when it ends, however fast the search was."""
-    monkeypatch.setattr("dhkit.cli.progress.threading.Timer", AtOnce)
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setenv("TERM", "xterm")
     status, _, err = plan("planar2r", "--to", "1", "0.5", "--intervals", "48")
     assert status == 0
     assert re.search(r"iteration \d+: 0\.\d+ s, limits missed by \d\.\de[-+]\d+", err)

@@ -1,7 +1,6 @@
 """`dhkit workspace`: what it says and writes."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from PIL import Image
 
 from dhkit import Arm, robots
 from dhkit.cli import main
-from dhkit.cli import workspace as command
 from dhkit.kinematics.workspace import workspace
 
 
@@ -84,12 +82,12 @@ def test_the_page_shows_the_arm_among_its_points(dhkit, tmp_path, chromium):
         page.close()
 
 
-def test_long_work_shows_how_far_it_is_to_someone_who_looks(dhkit, monkeypatch):
-    monkeypatch.setattr(command, "PATIENCE", -1.0)
-    assert dhkit("planar2r", "--samples", "100")[2] == ""  # nobody looks at a pipe
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("FORCE_COLOR", "1")
+def test_nobody_looks_at_a_pipe(dhkit):
+    assert dhkit("planar2r", "--samples", "100")[2] == ""
+
+
+@pytest.mark.usefixtures("bar_at_once")
+def test_long_work_shows_how_far_it_is_to_someone_who_looks(dhkit):
     assert "sampling" in dhkit("planar2r", "--samples", "100")[2]
 
 

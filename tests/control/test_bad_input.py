@@ -34,7 +34,7 @@ BAD = {
         lambda: run(reference=OTHER.quintic(np.zeros(6), np.full(6, 0.1), 1.0)),
         r"motion of puma560 \(6 joints\); expected one of planar2r \(2 joints\)",
     ),
-    "a reference that is a word": (lambda: run(reference="ready"), "reference"),
+    "a reference that is no configuration": (lambda: run(reference="raedy"), "reference: .* no configuration 'raedy'"),
     "a step of another arm": (
         lambda: run(reference=Step(np.zeros(6), np.ones(6))),
         r"reference's q has shape \(11, 6\)",

@@ -116,7 +116,7 @@ def test_arguments_of_the_wrong_kind_are_refused(function, arm):
         with pytest.raises(ValueError, match=r"expected \(..., 6\) for puma560"):
             function(arm, *good[:k], np.zeros(5), *good[k + 1 :])
         with pytest.raises(TypeError, match="expected numbers"):
-            function(arm, *good[:k], ["a"] * 6, *good[k + 1 :])
+            function(arm, *good[:k], [None] * 6, *good[k + 1 :])
 
 
 @every

@@ -134,7 +134,8 @@ def test_mistakes_at_two_bodies_add_up(arm):
     truth = truth_of(arm.description)
     report = arm.grade({"g": written(element_array(wrong.g), truth.arm("g"))})
     assert report.verdict is Verdict.WRONG
-    assert "height_at_joint" in str(report.diagnosis) and "gravity_sign" in str(report.diagnosis), str(report)
+    named = " ".join(str(found.mistake) for found in report.diagnosis)
+    assert "height_at_joint" in named and "gravity_sign" in named, str(report)
 
 
 def test_the_worked_solution_has_each_body(arm):
