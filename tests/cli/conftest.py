@@ -17,9 +17,9 @@ class AtOnce:
 
 
 @pytest.fixture
-def bar_at_once(capsys, monkeypatch):  # after capsys, whose stderr it is
+def bar_at_once(monkeypatch):
     """Show the progress bar from the start, as to somebody who looks at a terminal."""
     monkeypatch.setattr("dhkit.cli.progress.threading.Timer", AtOnce)
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("_pytest.capture.CaptureIO.isatty", lambda stream: True)  # of capsys
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("FORCE_COLOR", "1")
