@@ -146,6 +146,9 @@ def test_new_arms_leave_the_old_one_alone():
     assert arm.with_base(dhkit.pose((1, 0, 0))).fk(np.zeros(3))[0, 3] == arm.fk(np.zeros(3))[0, 3] + 1
     assert pickle.dumps(arm) == before
     assert repr(arm) == "<Arm planar3r: RRR, standard DH>"
+    held = Arm.load("puma560").with_payload(2.0).with_payload(0.5).with_tool(dhkit.pose((0, 0, 0.1)))
+    assert repr(held) == "<Arm puma560: RRRRRR, standard DH, tool at (0, 0, 0.1) m, carrying 2.5 kg>"
+    assert "carrying 2.5 kg" in held._repr_html_() and "l1 = 0.5" in Arm.load("planar2r")._repr_html_()
     assert "<table>" in arm._repr_html_()
     assert arm.urdf().startswith("<?xml")
     assert arm.jacobian_dot(np.zeros(3), np.ones(3), frame="tool").shape == (6, 3)

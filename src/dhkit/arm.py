@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from dhkit import description as describe
 from dhkit.description import Array, Description, DHTable, Named, Robot
+from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
@@ -1019,7 +1020,8 @@ class Arm:
         return Arm, (self._description,)
 
     def __repr__(self) -> str:
-        return f"<Arm {self.name}: {self._description.kinds}, {self._description.convention.value} DH>"
+        described = f"{self._description.kinds}, {self._description.convention.value} DH"
+        return repr_line(f"Arm {self.name}", said=", ".join([described, *self._description.carried_words]))
 
     def _repr_html_(self) -> str:
         return self._description._repr_html_()

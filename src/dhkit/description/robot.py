@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
 from dhkit.description.named import Named
 from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units, Vector
 from dhkit.display import html_block, html_lines, repr_line
-from dhkit.expressions import Expression
+from dhkit.expressions import Expression, substitute
 
 if TYPE_CHECKING:
     from dhkit.description.numbers import Numbers
@@ -126,8 +126,25 @@ class Description:
     def _repr_html_(self) -> str:
         from dhkit.description.table import DHTable
 
-        warnings = [f"warning: {warning}" for warning in self.warnings]
-        return html_block(self.name, DHTable.of(self)._repr_html_(), html_lines(warnings))
+        values = [f"{name} = {value:.6g}" for name, value in self.numbers.values.items()]
+        lines = [*self.carried_words, *([f"parameters (SI): {', '.join(values)}"] if values else [])]
+        lines += [f"warning: {warning}" for warning in self.warnings]
+        return html_block(self.name, DHTable.of(self)._repr_html_(), html_lines(lines))
+
+    @property
+    def carried_words(self) -> list[str]:
+        """Where the tool is in the last frame, unless there, and the mass of payloads, in words."""
+        from dhkit.description.parameters import resolved
+
+        found = []
+        x, y, z = (float(entry) + 0.0 for entry in self.numbers.T_last_tool[:3, 3])
+        if (x, y, z) != (0.0, 0.0, 0.0):
+            found.append(f"tool at ({x:.4g}, {y:.4g}, {z:.4g}) m")
+        values = resolved(self.parameters)
+        masses = [body.mass for body in self.joints[-1].bodies if body.name.startswith("payload")]
+        if masses:
+            found.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
+        return found
 
 
 def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:

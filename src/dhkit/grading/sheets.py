@@ -77,7 +77,9 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
     passed_over = {path.resolve() for path in exclude}
     for path in paths:
         if not path.exists():
-            raise AnswerError(f"{path}: no such file; expected an answer sheet or a folder of them")
+            raise AnswerError(
+                f"{path}: no such file; expected an answer sheet or a folder of them (--template NAME makes one)"
+            )
         for sheet in _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]:
             found.setdefault(sheet.path.absolute(), sheet)
             if len(found) > MAX_SHEETS:
