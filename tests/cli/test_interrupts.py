@@ -30,7 +30,9 @@ main(sys.argv[2:])
 """
 
 
-@pytest.mark.parametrize("command", ["plan puma560 --to nominal --via zero", "simulate puma560 --duration 9"])
+@pytest.mark.parametrize(
+    "command", ["plan puma560 --to nominal --via zero --intervals 240", "simulate puma560 --duration 300"]
+)
 @pytest.mark.parametrize("seconds", [0.005, 0.05, 0.25, 0.5, 0.8, 1.2])
 def test_a_command_ends_in_one_line(command, seconds):
     done = subprocess.run(
