@@ -536,12 +536,7 @@ class Arm:
         from dhkit.control import Plant, simulate
         from dhkit.dynamics import Friction
 
-        moved = Plant(
-            describe.description_of(self if plant is None else plant),
-            Friction.chosen(friction),
-            restitution,
-            _listed(pushes),
-        )
+        moved = Plant(self._moving(plant), Friction.chosen(friction), restitution, _listed(pushes))
         return simulate(
             self._description,
             controller,
@@ -640,12 +635,7 @@ class Arm:
         from dhkit.control import CONTROLLERS, Plant, compare
         from dhkit.dynamics import Friction
 
-        moved = Plant(
-            describe.description_of(self if plant is None else plant),
-            Friction.chosen(friction),
-            restitution,
-            _listed(pushes),
-        )
+        moved = Plant(self._moving(plant), Friction.chosen(friction), restitution, _listed(pushes))
         chosen = tuple(CONTROLLERS) if controllers is None else controllers
         return compare(
             self._description,
@@ -663,6 +653,10 @@ class Arm:
             saturation=saturation,
             tolerance=tolerance,
         )
+
+    def _moving(self, plant: Robot) -> Description:
+        """Return what moves: a plant, an arm or its description, or this arm where none is given."""
+        return self._description if plant is None else describe.description_of(plant)
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return A (2n, 2n) and B (2n, n) of the arm near a state; see :func:`dhkit.control.linearize`."""

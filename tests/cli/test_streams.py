@@ -7,7 +7,9 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import typer
 from dhkit import Arm, Limits
 from dhkit.cli.commands import app
 from dhkit.cli.streams import _plain
+from dhkit.description.files import write_atomically
 
 COMMANDS = typer.main.get_command(app).commands
 
@@ -172,3 +175,12 @@ def test_a_reader_that_goes_away_is_no_answer_of_no(command):
     first = subprocess.Popen([sys.executable, "-m", "dhkit", *command.split()], stdout=subprocess.PIPE)
     first.stdout.close()
     assert first.wait(60) == 141
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="no /dev/shm")
+def test_files_below_dev_are_replaced_whole():
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
+        path = Path(folder) / "out.txt"
+        for text in ("long before", "now"):
+            write_atomically(path, text)
+        assert path.read_text() == "now"

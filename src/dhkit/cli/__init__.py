@@ -8,7 +8,10 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-__all__ = ["main"]
+__all__ = ["INTERRUPTED", "main"]
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -23,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if not _is_interruption(error):
             raise
         sys.stderr.write("dhkit: interrupted\n")
-        status = 130
+        status = INTERRUPTED
     sys.exit(status)
 
 

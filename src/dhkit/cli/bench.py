@@ -10,14 +10,12 @@ from pathlib import Path
 from dhkit.arm import Arm
 from dhkit.bench import BenchReport, Ending
 from dhkit.bench import run as run_bench
+from dhkit.cli import INTERRUPTED
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 
 __all__ = ["run", "write"]
-
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
 
 
 def run(

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from dhkit import __version__
 from dhkit.arm import Arm
+from dhkit.cli import INTERRUPTED
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
 from dhkit.cli.output import ReaderGone, print_json, say
 from dhkit.cli.streams import accept_every_letter
@@ -29,8 +30,6 @@ SHOWN, LONGEST = 120, 600
 LONG_WORD = re.compile(rf"\S{{{2 * SHOWN},}}")
 GONE = 141
 """Exit status where whoever read the output went away, as shells have it."""
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 """Click's base of usage errors: newer typers carry a click of their own, which ``import click`` is not."""
@@ -444,10 +443,10 @@ def simulate(
     no_stops: NoStops = False,
     push: PushOption = None,
     noise: Annotated[
-        float, typer.Option(min=0, help="Standard deviation of measured joint values, rad and m; rad always.")
+        float, typer.Option(min=0, help="Standard deviation of measured joint values; rad, with --degrees too, and m.")
     ] = 0.0,
     resolution: Annotated[
-        float, typer.Option(min=0, help="Of the encoders, on the joints' side, rad and m; rad always.")
+        float, typer.Option(min=0, help="Of the encoders, on the joints' side; rad, with --degrees too, and m.")
     ] = 0.0,
     degrees: Degrees = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,

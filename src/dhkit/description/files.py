@@ -14,6 +14,7 @@ from dhkit.errors import DescriptionError
 __all__ = ["check_place", "read_bounded", "write_atomically"]
 
 STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
+"""Names of what this process has open; other files below /dev, such as those of /dev/shm, are files."""
 
 
 def read_bounded(path: str | Path, most: int, expected: str = "a robot file") -> bytes:
@@ -77,7 +78,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     if not private:
-        if path.absolute().parts[1:2] in (("dev",), ("proc",)) or (path.exists() and not path.is_file()):
+        if STREAM.fullmatch(str(path.absolute())) or (path.exists() and not path.is_file()):
             try:
                 with _opened(path) as stream:
                     stream.write(data)
