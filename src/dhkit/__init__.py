@@ -157,13 +157,7 @@ __getattr__, __dir__ = lazy_names(
             "BatchResult",
             "Comparison",
         ),
-        "dhkit.description": (
-            "Description",
-            "pose",
-            "pose_parts",
-            "robots",
-            "DHTable",
-        ),
+        "dhkit.description": ("Description", "pose", "pose_parts", "robots", "DHTable"),
         "dhkit.planning": (
             "Certificate",
             "Effort",
@@ -183,10 +177,7 @@ __getattr__, __dir__ = lazy_names(
             "Planner",
         ),
         "dhkit.dynamics": ("Friction",),
-        "dhkit.grading": (
-            "GradeReport",
-            "grade",
-        ),
+        "dhkit.grading": ("GradeReport", "grade"),
         "dhkit.kinematics": (
             "IKFlag",
             "IKSolutions",
@@ -196,22 +187,10 @@ __getattr__, __dir__ = lazy_names(
             "Singularities",
             "Workspace",
         ),
-        "dhkit.trajectories": (
-            "Limits",
-            "Trajectory",
-            "JointPath",
-        ),
-        "dhkit.symbolic": (
-            "BaseParameters",
-            "CasadiFunctions",
-            "Lagrangian",
-            "SymbolicKinematics",
-        ),
+        "dhkit.trajectories": ("Limits", "Trajectory", "JointPath"),
+        "dhkit.symbolic": ("BaseParameters", "CasadiFunctions", "Lagrangian", "SymbolicKinematics"),
         "dhkit.verification": ("VerificationReport",),
-        "dhkit.viewer": (
-            "plot",
-            "View",
-        ),
+        "dhkit.viewer": ("plot", "View"),
     },
     (
         "control",

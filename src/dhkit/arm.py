@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
 
-__all__ = ["Arm"]
-
 
 class Arm:
     """A serial robot arm; immutable, equal to its copies, picklable, safe to share between threads.

@@ -10,19 +10,6 @@ from dataclasses import fields
 from html import escape
 from typing import Any
 
-__all__ = [
-    "LONGEST_LINE",
-    "MOST_ROWS",
-    "counted",
-    "html_block",
-    "html_lines",
-    "html_table",
-    "listed",
-    "plain",
-    "repr_line",
-    "value_line",
-]
-
 LONGEST_LINE = 120
 """Characters of a repr."""
 SHORTEST_NAME = 40

@@ -4,18 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = [
-    "AnswerError",
-    "DescriptionError",
-    "DhkitError",
-    "ExpressionError",
-    "ModelError",
-    "PlanningError",
-    "SimulationError",
-    "UnreachableError",
-    "from_checkout",
-]
-
 
 def from_checkout(extra: str) -> str:
     """Return how to install one of dhkit's extras; the distribution is not published yet."""

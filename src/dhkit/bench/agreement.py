@@ -12,8 +12,6 @@ from dhkit.bench.contenders import Task, Workload
 from dhkit.description import Array
 from dhkit.display import value_line
 
-__all__ = ["TOLERANCE", "Verdict", "judge"]
-
 TOLERANCE = 1e-9
 """Largest error that counts as agreement, m or rotation entry: a nanometre, far above any rounding. Of dynamics over
 the largest entry where that is above 1."""

@@ -18,18 +18,6 @@ from dhkit.display import counted, repr_line
 from dhkit.errors import from_checkout
 from dhkit.verification import random_states
 
-__all__ = [
-    "QUANTITIES",
-    "Call",
-    "Contender",
-    "Mode",
-    "Task",
-    "UnavailableError",
-    "Workload",
-    "import_peer",
-    "one_by_one",
-]
-
 QUANTITIES = ("fk", "ik", "jacobian", "inverse_dynamics", "mass_matrix", "forward_dynamics")
 """What is timed; each is the name of a method of :class:`dhkit.Arm`."""
 

@@ -14,8 +14,6 @@ from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
 from dhkit.trajectories import Trajectory
 
-__all__ = ["BEGIN", "COMPENSATED", "END", "Case", "Errors", "cases", "errors_of", "table", "with_tables"]
-
 DURATION = 2.0
 """s."""
 COMPENSATED = "computed-torque, friction compensated"

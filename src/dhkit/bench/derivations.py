@@ -20,8 +20,6 @@ from dhkit.dynamics import dynamics_graph
 from dhkit.symbolic import CasadiFunctions, derive, lagrangian, operation_count
 from dhkit.symbolic.exact.exact_arm import exact_arm
 
-__all__ = ["CASADI", "INVERSE_DYNAMICS", "PROOFS", "Derivation", "Operations", "derivations", "operations"]
-
 PEER = "sympy.physics.mechanics LagrangesMethod"
 CASADI = "dhkit, CasADi functions, all of them"
 EXACT = "dhkit, exact M, C, g, tau in numbers"

@@ -10,8 +10,6 @@ from dhkit.bench.contenders import UnavailableError
 from dhkit.description import Array, Description, world_to_frames, world_to_tool
 from dhkit.description.frames import carrying
 
-__all__ = ["JointAxes", "OrthoParallel", "bare", "has_spherical_wrist", "joint_axes"]
-
 GEOMETRIC = 1e-9
 """Axes closer than this, in m or as a sine, count as meeting, parallel or perpendicular."""
 

@@ -11,8 +11,6 @@ from pathlib import Path
 from dhkit.display import repr_line
 from dhkit.kernels import kernel_mode
 
-__all__ = ["Machine", "cores"]
-
 FLAGS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl", "asimd", "sve")
 PACKAGES = (
     "dhkit",

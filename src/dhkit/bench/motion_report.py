@@ -10,8 +10,6 @@ from dhkit.bench.machine import Machine
 from dhkit.bench.report import Missing, Table, duration, listed_values, report_html, report_markdown, report_text
 from dhkit.display import html_table, repr_line
 
-__all__ = ["MeshBuild", "MotionReport", "MotionRow"]
-
 MEANING = (
     "Over fine: the motion's duration over that of the planner's on the fine mesh, between the same configurations. "
     "Time: of one call that finds it, everything included; the programs are made before, once for an arm, as Programs "

@@ -26,8 +26,6 @@ from dhkit.planning.certificate import Checker
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits, Trajectory, quintic, trapezoidal
 
-__all__ = ["compare_motions", "holdable_pairs"]
-
 SPEEDS = (1.0, 3.0)
 """Times the robot's own speed limits: at three times those of the PUMA, torques count as well."""
 MESHES = (24, 32, 48)

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 
 from dhkit.bench.report import Ending, Missing, Outcome, Row
 
-__all__ = ["outcome_of"]
-
 
 def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -> Outcome:
     """Return how the comparison of a quantity ended.

@@ -28,8 +28,6 @@ from dhkit.bench.rounds import lasting, repeated, rounds
 from dhkit.description import write_robot
 from dhkit.display import value_line
 
-__all__ = ["FirstCall", "PeakMemory", "ThreadScaling", "first_call", "peak_memory", "thread_scaling"]
-
 BLOCK, BLOCKS = bytes(256 * 1024), 128
 """What the control loop hashes: a block that stays in the core's cache, and how often."""
 PROCESS_TIME = 120.0

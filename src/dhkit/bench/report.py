@@ -14,23 +14,6 @@ from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 
-__all__ = [
-    "BATCH",
-    "BenchReport",
-    "Ending",
-    "Missing",
-    "Outcome",
-    "Requirement",
-    "Row",
-    "Table",
-    "duration",
-    "listed_values",
-    "report_html",
-    "report_markdown",
-    "report_text",
-    "standing",
-]
-
 BATCH = 100_000
 """Items of the batch that the figures are asked at."""
 

@@ -10,8 +10,6 @@ from dhkit.bench.peers import eaik, pinocchio
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.bench.report import Requirement, Row
 
-__all__ = ["requirements"]
-
 PIN_CALL = 0.25
 """µs of a pin.forwardKinematics call on the machine that a single call's figure is asked on."""
 

@@ -13,8 +13,6 @@ import numpy as np
 from dhkit.bench.contenders import Call, Mode, Task
 from dhkit.description import Array
 
-__all__ = ["calm", "items_within", "lasting", "repeated", "rounds", "seconds_of"]
-
 BUDGET = {Mode.SINGLE: 0.05, Mode.BATCH: 1.0}
 """s a contender may take in a round: a loop of single calls is as telling when it is short."""
 LASTING = 0.02

@@ -20,8 +20,6 @@ from dhkit.bench.required import requirements
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
-__all__ = ["REPEATS", "run"]
-
 DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
 DERIVING = 90.0
 """s that a peer may derive: one that takes longer would not be waited for."""

@@ -19,8 +19,6 @@ from dhkit.bench.report import (
 )
 from dhkit.display import html_table, repr_line
 
-__all__ = ["BatchRow", "IntegrationRow", "ModelCheck", "SimulationReport", "SingleRow", "Timing"]
-
 MEANING = (
     "Times are medians and quartiles over interleaved rounds; per arm and step: a call's time over arms times steps. "
     "Joint error: largest one between reference and joint values. Integration error: of the last joint values and "

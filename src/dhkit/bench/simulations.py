@@ -21,8 +21,6 @@ from dhkit.description import Array
 from dhkit.dynamics import kinetic_energy, potential_energy
 from dhkit.verification import random_motions
 
-__all__ = ["SimulationSizes", "compare_simulations"]
-
 RATE = 1000.0
 """Hz: calls of the sampled controllers, and steps of their plants."""
 MOST_SECONDS = 1.5

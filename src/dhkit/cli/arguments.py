@@ -21,18 +21,6 @@ if TYPE_CHECKING:
     from dhkit.planning import Floor, Objective, Obstacle, Payload
     from dhkit.trajectories import Limits
 
-__all__ = [
-    "columns",
-    "gathering",
-    "joint_limits",
-    "joint_values",
-    "numbers",
-    "objective",
-    "obstacles",
-    "payload",
-    "target",
-]
-
 LARGEST = 10_000
 """Bytes of a file with a matrix at most."""
 UNIT = re.compile(r"deg|°|\bpi\b", re.IGNORECASE)

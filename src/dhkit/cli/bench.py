@@ -15,8 +15,6 @@ from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 
-__all__ = ["run", "write"]
-
 
 def run(
     arm: Arm,

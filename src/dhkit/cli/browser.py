@@ -16,8 +16,6 @@ from dhkit.lab import Assignment, serve
 from dhkit.lab.assignment import is_assignment
 from dhkit.programs import protect_from_children
 
-__all__ = ["run_lab", "run_view", "until_interrupted"]
-
 
 def until_interrupted(url: str, what: str, *, open_browser: bool) -> int:
     """Say where a page is, open it, and wait for Ctrl-C or SIGTERM; return 0."""

@@ -11,8 +11,6 @@ from dhkit.arm import Arm
 from dhkit.cli.output import print_json
 from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check, protect_from_children
 
-__all__ = ["run"]
-
 
 def run(
     arm: Arm,

@@ -23,8 +23,6 @@ from dhkit.description.files import check_place
 from dhkit.description.joint_words import DEGREES
 from dhkit.errors import DescriptionError, DhkitError
 
-__all__ = ["run"]
-
 SHOWN, LONGEST = 120, 600
 """Characters of a word, and of a message: what was typed is echoed in it."""
 LONG_WORD = re.compile(rf"\S{{{2 * SHOWN},}}")

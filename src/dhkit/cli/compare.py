@@ -12,8 +12,6 @@ from dhkit.cli.simulation_task import Task
 from dhkit.control import Comparison, Plant, compare
 from dhkit.dynamics import Friction
 
-__all__ = ["run"]
-
 
 def run(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
     """Compare controllers on one motion, print a table and write a figure; return 0, or 1 where one failed."""

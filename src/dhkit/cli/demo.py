@@ -30,8 +30,6 @@ from dhkit.trajectories import Trajectory
 from dhkit.verification import VerificationReport
 from dhkit.viewer.motion import Motion
 
-__all__ = ["run"]
-
 PRINTED = 5_000
 """Terms of M, C and g that are printed; of longer ones M and g."""
 SAMPLES = 801

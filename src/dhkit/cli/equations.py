@@ -36,8 +36,6 @@ from dhkit.symbolic.equations import (
     readable,
 )
 
-__all__ = ["FORMATS", "lagrangian_of", "run"]
-
 LARGEST_TITLE = 200
 
 Printed = Callable[[Any, Sequence[Quantity]], str]

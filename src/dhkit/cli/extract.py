@@ -15,8 +15,6 @@ from dhkit.errors import DescriptionError
 from dhkit.model import Extraction, example_chains, extract_dh, urdf_source
 from dhkit.model.robot_folder import write_robot_with_meshes
 
-__all__ = ["chain_words", "list_examples", "run"]
-
 AGREES = 1e-9
 """The largest difference from the file that counts as the same robot."""
 

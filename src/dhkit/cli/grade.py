@@ -14,14 +14,14 @@ from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
 from dhkit.errors import AnswerError
 from dhkit.grading import LIBRARY, grade
 from dhkit.grading.answers.sheet import read_sheet, read_task
-from dhkit.grading.batch import GIGABYTE, Judge, find_sheets, grade_all
+from dhkit.grading.batch import GIGABYTE, grade_all
+from dhkit.grading.isolation import Judge
 from dhkit.grading.judgement import prepare, robot_of
 from dhkit.grading.marks import marks
 from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Feedback, Rubric
-
-__all__ = ["grade_files", "remark", "rubric_of", "run"]
+from dhkit.grading.sheets import find_sheets
 
 
 def rubric_of(path: Path | None) -> Rubric:

@@ -33,8 +33,6 @@ from dhkit.grading.reports.sentences import fault_of
 from dhkit.grading.rubric import Feedback
 from dhkit.grading.sheets import SUFFIXES
 
-__all__ = ["FORMS", "Graded", "check_output", "deliver"]
-
 FORMS = ("text", "json", "gradescope", "junit", "html")
 FILE_WIDTH = 120
 """Columns of text in a file."""

@@ -12,8 +12,6 @@ from dhkit.errors import AnswerError
 from dhkit.grading.explanation import explanation_html, explanation_text
 from dhkit.grading.template import template
 
-__all__ = ["write_explanation", "write_template"]
-
 
 def write_template(robot: str, output: Path | None) -> int:
     """Print or write an empty answer sheet."""

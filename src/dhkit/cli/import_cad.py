@@ -13,8 +13,6 @@ from dhkit.errors import DescriptionError
 from dhkit.model.cad_assembly import import_cad
 from dhkit.model.cad_files import LEFT_OUT
 
-__all__ = ["run"]
-
 PAIR = re.compile(r"\s*(?:link\s*)?(\d{1,3})\s*=\s*(.*?)\s*", re.IGNORECASE | re.DOTALL)
 
 WITHOUT = re.compile(r"\s*-\s*=\s*(.*?)\s*", re.DOTALL)

@@ -17,8 +17,6 @@ from dhkit.description.parameters import resolved
 from dhkit.expressions import substitute
 from dhkit.kinematics import classify, tool_reach
 
-__all__ = ["forward", "list_robots", "show"]
-
 
 def list_robots(json: bool) -> None:
     """Print the library."""

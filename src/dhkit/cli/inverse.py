@@ -15,8 +15,6 @@ from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
 from dhkit.kinematics.solutions import LIMIT_SLACK
 
-__all__ = ["run"]
-
 FLAG_WORDS = {
     IKFlag.shoulder: "shoulder singular",
     IKFlag.elbow: "elbow stretched or folded",

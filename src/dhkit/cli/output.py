@@ -13,8 +13,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-__all__ = ["ReaderGone", "finite", "print_json", "print_table", "say"]
-
 PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables then do not break."""
 

@@ -11,8 +11,6 @@ from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 
-__all__ = ["FIGURES", "PAGES", "check_outputs", "write_figure"]
-
 FIGURES = (".png", ".svg", ".pdf")
 PAGES = (".html", ".htm")
 RESOLUTION = 120

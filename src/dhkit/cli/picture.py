@@ -17,8 +17,6 @@ from dhkit.trajectories import read_motion, written_by_dhkit
 from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs, write_png
 from dhkit.viewer.pictures import picture
 
-__all__ = ["run"]
-
 SIZE = re.compile(r"(\d{1,5})x(\d{1,5})")
 
 

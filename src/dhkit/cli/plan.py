@@ -20,9 +20,8 @@ from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import Floor, Objective, Obstacle, Payload, PlanReport, Progress, ToolSpeed
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
-from dhkit.trajectories.files import ARCHIVES, TABLES
-
-__all__ = ["Files", "Task", "run"]
+from dhkit.trajectories.archives import ARCHIVES
+from dhkit.trajectories.files import TABLES
 
 SAMPLES = 801
 """By which a motion's largest rates and torques are told."""

@@ -13,8 +13,6 @@ from dhkit.control import SimulationResult
 from dhkit.control.result_files import SIMULATION
 from dhkit.trajectories import read_motion, written_by_dhkit
 
-__all__ = ["run"]
-
 
 def run(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str | None = None) -> int:
     """Play a motion or a simulation of a file in the browser until it is interrupted, or write a page of it."""

@@ -7,8 +7,6 @@ import threading
 from types import TracebackType
 from typing import Any
 
-__all__ = ["ProgressBar"]
-
 PATIENCE = 1.0
 """s: what takes longer shows how far it is."""
 

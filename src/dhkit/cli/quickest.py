@@ -10,8 +10,6 @@ from dhkit.description import Array
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
 
-__all__ = ["ends", "race", "there_and_back"]
-
 TURN, SLIDE = 1.0, 0.3
 """How far a joint is moved at most: rad, and shares of the reach."""
 ROOM = 0.8

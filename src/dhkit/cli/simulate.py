@@ -21,8 +21,6 @@ from dhkit.cli.units import joint_entry
 from dhkit.control import SimulationResult
 from dhkit.errors import SimulationError
 
-__all__ = ["Files", "facts_of", "run"]
-
 ACCOUNTED = 1e-6
 """Share of the energy without account above which the steps are too long."""
 RESULTS = (".npz", ".mat", ".csv")

@@ -19,8 +19,6 @@ from dhkit.dynamics import Friction
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, read_motion
 
-__all__ = ["Task", "chosen_motion", "friction_of", "moving_arm", "pushes"]
-
 NOTHING = "none"
 """The controller that gives no torque."""
 SHORTEST = 2.0

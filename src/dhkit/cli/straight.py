@@ -11,8 +11,6 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.kinematics import classify
 
-__all__ = ["Branches", "Line", "branches", "straight_line"]
-
 POSES = 200
 """Along a line."""
 SHARES = (0.5, 0.35, 0.25, 0.15, 0.08)

@@ -11,8 +11,6 @@ import unicodedata
 from pathlib import Path
 from typing import Any, TextIO, cast
 
-__all__ = ["accept_every_letter"]
-
 PLAIN = dict(zip("→←↑↓−–≤≥·…′", ("->", "<-", "^", "v", "-", "-", "<=", ">=", "*", "...", "'"), strict=True))
 """Signs whose decomposition has no ASCII letters."""
 

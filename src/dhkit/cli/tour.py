@@ -7,8 +7,6 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array
 
-__all__ = ["RATE", "tour"]
-
 RATE = 50.0
 """Hz: how densely the motion is sampled."""
 PAUSE = 0.4

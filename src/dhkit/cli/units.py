@@ -9,8 +9,6 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array
 
-__all__ = ["angle_key", "joint_entry"]
-
 
 def angle_key(name: str, *, degrees: bool) -> str:
     """Return the key of angles, ``q_rad`` or ``q_deg``."""

@@ -12,8 +12,6 @@ from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
 from dhkit.verification import VerificationReport, verify_urdf
 
-__all__ = ["run"]
-
 
 def run(
     arm: Arm,

@@ -20,8 +20,6 @@ from dhkit.kinematics.singularities import Singularities, singularities
 from dhkit.kinematics.workspace import Workspace
 from dhkit.kinematics.workspace import workspace as sample
 
-__all__ = ["run"]
-
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 SHOWN = 12_000
 """Points on the page: more are slow without a graphics card."""

@@ -16,8 +16,6 @@ from dhkit.dynamics import inertial_parameters, mass_matrix, parameter_grouping,
 from dhkit.errors import DescriptionError
 from dhkit.verification import random_motions
 
-__all__ = ["Adaptive"]
-
 STATES = 2000
 """Random motions over which the regressor's square is averaged for the default adaptation gains."""
 

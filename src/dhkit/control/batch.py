@@ -23,8 +23,6 @@ from dhkit.dynamics import Friction
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
 
-__all__ = ["simulate_batch"]
-
 KEEP = ("final", "errors", "all")
 MOST_BYTES = 4_000_000_000
 """Of all states of a batch that are kept."""

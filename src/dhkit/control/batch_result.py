@@ -15,8 +15,6 @@ from dhkit.description.joint_words import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, potential_energy
 
-__all__ = ["BatchResult", "History"]
-
 
 @dataclass(frozen=True, eq=False)
 class History:

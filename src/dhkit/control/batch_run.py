@@ -21,8 +21,6 @@ from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
 from dhkit.kernels import all_in_threads
 
-__all__ = ["BatchRun", "Record", "closed_step"]
-
 BLOCK = 8_192
 """Arms that are taken through all steps together, at most: few calls a step, and states that stay in the cache."""
 DIVERGED = 1e100

@@ -27,8 +27,6 @@ from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError
 from dhkit.trajectories import Trajectory
 
-__all__ = ["CONTROLLERS", "Comparison", "compare", "make_controller"]
-
 STYLES = ("text", "markdown", "latex")
 LARGE = 10.0
 """mm: from here on the tool's error is printed whole."""

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-__all__ = ["bounded_forces"]
-
 PATIENCE = 10
 """Rounds without fewer violations after which one index at a time is exchanged, which cannot go in a circle."""
 

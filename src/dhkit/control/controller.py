@@ -12,18 +12,6 @@ from dhkit.control.references import Setpoint
 from dhkit.description import Array, Description
 from dhkit.errors import SimulationError
 
-__all__ = [
-    "ContinuousController",
-    "Controller",
-    "Law",
-    "called",
-    "continuous_law",
-    "name_of",
-    "require_fits",
-    "reset",
-    "torques",
-]
-
 
 class Controller(Protocol):
     """Anything that is called with the time, the joint values, their rates and a setpoint, and returns torques (n,).

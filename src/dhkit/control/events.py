@@ -13,8 +13,6 @@ from dhkit.control.integrators import Integrator, State
 from dhkit.control.plant import Contact, Phase, Plant
 from dhkit.errors import SimulationError
 
-__all__ = ["advanced"]
-
 MOST_EVENTS = 1_000
 """In one step: more are a motion that the model does not describe, such as a joint that chatters."""
 SLOWEST_REBOUND = 1e-4

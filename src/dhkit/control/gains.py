@@ -12,17 +12,6 @@ from dhkit.description.arrays import number_array
 from dhkit.dynamics import mass_matrix
 from dhkit.verification import random_motions
 
-__all__ = [
-    "batch_of",
-    "effective_inertia",
-    "gain",
-    "pd_gains",
-    "pid_gains",
-    "positive",
-    "positive_each",
-    "told",
-]
-
 STATES = 256
 """Random configurations over which effective inertias are averaged."""
 

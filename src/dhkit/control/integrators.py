@@ -13,8 +13,6 @@ from dhkit.control.plant import Phase, Plant
 from dhkit.description import Array
 from dhkit.errors import SimulationError
 
-__all__ = ["DormandPrince", "Integrator", "RungeKutta", "State"]
-
 MOST_STEPS = 5_000
 """Of DOP853 on the way to one time."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]

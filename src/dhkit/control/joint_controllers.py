@@ -11,8 +11,6 @@ from dhkit.description import Array, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.display import repr_line
 
-__all__ = ["PID"]
-
 BAND = 0.01
 """Share of the largest torque over which a continuous controller's integral fades out."""
 

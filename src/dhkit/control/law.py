@@ -12,8 +12,6 @@ from dhkit.symbolic import InertialTable
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Law", "Symbols", "law_of"]
-
 
 class Symbols(NamedTuple):
     """What a law is a function of, n x 1 each."""

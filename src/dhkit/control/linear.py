@@ -19,8 +19,6 @@ from dhkit.symbolic import CasadiFunctions
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["LQR", "linearize"]
-
 ERROR, RATE, ACCELERATION = 0.1, 1.0, 200.0
 """Acceptable deviations, rad, rad/s and rad/s^2, or m."""
 

@@ -20,8 +20,6 @@ from dhkit.symbolic import InertialTable, recursive_gravity, recursive_inverse_d
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["ComputedTorque", "FeedForward", "FrictionCompensation", "PDGravity"]
-
 REST = 1e-4
 """rad/s or m/s: below it a setpoint's rate is taken as rest rather than as a direction."""
 

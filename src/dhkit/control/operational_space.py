@@ -16,8 +16,6 @@ from dhkit.dynamics import bias, mass_matrix, require_inertia
 from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.verification import random_motions
 
-__all__ = ["OperationalSpace", "pose_error"]
-
 PROBES = 16
 """Random configurations that tell in how many directions the tool can be moved."""
 ZERO = 1e-9

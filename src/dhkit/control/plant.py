@@ -29,8 +29,6 @@ from dhkit.dynamics.programs import dynamics_kernel
 from dhkit.kernels import Kernel
 from dhkit.verification import random_motions
 
-__all__ = ["Contact", "Phase", "Plant"]
-
 log = logging.getLogger(__name__)
 
 STATES = 256

@@ -14,8 +14,6 @@ from dhkit.description.frames import carrying
 from dhkit.display import value_line
 from dhkit.kinematics import forward_kinematics, frames
 
-__all__ = ["Push"]
-
 
 @dataclass(frozen=True, eq=False)
 class Push:

@@ -16,8 +16,6 @@ from dhkit.display import listed, repr_line, value_line
 from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.trajectories import Trajectory
 
-__all__ = ["Held", "Reference", "Samples", "Setpoint", "Sine", "Step", "reference_of"]
-
 Samples: TypeAlias = tuple[Array, Array, Array]
 """Joint values, rates and accelerations, shape (N, n) each."""
 

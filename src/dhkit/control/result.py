@@ -14,8 +14,6 @@ from dhkit.description.joint_words import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.kinematics import forward_kinematics
 
-__all__ = ["EnergyAudit", "ErrorNorms", "SimulationResult"]
-
 
 @dataclass(frozen=True)
 class EnergyAudit:

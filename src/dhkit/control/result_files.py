@@ -17,8 +17,6 @@ from dhkit.trajectories.archives import ARCHIVES, archive_bytes, read_archive
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.tables import read_table, table_text
 
-__all__ = ["load_result", "save_result"]
-
 SUFFIXES = (*ARCHIVES, ".csv")
 ROWS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
 """Arrays of shape (N+1, n), in the order of a table's columns."""

@@ -22,8 +22,6 @@ from dhkit.dynamics import kinetic_energy
 from dhkit.errors import SimulationError
 from dhkit.kinematics import forward_kinematics
 
-__all__ = ["ContinuousRun", "Progress", "Run", "SampledRun", "result_of"]
-
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with how many steps are done and how many there are."""
 LONGEST_STEP = 2e-3

@@ -11,8 +11,6 @@ from dhkit.description import Array
 from dhkit.description.arrays import number_array
 from dhkit.display import value_line
 
-__all__ = ["Sensors"]
-
 
 @dataclass(frozen=True, eq=False)
 class Sensors:

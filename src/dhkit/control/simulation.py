@@ -28,8 +28,6 @@ from dhkit.description.joint_words import joint_words, outside_words
 from dhkit.description.robot import takes_robot
 from dhkit.trajectories import Trajectory
 
-__all__ = ["simulate"]
-
 log = logging.getLogger(__name__)
 ROUNDING = 1e-9
 """rad or m beyond a limit that is not worth a word."""

@@ -25,8 +25,6 @@ from dhkit.symbolic import (
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["WORKS", "StepKernel"]
-
 WORKS = ("drives", "turnover", "friction")
 """What is added up for each arm, J: done by the drives' torques, the same without its sign, and taken by friction."""
 NO_LIMIT = 1e300

@@ -10,8 +10,6 @@ from dhkit.control.gains import positive
 from dhkit.control.references import Reference, Samples
 from dhkit.description import Array, Description
 
-__all__ = ["MOST_STEPS", "require_positive", "row_times", "sampled_reference", "steps_a_period", "substeps"]
-
 NAMES = ("q", "qd", "qdd")
 MOST_STEPS = 10_000_000
 """Of one run: what is kept of them is about 5 kB a step for each joint."""

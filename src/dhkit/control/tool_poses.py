@@ -16,8 +16,6 @@ from dhkit.errors import PlanningError, UnreachableError
 from dhkit.kinematics import classify, forward_kinematics, inverse_kinematics, solve_numerically
 from dhkit.trajectories import Trajectory, straight_line
 
-__all__ = ["ToolPoses", "joints_at_pose"]
-
 
 @dataclass(frozen=True, eq=False)
 class ToolPoses:

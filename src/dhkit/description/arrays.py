@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["number_array"]
-
 
 def number_array(value: ArrayLike, name: str, shape: str) -> NDArray[np.float64]:
     """Return numbers as a float64 array, itself where it is one.

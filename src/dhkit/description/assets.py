@@ -6,8 +6,6 @@ from pathlib import Path, PurePosixPath
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["MESH_FORMATS", "asset", "inside"]
-
 MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
 
 MAX_PATH = 500

@@ -18,8 +18,6 @@ from dhkit.expressions import ZERO, Expression
 if TYPE_CHECKING:
     from dhkit.description.robot import Description
 
-__all__ = ["joined", "moved_body", "require_bodies", "rod"]
-
 
 def moved_body(body: Body, T: ExactPose) -> Body:
     """Return a body in the frame that T maps its frame to: com -> R com + p, I -> R I R^T."""

@@ -28,8 +28,6 @@ from dhkit.expressions import Expression, exact, exact_angle
 SYMMETRIC = 1e-12
 """How unequal the products of an inertia may be, of its largest entry: what R I R^T leaves."""
 
-__all__ = ["with_base", "with_limits", "with_parameters", "with_payload", "with_tool", "with_uniform_links"]
-
 
 @takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:

@@ -12,21 +12,6 @@ from dhkit.description.poses import pose_parts
 from dhkit.description.values import Convention, Joint, Placement, Vector
 from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
 
-__all__ = [
-    "ExactPose",
-    "fixed_row",
-    "identity",
-    "inverse",
-    "moved",
-    "placement_of",
-    "pose_of",
-    "rotation_x",
-    "rotation_z",
-    "settled",
-    "translation",
-    "vector",
-]
-
 ExactPose: TypeAlias = NDArray[Any]
 """Shape (4, 4), entries Expression."""
 

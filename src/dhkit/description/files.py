@@ -11,8 +11,6 @@ from typing import BinaryIO
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["check_place", "read_bounded", "write_atomically"]
-
 STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
 """Names of what this process has open; other files below /dev, such as those of /dev/shm, are files."""
 

@@ -12,17 +12,6 @@ from dhkit.description.numbers import Array
 from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
 
-__all__ = [
-    "carrying",
-    "configuration",
-    "joint_array",
-    "joint_vector",
-    "link_transforms",
-    "one_each",
-    "world_to_frames",
-    "world_to_tool",
-]
-
 RATES = ("qd", "tau", "start_velocity", "goal_velocity")
 """Beginnings of the names of arguments that are speeds, accelerations or torques."""
 Frames = TypeVar("Frames", Array, list[Any])

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable
 from contextvars import ContextVar
 
-__all__ = ["DEGREES", "degrees_hint", "joint_unit", "joint_words", "outside_words"]
-
 DEGREES: ContextVar[bool] = ContextVar("dhkit_degrees", default=False)
 """Whether messages tell angles in degrees; the command sets it by ``--degrees``."""
 

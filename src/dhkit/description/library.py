@@ -11,8 +11,6 @@ from dhkit.description.robot import Description
 from dhkit.description.robot_file import from_toml
 from dhkit.errors import DescriptionError
 
-__all__ = ["library_robot", "robots"]
-
 
 @cache
 def robots() -> tuple[str, ...]:

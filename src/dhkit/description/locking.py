@@ -41,8 +41,6 @@ from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import PI, ZERO, Budget, Expression, arc_tangent, cos, exact_angle, parse, sin, sqrt, substitute
 
-__all__ = ["lock"]
-
 log = logging.getLogger(__name__)
 
 WORK = 300_000

@@ -18,8 +18,6 @@ from xml.parsers import expat
 from dhkit.description.assets import MESH_FORMATS
 from dhkit.errors import DescriptionError
 
-__all__ = ["MAX_MESH_BYTES", "MeshHeader", "check_mesh_file", "is_mesh_file"]
-
 MAX_MESH_BYTES = 50_000_000
 """A million triangles of a binary STL: more than a browser shows well."""
 STL_HEADER, STL_FACET = 84, 50

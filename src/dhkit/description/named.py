@@ -7,8 +7,6 @@ from typing import TypeVar
 
 from dhkit.display import LONGEST_LINE, counted, repr_line
 
-__all__ = ["Named"]
-
 V = TypeVar("V")
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from dhkit.description.robot import Description
     from dhkit.description.values import Body, Joint, Placement, Vector
 
-__all__ = ["Array", "Numbers", "matrix"]
-
 Array: TypeAlias = NDArray[np.float64]
 
 

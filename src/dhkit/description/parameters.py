@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import CONSTANTS, FUNCTIONS, Expression, substitute
 
-__all__ = ["check_parameter_name", "needs", "resolved"]
-
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
 
 

@@ -14,8 +14,6 @@ from dhkit.description.values import INERTIA_PLACES
 from dhkit.display import value_line
 from dhkit.errors import DescriptionError
 
-__all__ = ["Payload"]
-
 
 @dataclass(frozen=True)
 class Payload:

@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike
 from dhkit.description.arrays import number_array
 from dhkit.description.numbers import Array
 
-__all__ = ["check_pose", "pose", "pose_parts", "pose_quaternion"]
-
 ORTHONORMAL = 1e-6
 """Largest entry of R^T R - 1 that still counts as a rotation: six digits typed by hand."""
 AXES = {"X": 0, "Y": 1, "Z": 2}

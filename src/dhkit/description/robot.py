@@ -17,8 +17,6 @@ from dhkit.expressions import Expression, substitute
 if TYPE_CHECKING:
     from dhkit.description.numbers import Numbers
 
-__all__ = ["Description", "Robot", "description_of", "takes_robot"]
-
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -113,8 +111,8 @@ class Description:
         return hash(tuple(getattr(self, item.name) for item in fields(self) if item.compare))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the hash out: that of text differs from process to process."""
-        return {name: value for name, value in vars(self).items() if name != "_hash"}
+        """Return the fields alone: what is worked out from them is worked out anew, and hashes of text differ by process."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __repr__(self) -> str:
         bodies = sum(bool(joint.bodies) for joint in self.joints)

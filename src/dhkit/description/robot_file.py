@@ -35,8 +35,6 @@ from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
 if TYPE_CHECKING:
     from dhkit.description.schema import BodyForm, DriveForm, Entry, JointForm, RobotForm, ShapeForm
 
-__all__ = ["from_toml", "read_robot"]
-
 MAX_BYTES = 1_000_000
 ONE = exact(1)
 

@@ -23,8 +23,6 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["BodyForm", "JointForm", "RobotForm", "ShapeForm", "robot_schema", "titled_schema", "validated"]
-
 Entry: TypeAlias = int | Decimal | str
 """A number as the file has it: bare, or text in quotes."""
 

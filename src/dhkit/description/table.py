@@ -16,8 +16,6 @@ from dhkit.display import counted, html_table, repr_line
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, exact, exact_angle, parse
 
-__all__ = ["DHTable", "Quantity", "from_dh", "length", "quantity"]
-
 Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
 """A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
 

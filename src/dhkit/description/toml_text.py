@@ -10,8 +10,6 @@ from typing import Any
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["plain_numbers", "toml_document"]
-
 DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
 """No key of ours is dotted so deep, and tomllib takes quadratic time over such keys. (Possessive: linear itself.)"""
 MAX_BITS = 2_048

@@ -26,8 +26,6 @@ from dhkit.description.values import (
 )
 from dhkit.expressions import Expression, exact
 
-__all__ = ["to_toml", "write_robot"]
-
 ONE = exact(1)
 Content: TypeAlias = Mapping[str, Any]
 

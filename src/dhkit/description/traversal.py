@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 from dhkit.description.named import Named
 from dhkit.expressions import Expression, substitute
 
-__all__ = ["expressions_in", "names_in", "with_expressions", "with_values"]
-
 T = TypeVar("T")
 
 

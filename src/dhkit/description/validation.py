@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from dhkit.description.robot import Description
     from dhkit.description.values import Body, Drive, Geometry, Joint, Mesh, Placement, Shape
 
-__all__ = ["MAX_JOINTS", "check", "check_body"]
-
 MAX_JOINTS = 32
 LARGEST = 1e12
 """Size of a number, SI units: products of several of them are finite doubles, and no robot comes near."""

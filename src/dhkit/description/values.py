@@ -10,31 +10,6 @@ from typing import TypeAlias
 from dhkit.display import counted, repr_line, value_line
 from dhkit.expressions import PI, ZERO, Expression, exact
 
-__all__ = [
-    "INERTIA_PLACES",
-    "ORIGIN",
-    "STANDARD_GRAVITY",
-    "UNSCALED",
-    "Base",
-    "Body",
-    "Box",
-    "Capsule",
-    "Convention",
-    "Cylinder",
-    "Drive",
-    "Geometry",
-    "Inertia",
-    "Joint",
-    "JointType",
-    "Mesh",
-    "Placement",
-    "Shape",
-    "Sphere",
-    "Tool",
-    "Units",
-    "Vector",
-]
-
 Vector: TypeAlias = tuple[Expression, Expression, Expression]
 """Three coordinates."""
 

@@ -10,8 +10,6 @@ from dhkit.description.robot import takes_robot
 from dhkit.dynamics.programs import evaluate
 from dhkit.kernels import result_array
 
-__all__ = ["kinetic_energy", "potential_energy", "power"]
-
 
 @takes_robot
 def kinetic_energy(

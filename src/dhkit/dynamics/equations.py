@@ -11,8 +11,6 @@ from dhkit.dynamics.loads import external_torque
 from dhkit.dynamics.programs import evaluate
 from dhkit.symbolic import Friction
 
-__all__ = ["bias", "coriolis_matrix", "gravity_torque", "inverse_dynamics", "mass_matrix"]
-
 
 @takes_robot
 def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:

@@ -15,8 +15,6 @@ from dhkit.dynamics.programs import evaluate
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import SINGULAR, Friction
 
-__all__ = ["forward_dynamics", "require_inertia"]
-
 log = logging.getLogger(__name__)
 
 PROBES = 16

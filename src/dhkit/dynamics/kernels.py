@@ -8,8 +8,6 @@ from dhkit.dynamics.loads import friction_kernel, wrench_kernel
 from dhkit.dynamics.programs import EXPRESSIONS, dynamics_kernel
 from dhkit.kernels import Kernel
 
-__all__ = ["dynamic_kernels"]
-
 
 @takes_robot
 def dynamic_kernels(description: Description) -> list[Kernel]:

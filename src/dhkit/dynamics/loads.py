@@ -14,8 +14,6 @@ from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
 from dhkit.symbolic import friction_torque as friction_expression
 
-__all__ = ["external_torque", "friction_kernel", "friction_torque", "wrench_kernel", "wrench_torque"]
-
 
 @takes_robot
 def friction_torque(

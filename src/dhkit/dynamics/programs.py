@@ -28,8 +28,6 @@ from dhkit.symbolic import (
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["EXPRESSIONS", "dynamics_graph", "dynamics_kernel", "evaluate"]
-
 EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "mass_matrix": composite_mass_matrix,
     "coriolis_matrix": composite_coriolis_matrix,

@@ -9,8 +9,6 @@ from dhkit.description import INERTIA_PLACES, Array, Description, joint_array
 from dhkit.description.frames import carrying, world_to_frames
 from dhkit.description.robot import takes_robot
 
-__all__ = ["inertial_parameters", "regressor"]
-
 
 @takes_robot
 def inertial_parameters(description: Description) -> Array:

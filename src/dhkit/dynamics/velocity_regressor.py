@@ -16,8 +16,6 @@ from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 from dhkit.symbolic import velocity_regressor as velocity_regressor_expression
 
-__all__ = ["ParameterGrouping", "parameter_grouping", "velocity_regressor", "velocity_regressor_kernel"]
-
 DEPENDENT = 1e-9
 """Remainder of a column of unit length, its part along earlier columns taken off, below which it depends on them:
 roundings leave 1e-14."""

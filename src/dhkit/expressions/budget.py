@@ -8,8 +8,6 @@ from types import TracebackType
 from dhkit.display import repr_line
 from dhkit.errors import ExpressionError
 
-__all__ = ["Budget", "budgeted", "spend"]
-
 DEFAULT_WORK = 100_000
 """Term products and sums: about half a second. A file of the library takes 1,000 at most, an arm of symbols with a
 joint locked at 60 degrees 20,000."""

@@ -21,8 +21,6 @@ from dhkit.errors import ExpressionError
 from dhkit.expressions.budget import spend
 from dhkit.expressions.syntax import decimal_fraction
 
-__all__ = ["PI", "ZERO", "Atom", "Expression", "Monomial", "Scalar", "exact", "exact_angle"]
-
 MAX_TERMS = 2_000
 """Terms of a sum: a robot file's longest entry has a few dozen."""
 MAX_EXPONENT = 64

@@ -10,8 +10,6 @@ from functools import cache
 from dhkit.errors import ExpressionError
 from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exact
 
-__all__ = ["FUNCTIONS", "arc_tangent", "call", "cos", "decimals", "sin", "sqrt", "substitute"]
-
 NOTHING = 1e-40
 """A function's value below this is taken for 0: no length times it is ever seen, and its digits would be many."""
 LARGEST_FACTORED = 10**6

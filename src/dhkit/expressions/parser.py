@@ -12,8 +12,6 @@ from dhkit.expressions.exact import PI, Expression
 from dhkit.expressions.functions import call, sqrt
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree, read
 
-__all__ = ["CONSTANTS", "parse", "value_of"]
-
 CONSTANTS = {
     "pi": PI,
     "deg": PI / 180,

@@ -22,20 +22,6 @@ from typing import NamedTuple, NoReturn, TypeAlias
 
 from dhkit.errors import ExpressionError
 
-__all__ = [
-    "Call",
-    "Name",
-    "Number",
-    "Power",
-    "Product",
-    "Sum",
-    "Token",
-    "Tree",
-    "decimal_fraction",
-    "read",
-    "read_tokens",
-]
-
 MAX_LENGTH = 10_000
 """Characters of one expression: longer than any derivation that a person types."""
 MAX_DEPTH = 50

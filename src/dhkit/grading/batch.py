@@ -15,9 +15,7 @@ from types import TracebackType
 from dhkit.grading.isolation import PIECE, Judge, Limits, judged, kill, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
-from dhkit.grading.sheets import Sheet, find_sheets
-
-__all__ = ["GIGABYTE", "Judge", "Sheet", "find_sheets", "grade_all"]
+from dhkit.grading.sheets import Sheet
 
 GIGABYTE = 1024**3
 MOST = 20_000_000

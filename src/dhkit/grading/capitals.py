@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["capitalised"]
-
 
 def capitalised(sentence: str) -> str:
     """Return a sentence with a capital first letter, unless it begins with a symbol: l1, dK/dq, a and d."""

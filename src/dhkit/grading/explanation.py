@@ -18,8 +18,6 @@ from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 from dhkit.symbolic.textbook_kinematics import derive_kinematics
 
-__all__ = ["Step", "explanation_html", "explanation_text", "worked_solution"]
-
 
 @dataclass(frozen=True, eq=False)
 class Step:

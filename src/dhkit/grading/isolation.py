@@ -19,8 +19,6 @@ from typing import NoReturn, TypeAlias
 from dhkit.errors import DhkitError
 from dhkit.grading.report import GradeReport
 
-__all__ = ["Judge", "Limits", "judged", "kill", "result_of", "start_worker"]
-
 Judge: TypeAlias = Callable[[Path], GradeReport]
 """Judges a sheet; what it raises becomes the report's error."""
 

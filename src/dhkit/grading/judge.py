@@ -37,8 +37,6 @@ from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, 
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import RingError
 
-__all__ = ["judge"]
-
 
 def judge(
     description: Description, sheet: AnswerSheet, digits: int = 4, *, seed: int | None = None, explained: bool = True

@@ -19,8 +19,6 @@ from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Rubric
 
-__all__ = ["grade", "grade_answers", "prepare", "robot_of"]
-
 MOST_JOINTS = 4
 """Of robots whose mistakes are all derived ahead: those of larger ones take longer than most sheets need."""
 LONGEST_NAME = 200

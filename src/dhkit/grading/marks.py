@@ -11,8 +11,6 @@ from dhkit.grading.answers.sheet import QUANTITY
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
 
-__all__ = ["Mark", "Marks", "marks"]
-
 
 @dataclass(frozen=True)
 class Mark:

@@ -10,9 +10,6 @@ from typing import Any
 
 from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
 
-__all__ = ["Diagnosis", "Entry", "GradeReport", "Note", "NoteKind", "Verdict", "Witness"]
-
-
 MOST_NAMED = 6
 LONGEST_SHOWN = 400
 """Characters of an answer, and of what is said about it, that a notebook shows."""

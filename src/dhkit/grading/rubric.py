@@ -19,8 +19,6 @@ from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import QUANTITY
 
-__all__ = ["WEIGHED", "Credit", "Feedback", "Rubric"]
-
 MAX_BYTES = 100_000
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 WEIGHED = re.compile(

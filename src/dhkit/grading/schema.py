@@ -24,8 +24,6 @@ from dhkit.grading.answers.sheet import (
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
 
-__all__ = ["rubric_schema", "sheet_schema", "task_schema"]
-
 ENTRY = {"type": ["string", "number"]}
 """A formula as text, or a number."""
 ANSWER = {"$ref": "#/$defs/Answer"}

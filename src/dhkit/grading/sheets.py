@@ -11,8 +11,6 @@ from pathlib import Path
 
 from dhkit.errors import AnswerError
 
-__all__ = ["SUFFIXES", "Sheet", "find_sheets"]
-
 SUFFIXES = frozenset((".toml", ".py", ".m", ".tex", ".ipynb"))
 MAX_DEPTH = 8
 MAX_LISTED = 20

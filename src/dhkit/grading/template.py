@@ -5,8 +5,6 @@ from __future__ import annotations
 from dhkit.description import Description
 from dhkit.grading.answers.sheet import shape_of
 
-__all__ = ["template"]
-
 ASKED = ("K", "V", "M", "C", "g", "tau")
 
 

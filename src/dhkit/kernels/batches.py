@@ -11,8 +11,6 @@ from dhkit.description import Array
 from dhkit.description.arrays import number_array
 from dhkit.kernels.kernel import Kernel
 
-__all__ = ["check_whole", "fill", "pose_rows", "result_array"]
-
 
 def fill(
     kernel: Kernel,

@@ -12,8 +12,6 @@ from typing import Any, TypeAlias
 
 from dhkit.kernels.vectors import Vector, absolute, select
 
-__all__ = ["EXACT_RANGE", "atan2", "maximum", "minimum", "sincos"]
-
 Select: TypeAlias = Callable[[Any, Any, Any], Any]
 Absolute: TypeAlias = Callable[[Any], Any]
 

@@ -19,8 +19,6 @@ from dhkit.symbolic import Graph
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Interpreter"]
-
 LANES = 64
 """Items that one call of the virtual machine works through in a larger batch."""
 FEW = 16

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from dhkit.kernels.interpreter import Interpreter
     from dhkit.kernels.machine_code import CompiledFunction
 
-__all__ = ["COMPILE_AFTER", "SMALL", "Kernel", "kernel", "kernel_mode", "uncounted"]
-
 log = logging.getLogger(__name__)
 
 MODES = ("auto", "on", "off")

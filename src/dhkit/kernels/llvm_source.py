@@ -25,8 +25,6 @@ from dhkit.kernels.vectors import (
 )
 from dhkit.symbolic import Graph
 
-__all__ = ["BLOCK", "FLOAT", "SMALL_INTEGER", "llvm_source"]
-
 BLOCK = 64
 """Items of one block: 8 vectors of 8 doubles; all rows of a block, inverse kinematics included, fit the first cache."""
 

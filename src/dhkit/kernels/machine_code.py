@@ -15,8 +15,6 @@ from dhkit.description import Array
 from dhkit.kernels.llvm_source import BLOCK
 from dhkit.kernels.stages import Stage, Stages, address, aligned
 
-__all__ = ["CompiledFunction", "compiled", "processor"]
-
 OPTIMIZATION = 2
 """Of instruction selection and scheduling; a straight-line body of vectors leaves other passes nothing to do."""
 ALIGNMENT = 64

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-__all__ = ["Stage", "Stages"]
-
 
 @dataclass(frozen=True, slots=True)
 class Stage:

@@ -18,8 +18,6 @@ from dhkit.description import write_atomically
 from dhkit.errors import DhkitError
 from dhkit.kernels.machine_code import processor
 
-__all__ = ["cache_folder", "digest", "read", "write"]
-
 log = logging.getLogger(__name__)
 
 PACKAGES = ("description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")

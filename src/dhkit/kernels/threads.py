@@ -10,8 +10,6 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from itertools import islice
 from typing import Any, TypeVar
 
-__all__ = ["all_in_threads", "in_threads"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 

@@ -6,23 +6,6 @@ import struct
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-__all__ = [
-    "EXACT",
-    "FUSING",
-    "MASK",
-    "VECTOR",
-    "WIDTH",
-    "Body",
-    "Mask",
-    "Number",
-    "Vector",
-    "absolute",
-    "constant",
-    "floor",
-    "select",
-    "sqrt",
-]
-
 WIDTH = 8
 """Doubles of one vector: a register of AVX-512, two of AVX, four of SSE and NEON."""
 VECTOR, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"

@@ -5,7 +5,7 @@ from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics, inverse_kinematics_in_chunks
-from dhkit.kinematics.jacobian import ReferenceAxes, jacobian, jacobian_dot
+from dhkit.kinematics.jacobian import jacobian, jacobian_dot
 from dhkit.kinematics.kernels import kinematic_kernels
 from dhkit.kinematics.manipulability import (
     Ellipsoid,
@@ -29,6 +29,7 @@ from dhkit.kinematics.singularities import (
 )
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 from dhkit.kinematics.workspace import Estimate, Grid, Workspace, tool_reach, workspace
+from dhkit.symbolic import ReferenceAxes
 
 __all__ = [
     "Boundary",

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description, world_to_frames
 from dhkit.description.frames import carrying
 
-__all__ = ["TOLERANCE", "Axes", "inverse_pose"]
-
 TOLERANCE = 1e-12
 """Sine of the angle by which axes may miss being parallel or perpendicular; share of the reach by which they may miss
 each other where they intersect. A closed form then still closes to about this."""

@@ -21,8 +21,6 @@ from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.singular_factors import Side, link_radii, slide_radii
 from dhkit.kinematics.singularities import singularities
 
-__all__ = ["Boundary", "boundaries"]
-
 TURNED = {"elbow_wrist", "slide_wrist", "three_parallel", "yaw_two", "yaw_three"}
 """Families with an arm in a plane that joint 1 turns."""
 PLANAR = {"parallel_chain", "polar"}

@@ -10,8 +10,6 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import limit_parameters
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
 
-__all__ = ["export_kinematics"]
-
 
 @takes_robot
 def export_kinematics(description: Description, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:

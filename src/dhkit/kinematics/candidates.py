@@ -9,8 +9,6 @@ from dhkit.description import Array, Description
 from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatus
 
-__all__ = ["are_poses", "collect", "orthonormal", "wrapped"]
-
 TURN = 2 * np.pi
 
 

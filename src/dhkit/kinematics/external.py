@@ -20,8 +20,6 @@ from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.numeric import closes, descend
 from dhkit.kinematics.solutions import IKSolutions
 
-__all__ = ["solve_externally"]
-
 log = logging.getLogger(__name__)
 
 CLOSES = 1e-10

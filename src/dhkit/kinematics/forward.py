@@ -11,8 +11,6 @@ from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
-__all__ = ["forward_kinematics", "frames", "frames_kernel", "tool_kernel"]
-
 
 @takes_robot
 def forward_kinematics(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:

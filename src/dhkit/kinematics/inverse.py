@@ -19,8 +19,6 @@ from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_paramet
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
-__all__ = ["inverse_kinematics", "inverse_kinematics_in_chunks", "solver_of"]
-
 CHUNK = 16_384
 """Poses of a chunk: about 6 MB of joint values with eight branches, which the processor's cache holds."""
 

@@ -13,8 +13,6 @@ from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols, t
 from dhkit.symbolic import jacobian as symbolic_jacobian
 from dhkit.symbolic import jacobian_dot as symbolic_jacobian_dot
 
-__all__ = ["ReferenceAxes", "jacobian", "jacobian_dot", "jacobian_dot_kernel", "jacobian_kernel"]
-
 
 @takes_robot
 def jacobian(

@@ -10,8 +10,6 @@ from dhkit.kinematics.inverse import solver_of
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
 from dhkit.kinematics.newton import error_kernel, step_kernel
 
-__all__ = ["kinematic_kernels"]
-
 
 @takes_robot
 def kinematic_kernels(description: Description) -> list[Kernel]:

@@ -15,18 +15,6 @@ from dhkit.display import listed, repr_line
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 
-__all__ = [
-    "Ellipsoid",
-    "Motion",
-    "condition_number",
-    "force_ellipsoid",
-    "freedoms",
-    "isotropy",
-    "manipulability",
-    "singular_values",
-    "velocity_ellipsoid",
-]
-
 Motion: TypeAlias = Literal["translational", "rotational", "whole"]
 """Which of the tool's motions: its origin's velocity, its angular velocity, or both (in m and rad, unweighted)."""
 

@@ -14,8 +14,6 @@ from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.symbolic import Graph
 
-__all__ = ["Newton", "error_kernel", "step_kernel"]
-
 TURN = 2 * np.pi
 
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from dhkit.symbolic import Graph
 
-__all__ = ["error_program", "step_program"]
-
 SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
 TURN = 2 * np.pi

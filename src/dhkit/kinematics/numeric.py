@@ -19,8 +19,6 @@ from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.solutions import IKSolutions
 
-__all__ = ["solve_numerically"]
-
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with how many poses are done and how many there are."""
 

@@ -18,8 +18,6 @@ from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
-__all__ = ["IKPath", "follow_path"]
-
 JUMP = np.pi / 4
 """rad, or as a share of the reach: a joint that moves more between two poses has left its branch."""
 NEAR = 0.02

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-__all__ = ["Factor", "Kind", "Link", "Side", "Slide", "Turn", "link_radii", "slide_radii"]
-
 Kind: TypeAlias = Literal["shoulder", "elbow", "wrist"]
 TURN = 2 * np.pi
 NOTHING = 1e-12

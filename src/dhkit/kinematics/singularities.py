@@ -28,8 +28,6 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.singular_factors import Factor, Kind, Link, Side, Slide, Turn
 
-__all__ = ["Singularities", "determinant", "measures", "singular_configurations", "singularities"]
-
 BATCH, BATCHES = 256, 64
 """Random states tried at once, and how often, until enough are singular inside the limits."""
 STRETCHED = ("stretched", "folded")

@@ -14,8 +14,6 @@ from dhkit.description import Array, Description, joint_array
 from dhkit.display import MOST_ROWS, counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 
-__all__ = ["LIMIT_SLACK", "IKFlag", "IKSolutions", "IKStatus"]
-
 LIMIT_SLACK = 1e-9
 """rad or m: how far outside its limits a joint still counts as inside, for rounding."""
 TURN = 2 * np.pi

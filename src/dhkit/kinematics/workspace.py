@@ -15,8 +15,6 @@ from dhkit.display import counted, html_block, html_lines, html_table, listed, r
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
 
-__all__ = ["Estimate", "Grid", "Progress", "Workspace", "first_axis", "occupancy", "tool_reach", "workspace"]
-
 STATES_FOR_REACH = 5_000
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with how many samples are done and how many there will be."""

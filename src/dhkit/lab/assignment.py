@@ -20,8 +20,6 @@ from dhkit.kinematics import classify
 from dhkit.lab.assignment_form import AssignmentForm, GoalForm, PoseForm, StepForm, validated
 from dhkit.trajectories import Trajectory
 
-__all__ = ["Assignment", "Goal", "JointsAt", "MotionBetween", "OwnScore", "Step", "ToolAt", "is_assignment"]
-
 MAX_BYTES = 100_000
 MAX_BYTES_OF_ROBOT = 1_000_000
 """Of a robot file: what is longer is neither."""

@@ -29,8 +29,6 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 from dhkit.lab.tool_panel import ORDERS
 
-__all__ = ["AssignmentForm", "GoalForm", "PoseForm", "StepForm", "assignment_schema", "panel_names", "validated"]
-
 CONDITIONS = ("pose", "joints", "motion", "own")
 MOST_STEPS, MOST_GOALS, MOST_JOINTS = 20, 20, 32
 LONGEST_TEXT, LONGEST_LINE, LONGEST_EXPRESSION = 4_000, 200, 200

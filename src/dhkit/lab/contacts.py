@@ -11,8 +11,6 @@ from dhkit.description import Array
 from dhkit.errors import DhkitError
 from dhkit.lab.jobs import Job, Jobs
 
-__all__ = ["Contacts", "touching"]
-
 SETTLE = 0.5
 """s without another arm before one is prepared: an arm that a person edits changes again soon."""
 

@@ -23,8 +23,6 @@ from dhkit.lab.references import back_and_forth, gentle_sine
 from dhkit.lab.run_settings import OWN, PARTS, TITLES, Settings
 from dhkit.viewer.streams import Samples
 
-__all__ = ["ControlPanel"]
-
 log = logging.getLogger(__name__)
 
 RATE = 1000.0

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from dhkit.control import SimulationResult
     from dhkit.trajectories import Trajectory
 
-__all__ = ["Desk", "file_content"]
-
 UNIQUE = 1e-6
 """Cosine (or sine) of the second Euler angle below which the first and third are not unique."""
 SINGULAR = 1e-3

@@ -19,8 +19,6 @@ from dhkit.symbolic.equations import latex_lines
 from dhkit.symbolic.equations.quantities import quantities
 from dhkit.viewer.interactive import listed
 
-__all__ = ["DynamicsPanel"]
-
 ROOM = 21.0
 """em of a line of a formula: what the panel is wide."""
 MOST_LINES = 60

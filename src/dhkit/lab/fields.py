@@ -11,8 +11,6 @@ import numpy as np
 
 from dhkit.description import Array
 
-__all__ = ["LARGEST_JOINT_VALUE", "Fields"]
-
 LARGEST_JOINT_VALUE = 1e6
 """rad or m."""
 

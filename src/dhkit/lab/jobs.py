@@ -10,8 +10,6 @@ from typing import Any
 
 from dhkit.errors import DhkitError
 
-__all__ = ["Cancelled", "Job", "Jobs"]
-
 log = logging.getLogger(__name__)
 
 LONGEST_END = 20.0

@@ -10,8 +10,6 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.programs import random_states
 
-__all__ = ["JointPanel"]
-
 
 class JointPanel:
     """Requests ``joints.…``."""

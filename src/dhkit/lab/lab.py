@@ -31,8 +31,6 @@ from dhkit.lab.transforms_panel import Solid, TransformsPanel
 from dhkit.lab.workspace_panel import WorkspacePanel
 from dhkit.viewer import View
 
-__all__ = ["Lab"]
-
 
 class Lab:
     """An arm that a person moves, drives, edits and controls in the browser.

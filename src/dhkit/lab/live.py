@@ -17,8 +17,6 @@ from dhkit.control.runs import result_of
 from dhkit.description import Array
 from dhkit.dynamics import Friction
 
-__all__ = ["Live"]
-
 MOST_ROWS = 20_000
 """Rows that are kept: the first 20 s at 1 kHz, 7 MB for six joints. When they are full every second one is dropped, and
 from then on half as many are added, so that a run of any length is kept whole."""

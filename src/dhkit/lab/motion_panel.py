@@ -26,8 +26,6 @@ from dhkit.trajectories import Trajectory, read_motion
 from dhkit.viewer.interactive import limits_state
 from dhkit.viewer.motion import exceeded_limit
 
-__all__ = ["MotionPanel", "literal"]
-
 KINDS = ("quintic", "trapezoidal", "least-time", "line", "circle")
 GOAL = ("q", "T", "waypoints")
 LONGEST = 600.0

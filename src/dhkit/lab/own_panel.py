@@ -19,8 +19,6 @@ from dhkit.lab.fields import Fields
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.programs import Limits, Program, ProgramError, check
 
-__all__ = ["OwnPanel"]
-
 log = logging.getLogger(__name__)
 
 PERIOD = 0.1

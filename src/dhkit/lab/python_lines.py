@@ -14,8 +14,6 @@ from dhkit.lab.motion_panel import MotionPanel, literal
 from dhkit.lab.run_settings import OWN
 from dhkit.lab.tool_panel import ToolPanel
 
-__all__ = ["python_lines"]
-
 CLASSES = {
     "pd": "dhkit.PID.tuned(arm, {w}, {z}, integral=0)",
     "pid": "dhkit.PID.tuned(arm, {w}, {z})",

@@ -9,8 +9,6 @@ from dhkit.control import Sine
 from dhkit.description import Array
 from dhkit.trajectories import Trajectory
 
-__all__ = ["back_and_forth", "gentle_sine"]
-
 AMPLITUDE, FREQUENCY = 0.3, 0.25
 """Of a sine: rad (and shares of the reach) from end to end, less where limits are near; and Hz."""
 ROOM = 0.9

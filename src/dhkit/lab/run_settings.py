@@ -9,8 +9,6 @@ from dhkit.control import CONTROLLERS
 from dhkit.dynamics import Friction
 from dhkit.lab.fields import Fields
 
-__all__ = ["OWN", "PARTS", "TITLES", "Settings"]
-
 SMOOTH = 0.05
 """rad/s or m/s of smooth friction."""
 FRICTIONS = ("none", "smooth", "stiction")

@@ -15,8 +15,6 @@ from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
 
-__all__ = ["serve"]
-
 TOKEN_LENGTH = 22
 """Characters of a token."""
 LONGEST_TOKEN = 100

@@ -28,8 +28,6 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
 from dhkit.lab.jobs import Job, Jobs
 
-__all__ = ["SubmitPanel"]
-
 LONGEST = 60_000
 """Characters of an answer."""
 SECONDS = 120.0

@@ -17,8 +17,6 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.fields import Fields
 from dhkit.viewer.interactive import COLUMNS, table_texts
 
-__all__ = ["TablePanel", "moved", "turned", "typed"]
-
 MOST_STEPS = 200
 """Of undo."""
 LARGEST = 1e4

@@ -16,8 +16,6 @@ from dhkit.lab.fields import Fields
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
 
-__all__ = ["TaskPanel"]
-
 Place = tuple[int, int]
 """Of a goal: its step and its number there, from 0."""
 

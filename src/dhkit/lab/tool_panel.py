@@ -15,8 +15,6 @@ from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
 from dhkit.lab.desk import Desk
 from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 
-__all__ = ["ToolPanel", "solved"]
-
 FAR = 1e4
 """m: positions beyond are refused."""
 RESTARTS = 3

@@ -18,8 +18,6 @@ from dhkit.lab.fields import Fields
 from dhkit.lab.table_panel import moved, turned, typed
 from dhkit.model.mesh_reader import read_mesh
 
-__all__ = ["Solid", "TransformsPanel"]
-
 EDGES = (0.36, 0.24, 0.12)
 """Of the box that is shown where no file is given, shares of the arm's reach."""
 MOST_BYTES, MOST_TRIANGLES = 5_000_000, 5_000

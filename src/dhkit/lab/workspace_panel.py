@@ -18,8 +18,6 @@ from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.viewer.overlays import heat_colors
 
-__all__ = ["WorkspacePanel", "boundary_distance"]
-
 SAMPLES = 400_000
 """Random states, of which a slice keeps a few in a hundred."""
 SHOWN = 10_000

@@ -9,8 +9,6 @@ from dhkit.description import library_robot, robots, write_atomically
 from dhkit.model.puma560_meshes import write_puma560_meshes
 from dhkit.model.urdf import urdf_text
 
-__all__ = ["library_urdf", "write_assets"]
-
 log = logging.getLogger(__name__)
 
 

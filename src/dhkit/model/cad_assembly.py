@@ -41,8 +41,6 @@ from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 from dhkit.model.urdf import urdf_text
 
-__all__ = ["CadImport", "import_cad"]
-
 ROBOT, URDF, MESHES = "robot.toml", "robot.urdf", "meshes"
 FOREIGN_SIZE = (0.1, 20.0)
 """Size of an assembly as a share of the arm's length, beyond which a stated unit is probably wrong."""

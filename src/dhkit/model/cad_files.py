@@ -10,8 +10,6 @@ from pathlib import Path
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.errors import DescriptionError, ModelError
 
-__all__ = ["LEFT_OUT", "Assignment", "assigned", "file_inside", "link_number", "mat_file", "mesh_files"]
-
 LEFT_OUT = -1
 """The link that stands for none, where parts are mapped."""
 MOST_FILES = 500

@@ -15,8 +15,6 @@ from dhkit.model.mass_report import ReportedMass, read_mass_report
 from dhkit.model.shape_inertia import MassProperties, shape_inertia
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["LinkBody", "StatedMasses"]
-
 ROUNDING = 1e-13
 """Coordinates and products below this share of a link's size and moments are 0: integrals are exact to some 1e-15."""
 IMPOSSIBLE = 0.01

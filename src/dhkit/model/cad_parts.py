@@ -18,8 +18,6 @@ from dhkit.model.mat_parts import mat_parts
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["MAX_CAD_TRIANGLES", "CadPart", "cad_parts", "simplified"]
-
 MAX_CAD_BYTES = 600_000_000
 MAX_CAD_TRIANGLES = 200_000
 """Of a file without ``simplify``: seven of them are drawn well by a browser."""

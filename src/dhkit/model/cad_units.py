@@ -11,8 +11,6 @@ from dhkit.description.frames import carrying
 from dhkit.errors import ModelError
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["UNITS", "arm_length", "check_positions", "check_size", "far_from_axes", "size_of", "unit_of"]
-
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 SMALLEST, LARGEST = 0.25, 6.0
 """Diagonal of the box around an arm in its READY pose, as a share of its length, the sum of |a| and |d|."""

@@ -17,8 +17,6 @@ from dhkit.description import Array
 from dhkit.model.shells import Shells
 from dhkit.model.triangle_mesh import TriangleMesh, same_vertices
 
-__all__ = ["FLAT", "Surface", "is_closed", "outwards", "repaired", "signed_volume", "tetrahedra"]
-
 NEAR = 1e-6
 """Vertices nearer than this share of a mesh's size are joined where the mesh is open: files round each corner alone."""
 LARGEST_CAP = 0.02

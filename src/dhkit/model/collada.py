@@ -18,8 +18,6 @@ from dhkit.errors import ModelError
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
-__all__ = ["collada_mesh", "collada_unit"]
-
 Element = ElementTree.Element
 MOST_PIECES = 5_000
 """Geometries that the nodes of one file may place: nodes can name each other, so that a small file could place any

@@ -14,8 +14,6 @@ from dhkit.model.urdf_chain import chain_tips, only_tip, tool_frame
 from dhkit.model.urdf_reader import read_urdf
 from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 
-__all__ = ["ExampleChain", "example_chains", "example_robots", "example_urdf", "urdf_source"]
-
 PACKAGE = "example-robot-data"
 PREFIX = "example:"
 LONG = 7

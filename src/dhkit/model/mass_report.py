@@ -17,8 +17,6 @@ from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.shape_inertia import MassProperties
 from dhkit.model.solidworks_report import REPORT, SolidWorksReport
 
-__all__ = ["ReportedMass", "read_mass_report"]
-
 MAX_BYTES = 1_000_000
 MAX_ROWS = 200
 COLUMNS = ("link", "mass", "com_x", "com_y", "com_z", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz")

@@ -23,8 +23,6 @@ from dhkit.model.mesh_reader import odd_coordinates
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["mat_parts"]
-
 MAX_BYTES = 100_000_000
 MAX_UNPACKED = 400_000_000
 MAX_DEPTH = 6

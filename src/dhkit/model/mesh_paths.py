@@ -10,8 +10,6 @@ from xml.etree import ElementTree
 
 from dhkit.errors import ModelError
 
-__all__ = ["MeshFinder"]
-
 MAX_PARENTS = 20
 """Folders above a URDF that are looked at for a package.xml."""
 MAX_PACKAGE_BYTES = 100_000

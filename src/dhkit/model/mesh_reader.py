@@ -20,8 +20,6 @@ from dhkit.model.shapes import Part
 from dhkit.model.stl import ascii_corners, binary_corners
 from dhkit.model.triangle_mesh import TriangleMesh
 
-__all__ = ["MAX_TRIANGLES", "mesh_header", "odd_coordinates", "read_mesh", "read_part"]
-
 MAX_TRIANGLES = 2_000_000
 """Of a file that is drawn or measured, more than 50 MB of binary STL hold."""
 LARGEST_COORDINATE = 1e12

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-__all__ = ["triangles_of"]
-
 STRAIGHT = 1e-9
 """A corner turns inwards where the sine of its turn, the longest edges' product as measure, is below minus this."""
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 else:
     PinocchioModel: TypeAlias = Any
 
-__all__ = ["NoPinocchioError", "PinocchioModel", "import_pinocchio", "pinocchio_model"]
-
 
 class NoPinocchioError(ModelError):
     """Pinocchio is not installed; there is no wheel of it for Windows."""

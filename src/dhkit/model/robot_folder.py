@@ -10,8 +10,6 @@ from dhkit.description import Description, Mesh, Shape, to_toml, write_atomicall
 from dhkit.description.robot import takes_robot
 from dhkit.errors import DescriptionError, ModelError
 
-__all__ = ["write_robot_with_meshes"]
-
 MESHES = "meshes"
 
 

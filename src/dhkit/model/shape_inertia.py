@@ -16,8 +16,6 @@ from dhkit.expressions import exact
 from dhkit.model.closed_surface import FLAT, outwards, repaired, signed_volume, tetrahedra
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
-__all__ = ["InertiaMethod", "MassProperties", "ShapeInertia", "convex_hull", "shape_inertia"]
-
 
 class InertiaMethod(Enum):
     """What the volume of a link was taken from."""

@@ -24,8 +24,6 @@ from dhkit.description.robot import takes_robot
 from dhkit.display import repr_line
 from dhkit.expressions import Expression, exact, substitute
 
-__all__ = ["Part", "link_parts"]
-
 Solid: TypeAlias = tuple[Geometry, Array]
 """A geometry and its (4, 4) pose in its link's DH frame."""
 

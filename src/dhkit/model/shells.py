@@ -18,8 +18,6 @@ from dhkit.model.triangle_mesh import TriangleMesh
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-__all__ = ["Shells"]
-
 BEHIND = 1e-6
 """How far behind a triangle a point is looked at, as a share of the mesh's size."""
 POINTS = 16

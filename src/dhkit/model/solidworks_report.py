@@ -18,8 +18,6 @@ from dhkit.description import Array
 from dhkit.errors import ModelError
 from dhkit.model.shape_inertia import MassProperties
 
-__all__ = ["REPORT", "SolidWorksReport"]
-
 REPORT = re.compile(r"^[ \t]*Mass properties of\b[ \t]*(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
 ASSEMBLY = re.compile(r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE)
 DECIMAL = r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?"

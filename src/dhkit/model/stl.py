@@ -9,8 +9,6 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import ModelError
 
-__all__ = ["ascii_corners", "ascii_stl", "binary_corners", "binary_stl"]
-
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 HEADER = 84
 NORMAL_DECIMALS = 6

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array
 from dhkit.display import repr_line
 
-__all__ = ["TriangleMesh", "joined_meshes", "same_vertices"]
-
 MIXERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 """Odd factors that spread three coordinates over 64 bits."""
 

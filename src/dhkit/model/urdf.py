@@ -35,8 +35,6 @@ from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.shapes import Part, link_parts
 
-__all__ = ["MESHES", "urdf_text", "write_urdf"]
-
 MESHES = "meshes"
 """Folder beside a URDF that its meshes are copied into."""
 UNLIMITED = 1e6

@@ -19,20 +19,6 @@ from dhkit.model.urdf_reader import read_urdf
 from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name
 
-__all__ = [
-    "BASE_FRAME",
-    "TIP_FRAME",
-    "Chain",
-    "Side",
-    "chain_model",
-    "chain_of",
-    "chain_text",
-    "chain_tips",
-    "only_tip",
-    "read_chain",
-    "tool_frame",
-]
-
 Side: TypeAlias = Literal["freeze", "drop"]
 """What becomes of links behind moving joints beside the chain: carried along with those joints at zero, or left out."""
 

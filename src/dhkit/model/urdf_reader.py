@@ -19,8 +19,6 @@ from dhkit.errors import ModelError
 from dhkit.model.urdf_tree import MOVING, Inertial, UrdfJoint, UrdfLink, UrdfShape, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name, numbers, parsed
 
-__all__ = ["read_urdf"]
-
 MAX_LINKS = 500
 """Thousands of fixed joints in a row crash Pinocchio."""
 MAX_SHAPES = 2_000

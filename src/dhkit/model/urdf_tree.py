@@ -11,8 +11,6 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.model.urdf_xml import Element
 
-__all__ = ["MOVING", "Inertial", "UrdfJoint", "UrdfLink", "UrdfShape", "UrdfTree"]
-
 MOVING = ("revolute", "continuous", "prismatic")
 
 

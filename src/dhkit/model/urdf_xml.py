@@ -11,8 +11,6 @@ from xml.etree import ElementTree
 
 from dhkit.errors import ModelError
 
-__all__ = ["MAX_BYTES", "Element", "child_name", "numbers", "parsed"]
-
 Element = ElementTree.Element
 
 MAX_BYTES = 5_000_000

@@ -11,8 +11,6 @@ from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import Knots
 from dhkit.trajectories import Trajectory
 
-__all__ = ["assembled", "knots_along"]
-
 ROUNDS = 2
 """Corrections: the first leaves what rounding makes of it."""
 

@@ -17,8 +17,6 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import default_limits
 
-__all__ = ["ACTIVE", "POINTS", "Certificate", "Check", "Checker", "certify", "position_sizes"]
-
 POINTS = 24
 """States an interval, both its ends included: more than anybody will ask for."""
 SPREAD = 4

@@ -18,8 +18,6 @@ from dhkit.planning.point import Point
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["BEYOND", "NOTHING", "Clear", "Surroundings"]
-
 SIZES = (0, 1, 2, 4, 8, 16, 32)
 """How many obstacles programs have room for: one made for three serves four as well."""
 BEYOND = 1.2

@@ -13,8 +13,6 @@ from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.trajectories import Trajectory, quintic, trapezoidal
 
-__all__ = ["classical", "coarser"]
-
 
 def classical(task: Task) -> tuple[tuple[str, float], ...]:
     """Return the durations of a quintic and of the best trapezoid along the straight joint path, under its limits, s.

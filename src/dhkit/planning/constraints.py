@@ -22,13 +22,6 @@ from dhkit.planning.states import States
 if TYPE_CHECKING:
     import casadi
 
-__all__ = [
-    "Constraint",
-    "MotorPower",
-    "TorqueSpeedLine",
-    "positive",
-]
-
 
 @dataclass(frozen=True)
 class Constraint:

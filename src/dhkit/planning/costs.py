@@ -10,8 +10,6 @@ from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
 
-__all__ = ["cost_of", "size_of"]
-
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 """Exact to degree 9: of a motion's squared jerk, and of its squared torques up to their curvature in an interval."""
 

@@ -15,8 +15,6 @@ from dhkit.planning.objectives import Objective
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
 
-__all__ = ["require_bounded", "require_holdable", "require_inside_limits", "require_kept", "require_speed"]
-
 BARELY = 1e-6
 """By what share of a constraint rounding may exceed it."""
 EDGE = 1e-9

@@ -16,8 +16,6 @@ from dhkit.errors import DescriptionError, ModelError, PlanningError, Unreachabl
 from dhkit.kinematics import inverse_kinematics, solve_numerically
 from dhkit.trajectories import Limits
 
-__all__ = ["Place", "Route", "place", "routes"]
-
 SEARCHES = 24
 """Starts of the iteration for arms without a closed form."""
 SAME = 1e-3

@@ -14,8 +14,6 @@ from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.trajectories import Limits, Trajectory
 
-__all__ = ["detour", "leg_durations", "straight_knots", "usual_accelerations"]
-
 SAMPLES = 17
 """States by which a leg's duration is guessed."""
 ROOM = 0.05

@@ -10,8 +10,6 @@ from dhkit.planning.mesh import Curve
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["MotionPieces"]
-
 
 @dataclass(frozen=True, eq=False)
 class MotionPieces:

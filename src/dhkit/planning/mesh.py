@@ -9,8 +9,6 @@ import numpy as np
 
 from dhkit.description import Array
 
-__all__ = ["LEAST", "Curve", "Mesh"]
-
 GRADED = 0.9
 """How much finer the mesh is at its ends: robots reach their speed in a small part of a motion."""
 LEAST = 6

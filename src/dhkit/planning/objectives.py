@@ -17,8 +17,6 @@ from dhkit.planning.states import States
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Effort", "Energy", "Jerk", "Objective", "ObjectiveLike", "Term", "Time"]
-
 SOFT = 0.02
 """Share of a joint's greatest power over which regenerated power fades out, so that it can be differentiated."""
 

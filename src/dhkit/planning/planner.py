@@ -43,8 +43,6 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
 
-__all__ = ["Planner"]
-
 EXPANDED = 400
 """Up to so many joints times intervals a program is expanded into scalars: solved twice as fast, made in ten times."""
 CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}

@@ -16,8 +16,6 @@ from dhkit.trajectories import Limits
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["LOAD", "Point", "gear_ratios"]
-
 LOAD = 10
 """Numbers of a payload: mass, centre of mass (3), inertia (6)."""
 

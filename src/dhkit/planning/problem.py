@@ -24,8 +24,6 @@ from dhkit.trajectories import Limits
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Knots", "Problem", "Rows"]
-
 CALM = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
 """Share of the objective that accelerations have in least time or energy: joints with slack then move calmly.
 

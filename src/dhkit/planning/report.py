@@ -8,8 +8,6 @@ from typing import Any
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.planning.certificate import Certificate
 
-__all__ = ["JOINTWISE", "BranchReport", "PlanReport"]
-
 JOINTWISE = ("position", "velocity", "acceleration", "jerk", "torque", "motor power", "torque-speed line")
 """Limits of each joint."""
 TOLD = 3

@@ -22,8 +22,6 @@ from dhkit.planning.states import States
 from dhkit.planning.task import FEW, Margins, Task, g_bounds, worst_row, x_bounds
 from dhkit.trajectories import Trajectory
 
-__all__ = ["Found", "Program", "Search"]
-
 FEASIBLE = 1e-5
 """What a solution's rows may miss at most to be taken: the certificate decides about the rest."""
 SMALL_STEP = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-3, Curve.QUADRATIC: 1e-3}

@@ -18,8 +18,6 @@ from dhkit.display import value_line
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Progress", "ProgressCall", "Solution", "Solver", "Stopped"]
-
 OPTIONS: dict[str, Any] = {
     "print_level": 0,
     "sb": "yes",

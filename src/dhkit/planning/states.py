@@ -16,8 +16,6 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
 from dhkit.trajectories.pieces import Side
 
-__all__ = ["States", "prepare"]
-
 
 @dataclass(frozen=True, eq=False)
 class States:

@@ -15,8 +15,6 @@ from dhkit.planning.solver import Solution
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits
 
-__all__ = ["Margins", "Task"]
-
 FEW = 3
 """Joints: with so many, programs are small."""
 LEAST_ROOM = 0.05

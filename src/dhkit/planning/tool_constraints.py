@@ -19,8 +19,6 @@ from dhkit.planning.states import States
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["ToolAcceleration", "ToolDirection", "ToolOrientation", "ToolSpeed"]
-
 
 @dataclass(frozen=True)
 class ToolSpeed(Constraint):

@@ -11,8 +11,6 @@ from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.clear import Surroundings
 from dhkit.trajectories import Limits
 
-__all__ = ["Wish", "checked_limits", "end_velocity"]
-
 
 @dataclass(frozen=True, eq=False)
 class Wish:

@@ -10,8 +10,6 @@ from dhkit.description import Array
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 
-__all__ = ["CLOSE", "EXAMPLES", "Caller"]
-
 CLOSE = 1e-6
 """Between a pose and the one that is reached: entries of the rotations, and positions in shares of the arm's reach."""
 EXAMPLES = 5

@@ -19,8 +19,6 @@ from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part, share_within
 from dhkit.programs.rubric import CheckRubric, ControllerTask
 
-__all__ = ["check"]
-
 ROUNDED = 2e-3
 """Largest difference of poses that may come from rounded numbers."""
 APART = 1e-6

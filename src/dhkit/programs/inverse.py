@@ -18,8 +18,6 @@ from dhkit.programs.random_poses import poses_out_of_reach, random_states, regul
 from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
-__all__ = ["score_inverse"]
-
 SAME = 1e-5
 """rad and m between joint values that count as one solution; near singular poses they are less exact than the pose."""
 FEWEST = 10

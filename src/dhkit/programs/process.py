@@ -23,8 +23,6 @@ import psutil
 
 from dhkit.errors import DhkitError
 
-__all__ = ["HERE", "Limits", "Process", "ProgramError", "printable"]
-
 HERE = Path(__file__).parent
 LONGEST_LINE = 1 << 22
 """Bytes of an answer."""

@@ -22,8 +22,6 @@ from dhkit.programs.process import HERE, Limits, Process, ProgramError, printabl
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
 
-__all__ = ["FUNCTIONS", "Program", "protect_from_children"]
-
 FUNCTIONS = ("fk", "ik", "controller")
 """What a program may define."""
 LARGEST_SOURCE = 1_000_000

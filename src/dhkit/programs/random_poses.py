@@ -10,8 +10,6 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.kinematics import singular_values
 
-__all__ = ["poses_out_of_reach", "random_states", "regular_states", "singular_states"]
-
 REGULAR = 1e-2
 """Smallest over largest singular value of the Jacobian, from which a state is regular."""
 SINGULAR = 1e-9

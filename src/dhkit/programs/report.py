@@ -9,8 +9,6 @@ import numpy as np
 
 from dhkit.display import html_block, html_lines, html_table, repr_line, value_line
 
-__all__ = ["CheckReport", "Part", "share_within"]
-
 
 @dataclass(frozen=True)
 class Part:

@@ -13,8 +13,6 @@ from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 
-__all__ = ["CheckRubric"]
-
 MAX_BYTES = 100_000
 STRICT = ConfigDict(extra="forbid")
 Points = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]

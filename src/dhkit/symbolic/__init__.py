@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
     from dhkit.symbolic.differentiable.velocity_regressor import velocity_regressor
     from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
-    from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
+    from dhkit.symbolic.exact.exact_arm import ExactArm, exact_arm
     from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
+    from dhkit.symbolic.exact.naming import Symbols
     from dhkit.symbolic.exact.regressor import Regressor
     from dhkit.symbolic.kinematics import SymbolicKinematics, SymbolicMatrix, symbolic_kinematics
     from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
@@ -112,10 +113,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "dhkit.symbolic.differentiable.bodies": ("Moments",),
         "dhkit.symbolic.differentiable.casadi_functions": ("CasadiFunctions",),
-        "dhkit.symbolic.differentiable.composite_bodies": (
-            "composite_coriolis_matrix",
-            "composite_mass_matrix",
-        ),
+        "dhkit.symbolic.differentiable.composite_bodies": ("composite_coriolis_matrix", "composite_mass_matrix"),
         "dhkit.symbolic.differentiable.energies": (
             "kinetic_energy",
             "lagrange_coriolis_matrix",
@@ -138,61 +136,25 @@ __getattr__, __dir__ = lazy_names(
             "joint_symbols",
             "table_pattern",
         ),
-        "dhkit.symbolic.differentiable.friction": (
-            "Friction",
-            "friction_torque",
-            "smooth_direction",
-        ),
-        "dhkit.symbolic.differentiable.inertial_table": (
-            "InertialTable",
-            "inertial_pattern",
-        ),
+        "dhkit.symbolic.differentiable.friction": ("Friction", "friction_torque", "smooth_direction"),
+        "dhkit.symbolic.differentiable.inertial_table": ("InertialTable", "inertial_pattern"),
         "dhkit.symbolic.differentiable.recursive": (
             "recursive_bias",
             "recursive_gravity",
             "recursive_inverse_dynamics",
         ),
         "dhkit.symbolic.differentiable.velocity_regressor": ("velocity_regressor",),
-        "dhkit.symbolic.exact.base_parameters": (
-            "BaseParameters",
-            "base_parameters",
-        ),
-        "dhkit.symbolic.exact.exact_arm": (
-            "ExactArm",
-            "Symbols",
-            "exact_arm",
-        ),
-        "dhkit.symbolic.exact.lagrangian": (
-            "Lagrangian",
-            "Proof",
-            "lagrangian",
-        ),
+        "dhkit.symbolic.exact.base_parameters": ("BaseParameters", "base_parameters"),
+        "dhkit.symbolic.exact.exact_arm": ("ExactArm", "exact_arm"),
+        "dhkit.symbolic.exact.naming": ("Symbols",),
+        "dhkit.symbolic.exact.lagrangian": ("Lagrangian", "Proof", "lagrangian"),
         "dhkit.symbolic.exact.regressor": ("Regressor",),
         "dhkit.symbolic.kinematics": ("SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"),
-        "dhkit.symbolic.mistakes": (
-            "MISTAKES",
-            "MadeAt",
-            "Mistake",
-            "Subject",
-        ),
-        "dhkit.symbolic.programs.graph": (
-            "Graph",
-            "Node",
-            "Variable",
-        ),
+        "dhkit.symbolic.mistakes": ("MISTAKES", "MadeAt", "Mistake", "Subject"),
+        "dhkit.symbolic.programs.graph": ("Graph", "Node", "Variable"),
         "dhkit.symbolic.programs.operations": ("operation_count",),
-        "dhkit.symbolic.programs.printers": (
-            "c_source",
-            "export_c",
-        ),
-        "dhkit.symbolic.ring.elements": (
-            "Element",
-            "Elements",
-            "RingError",
-        ),
-        "dhkit.symbolic.textbook": (
-            "TextbookDerivation",
-            "derive",
-        ),
+        "dhkit.symbolic.programs.printers": ("c_source", "export_c"),
+        "dhkit.symbolic.ring.elements": ("Element", "Elements", "RingError"),
+        "dhkit.symbolic.textbook": ("TextbookDerivation", "derive"),
     },
 )

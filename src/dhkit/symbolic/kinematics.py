@@ -14,12 +14,11 @@ from dhkit.description import Array, Description
 from dhkit.description.robot import takes_robot
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
-from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols
+from dhkit.symbolic.exact.exact_arm import ExactArm
+from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import READABLE
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
-
-__all__ = ["SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"]
 
 CODE = {
     "python": equations.equations_python,

@@ -13,21 +13,6 @@ from fractions import Fraction
 
 from dhkit.display import repr_line, value_line
 
-__all__ = [
-    "LINK_MISTAKES",
-    "MISTAKES",
-    "ROTOR_MISTAKES",
-    "STEP_FACTORS",
-    "VELOCITY_FACTORS",
-    "MadeAt",
-    "Mistake",
-    "Subject",
-    "catalogue",
-    "check_mistake",
-    "has",
-    "made_at",
-]
-
 HALF = Fraction(1, 2)
 
 

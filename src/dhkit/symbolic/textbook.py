@@ -20,11 +20,10 @@ from dhkit.description import Description
 from dhkit.description.robot import takes_robot
 from dhkit.display import repr_line
 from dhkit.symbolic.exact.compact import parallel_runs
-from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, Symbols, exact_arm, point_inertia
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, exact_arm, point_inertia
+from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
-
-__all__ = ["BodyMotion", "LinkMotion", "TextbookDerivation", "derive", "scaled", "velocity_torques"]
 
 HALF = Fraction(1, 2)
 

@@ -16,21 +16,10 @@ import numpy as np
 from dhkit.description import Body, Description, Placement
 from dhkit.display import repr_line
 from dhkit.expressions import ZERO, Expression, cos, exact_angle, sin
-from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, Symbols, exact_arm
-from dhkit.symbolic.exact.naming import Naming
+from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, exact_arm
+from dhkit.symbolic.exact.naming import Naming, Symbols
 from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_mistake, has, made_at
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring, RingError
-
-__all__ = [
-    "JACOBIAN_MISTAKES",
-    "KINEMATIC_MISTAKES",
-    "LINK_MISTAKES",
-    "POSE_MISTAKES",
-    "TextbookKinematics",
-    "check_kinematic_mistake",
-    "derive_kinematics",
-    "with_massless_links",
-]
 
 ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
 ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."

@@ -15,8 +15,6 @@ from dhkit.errors import DescriptionError
 from dhkit.trajectories.labels import TEXTS, FileKind
 from dhkit.trajectories.matlab import read_variables
 
-__all__ = ["ARCHIVES", "archive_bytes", "archive_format", "mat_bytes", "npz_bytes", "read_archive"]
-
 ARCHIVES = (".npz", ".mat")
 MOST_FORMAT = 1_000
 """Bytes of the text ``format``."""

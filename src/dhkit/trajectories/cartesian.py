@@ -15,8 +15,6 @@ from dhkit.trajectories.timing import check_duration, timed
 from dhkit.trajectories.tool_paths import ToolPath, tool_circle, tool_line
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["circle", "straight_line"]
-
 
 @takes_robot
 def straight_line(

@@ -20,18 +20,6 @@ from dhkit.trajectories.ros_yaml import MESSAGE, POINT, ROWS, TIMES, parse_messa
 from dhkit.trajectories.tables import check_columns, read_table, select_columns, table_text
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = [
-    "ARCHIVES",
-    "LEFT_OUT",
-    "MOST_DIGITS",
-    "TABLES",
-    "load_trajectory",
-    "read_motion",
-    "read_samples",
-    "save_trajectory",
-    "written_by_dhkit",
-]
-
 TABLES = (".csv", ".yaml", ".yml")
 SAMPLES = (*TABLES, ".mat")
 """What samples from elsewhere may come in."""

@@ -21,8 +21,6 @@ from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.tool_paths import ToolPath
 
-__all__ = ["joint_path"]
-
 ACCURATE = 5e-8
 """m and rad: how far the tool may be off the path between knots, half of what is promised."""
 CHECKS = 9

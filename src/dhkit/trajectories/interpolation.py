@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.arrays import number_array
 
-__all__ = ["check_times", "cubic_hermite", "interpolated", "quintic_hermite"]
-
 
 def check_times(times: ArrayLike) -> Array:
     """Return times as an array (N,), N >= 2.

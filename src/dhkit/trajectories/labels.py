@@ -14,8 +14,6 @@ from dhkit.description import Description, from_toml, library_robot, robots, to_
 from dhkit.description.files import read_bounded
 from dhkit.errors import DescriptionError
 
-__all__ = ["TEXTS", "FileKind", "checked_suffix", "decoded"]
-
 TEXTS = ("format", "robot", "digest", "toml", "content")
 """Names of an archive's texts: its kind and version, the robot's name, digest and whole file, the arrays' digest."""
 DIGITS = 16

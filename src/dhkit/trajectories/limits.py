@@ -13,8 +13,6 @@ from dhkit.description.arrays import number_array
 from dhkit.description.frames import one_each
 from dhkit.display import counted, html_table, repr_line
 
-__all__ = ["Limits"]
-
 
 @dataclass(frozen=True, eq=False)
 class Limits:

@@ -12,8 +12,6 @@ import numpy as np
 
 from dhkit.errors import DescriptionError
 
-__all__ = ["ARRAY_EXPORT", "Variable", "read_variables"]
-
 HEADER, TAG = 128, 8
 MATRIX, COMPRESSED = 14, 15
 """Types of elements (MathWorks, MAT-File Format, table 1-1)."""

@@ -11,8 +11,6 @@ from dhkit.errors import DescriptionError
 from dhkit.trajectories.matlab import ARRAY_EXPORT, Variable, read_variables
 from dhkit.trajectories.tables import PREFIXES, TIMES, Table, joint_columns, place_of_name
 
-__all__ = ["MATRICES", "matlab_table"]
-
 MATRICES = tuple(prefixes[0] for prefixes in PREFIXES)
 """Our names of matrices with a column for each joint: values, rates, accelerations."""
 

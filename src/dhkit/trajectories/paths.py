@@ -13,8 +13,6 @@ from dhkit.trajectories.pieces import Pieces, shifted
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["JointPath", "quintic_law"]
-
 BISECTIONS = 60
 """Halve an interval down to rounding."""
 CLOSE = 1e-12

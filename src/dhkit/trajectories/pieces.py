@@ -14,8 +14,6 @@ from dhkit.description import Array
 from dhkit.description.arrays import number_array
 from dhkit.display import counted, repr_line
 
-__all__ = ["Pieces", "Side", "joined", "shifted"]
-
 Side: TypeAlias = Literal["right", "left"]
 """Which piece counts at a break."""
 REFINEMENTS = 6

@@ -13,8 +13,6 @@ from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
 from dhkit.trajectories.timing import check_duration, configuration, default_limits, timed
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["cubic", "quintic", "trapezoidal"]
-
 LEAST_BLEND = 0.01
 """Of the duration: shorter blends are not looked for, since accelerations grow without end."""
 GRID, ZOOMED, ZOOMS = 50, 15, 4

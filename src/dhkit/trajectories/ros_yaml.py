@@ -9,8 +9,6 @@ from typing import Any
 from dhkit.description import Array
 from dhkit.errors import DescriptionError
 
-__all__ = ["MESSAGE", "POINT", "ROWS", "TIMES", "parse_message", "trajectory_text"]
-
 MESSAGE = ("header", "joint_names", "points")
 """Keys of a message."""
 ROWS = ("positions", "velocities", "accelerations")

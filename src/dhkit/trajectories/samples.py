@@ -9,8 +9,6 @@ from dhkit.description import Array, Description, Payload
 from dhkit.display import counted, html_table, repr_line
 from dhkit.symbolic import Friction
 
-__all__ = ["Samples"]
-
 FIRST = 5
 """Times that a notebook shows."""
 

@@ -8,8 +8,6 @@ from dhkit.description.schema import titled_schema
 from dhkit.trajectories.files import LEFT_OUT, MOST_DIGITS
 from dhkit.trajectories.ros_yaml import ROWS, TIMES
 
-__all__ = ["motion_schema"]
-
 NUMBER = {
     "type": ["number", "string"],
     "pattern": r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$",

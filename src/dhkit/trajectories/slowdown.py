@@ -17,8 +17,6 @@ from dhkit.errors import PlanningError
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["Torques", "least_slowdown", "least_slowdowns", "require_inside"]
-
 Torques: TypeAlias = Callable[[Array, Array, Array], Array]
 """From q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n)."""
 

@@ -13,8 +13,6 @@ from dhkit.trajectories.slowdown import Torques
 from dhkit.trajectories.timing import default_limits, timed
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["spline"]
-
 
 @takes_robot
 def spline(

@@ -10,18 +10,6 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
 
-__all__ = [
-    "PREFIXES",
-    "TIMES",
-    "Table",
-    "check_columns",
-    "joint_columns",
-    "place_of_name",
-    "read_table",
-    "select_columns",
-    "table_text",
-]
-
 MOST_COLUMNS = 1000
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""

@@ -14,8 +14,6 @@ from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
 from dhkit.trajectories.trajectory import Trajectory
 
-__all__ = ["check_duration", "configuration", "default_limits", "timed"]
-
 SHORTEST, LONGEST = 1e-6, 1e6
 """s: durations beyond these are slips, and their powers leave the range of doubles."""
 SLACK = 1e-9

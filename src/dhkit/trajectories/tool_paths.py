@@ -12,8 +12,6 @@ from dhkit.description import Array, check_pose
 from dhkit.description.arrays import number_array
 from dhkit.display import repr_line
 
-__all__ = ["ToolCircle", "ToolLine", "ToolPath", "tool_circle", "tool_line"]
-
 
 class ToolPath(Protocol):
     """Poses of the tool over s in [0, 1]."""

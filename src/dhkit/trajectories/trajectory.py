@@ -22,8 +22,6 @@ from dhkit.trajectories.interpolation import interpolated
 from dhkit.trajectories.pieces import Pieces, Side, joined
 from dhkit.trajectories.samples import Samples
 
-__all__ = ["Trajectory"]
-
 MEETS = 1e-9
 """rad and m: two motions whose ends are nearer to each other are joined."""
 SLOWEST = 1e12

@@ -17,8 +17,6 @@ from dhkit.verification.reference import Reference
 from dhkit.verification.report import Agreement, VerificationReport
 from dhkit.verification.states import Motion, random_motions
 
-__all__ = ["Comparison", "largest", "verify", "worst"]
-
 FRAME_TOLERANCE = 1e-13
 """Of positions over the reach (at least 1 m) and of rotation entries: some hundred roundings."""
 JACOBIAN_TOLERANCE = 1e-12

@@ -10,8 +10,6 @@ from dhkit.description import Array, Description
 from dhkit.description.frames import carrying, world_to_frames
 from dhkit.model import PinocchioModel, pinocchio_model
 
-__all__ = ["differences"]
-
 STEPS = 360
 """Angles that are tried for a zero position, before the best is refined."""
 DIGITS = 6

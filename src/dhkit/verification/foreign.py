@@ -20,8 +20,6 @@ from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
 
-__all__ = ["verify_urdf"]
-
 BASE_MOVED = "the arms differ by a constant base"
 ROUNDING = 1e-12
 """m and rotation entries: what is below is no difference of two arms."""

@@ -8,8 +8,6 @@ import numpy as np
 
 from dhkit.description import Array, Description
 
-__all__ = ["Floors", "forward_tolerance", "relative_error"]
-
 TOLERANCE = 1e-12
 """Of every quantity of dynamics: some thousand roundings."""
 

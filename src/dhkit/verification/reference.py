@@ -10,8 +10,6 @@ from dhkit.description import INERTIA_PLACES, Array
 from dhkit.model import PinocchioModel
 from dhkit.verification.states import Motion
 
-__all__ = ["Reference"]
-
 
 class Reference:
     """A Pinocchio model asked at many states; every answer has the states as its first axis."""

@@ -8,8 +8,6 @@ from typing import Any
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
 
-__all__ = ["Agreement", "VerificationReport", "printable"]
-
 MOST_SHOWN = 20
 """Quantities that a notebook shows: all of an arm's own report."""
 MEASURE = (

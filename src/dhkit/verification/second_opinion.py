@@ -11,8 +11,6 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_text
 
-__all__ = ["second_opinion"]
-
 AGREED = 1e-9
 """Largest difference of a frame's entries, and of masses, centres and moments of inertia, that counts as agreement."""
 STATES = 10

@@ -11,8 +11,6 @@ from dhkit.description.robot import takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
-__all__ = ["Motion", "random_motions", "random_states"]
-
 RATE, ACCELERATION = 3.0, 10.0
 """rad/s or m/s where a joint has no speed limit; rad/s^2 or m/s^2."""
 

@@ -16,8 +16,6 @@ from dhkit.model.stl import binary_stl
 if TYPE_CHECKING:
     from dhkit.model.shapes import Part
 
-__all__ = ["Lowered", "grid_object", "grid_step", "part_object", "part_transform", "triad_object"]
-
 Lowered: TypeAlias = dict[str, Any]
 """A meshcat object or command as dictionaries, lists, numbers and bytes."""
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_path", "frame_space", "plot", "plot_arm", "plot_motion", "skeleton", "space"]
-
 AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
 """x, y and z, as in the viewer."""
 CURVE_COLORS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from dhkit.viewer.server import ViewerServer
     from dhkit.viewer.session import Session
 
-__all__ = ["File", "Page", "Refused"]
-
 MOST_REQUESTS = 64
 """Of one page that wait for an answer, or whose answer the page has not taken yet."""
 MOST_PAGES = 100

@@ -19,8 +19,6 @@ from dhkit.viewer.scene import frame_labels
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["COLUMNS", "arm_state", "interactive_data", "limits_state", "listed", "table_texts"]
-
 COLUMNS = ("theta", "d", "a", "alpha")
 RATE = 30.0
 """Samples a second of a motion in a page, which draws straight lines between them."""

@@ -14,8 +14,6 @@ from dhkit.description.numbers import Array
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
 
-__all__ = ["Motion", "PlayedMotion", "check_motion", "exceeded_limit", "played_motion", "sampled"]
-
 Motion = Trajectory | SimulationResult | tuple[ArrayLike, ArrayLike]
 """What can be played: the last are times (N,), s, and joint values (N, n), rad and m."""
 

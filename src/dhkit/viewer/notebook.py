@@ -8,8 +8,6 @@ from importlib import resources
 from importlib.util import find_spec
 from typing import Any
 
-__all__ = ["framed_page", "notebook_widget"]
-
 STYLE = "width: 100%; height: 560px; border: 0; border-radius: 8px"
 NOTE = (
     "A copy of the state when this cell ran. With the package anywidget "

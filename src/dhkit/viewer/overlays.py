@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
 
-__all__ = ["ball_transforms", "color_bytes", "ghost_tints", "heat_colors", "solids"]
-
 GREY = (0.5, 0.55, 0.62)
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""

@@ -17,8 +17,6 @@ from urllib.parse import quote
 
 from dhkit.errors import ModelError
 
-__all__ = ["SECURITY_POLICY", "meshcat_bundle", "offline_page", "page_files"]
-
 MODULES = (
     "main.js",
     "stage.js",

@@ -15,21 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "LIMIT_STYLE",
-    "SHARED_COLOR",
-    "Panel",
-    "draw_curves",
-    "draw_panel",
-    "joint_color",
-    "joint_style",
-    "kinds_of_joints",
-    "name_joints",
-    "percent_panel",
-    "plain_axes",
-    "torque_panel",
-]
-
 LIMIT_STYLE: dict[str, Any] = {"ls": (0, (5, 3)), "lw": 1.0, "alpha": 0.75}
 SHARED_COLOR = "#5b6472"
 """Of a limit that several joints have."""

@@ -18,8 +18,6 @@ from dhkit.viewer.scene import node_transforms
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-__all__ = ["write_gif", "write_motion_gif", "write_motion_pngs", "write_png"]
-
 COLORS = 128
 """Of a GIF."""
 MAX_PICTURES = 900

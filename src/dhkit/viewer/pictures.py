@@ -23,8 +23,6 @@ from dhkit.viewer.scene import first_configuration, frame_labels, node_transform
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-__all__ = ["Ghost", "picture", "pictures"]
-
 log = logging.getLogger(__name__)
 
 FINE = 2

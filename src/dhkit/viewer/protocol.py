@@ -40,38 +40,6 @@ if TYPE_CHECKING:
     from dhkit.viewer.drawables import Lowered
     from dhkit.viewer.scene import Scene
 
-__all__ = [
-    "Animation",
-    "Cloud",
-    "Ghosts",
-    "Header",
-    "MessageType",
-    "Obstacles",
-    "Pose",
-    "ProtocolError",
-    "decode_animation",
-    "decode_ellipsoids",
-    "decode_frames",
-    "decode_ghosts",
-    "decode_header",
-    "decode_obstacles",
-    "decode_points",
-    "decode_pose",
-    "decode_scene",
-    "decode_trace",
-    "encode_animation",
-    "encode_ellipsoids",
-    "encode_frames",
-    "encode_ghosts",
-    "encode_obstacles",
-    "encode_points",
-    "encode_pose",
-    "encode_scene",
-    "encode_trace",
-    "message_header",
-    "stamped",
-]
-
 HEADER = struct.Struct("<BBHId")
 LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32

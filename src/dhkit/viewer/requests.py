@@ -8,8 +8,6 @@ from typing import Any
 
 from dhkit.viewer.protocol import MAX_SEQUENCE, ProtocolError
 
-__all__ = ["Request", "Shown", "decode_message"]
-
 LONGEST_NAME = 40
 DEEPEST = 6
 """Levels of lists and objects in a request."""

@@ -24,8 +24,6 @@ from dhkit.viewer.drawables import Lowered, grid_object, part_object, part_trans
 if TYPE_CHECKING:
     from dhkit.model.shapes import Part
 
-__all__ = ["Label", "Scene", "build_scene", "first_configuration", "frame_labels", "node_transforms", "scene_size"]
-
 log = logging.getLogger(__name__)
 
 ROOT = "/dhkit"

@@ -32,8 +32,6 @@ from dhkit.viewer.requests import Request
 from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 from dhkit.viewer.streams import Samples, encode_state
 
-__all__ = ["Answer", "ViewerServer"]
-
 Answer = Callable[[str, dict[str, Any]], Any]
 
 LOG = logging.getLogger(__name__)

@@ -8,9 +8,6 @@ from enum import IntEnum
 from dhkit.viewer.protocol import stamped
 from dhkit.viewer.streams import Samples
 
-__all__ = ["OF_ONE_ARM", "Session", "Slot"]
-
-
 STATES = 16
 """Messages of panels under way: an edit of the table changes the state of most panels."""
 LAST_SLOT = 1_000

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_comparison", "plot_simulation"]
-
 CONTROLLER_COLORS = (
     "#332288",
     "#cc6677",

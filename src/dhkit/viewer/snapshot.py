@@ -20,8 +20,6 @@ from dhkit.viewer.session import Slot
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-__all__ = ["Snapshot"]
-
 DRAWN_BESIDE = (
     (Slot.POINTS, "points of the workspace", "#7f8794"),
     (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from dhkit.viewer.protocol import HEADER, MessageType, message_header
 
-__all__ = ["MOST_FLOATS", "Samples", "decode_samples", "decode_state", "encode_state"]
-
 LENGTH = struct.Struct("<I")
 MOST_FLOATS = 100_000
 """Of samples that wait for a slow page, and that a new page is told: half an hour of a robot's errors are 60 kB."""

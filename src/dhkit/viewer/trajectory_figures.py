@@ -25,8 +25,6 @@ from dhkit.viewer.panels import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["plot_trajectory", "plot_uses"]
-
 SAMPLES = 401
 """Spread evenly; breaks, where accelerations jump, are drawn from both sides."""
 EDGE = 0.06

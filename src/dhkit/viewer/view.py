@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from dhkit.viewer.server import Answer, ViewerServer
     from dhkit.viewer.streams import Samples
 
-__all__ = ["View"]
-
 ELLIPSOID = 0.25
 """What an ellipsoid's longest half axis is drawn as, of the arm's size."""
 

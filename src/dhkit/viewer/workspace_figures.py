@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_ellipsoid", "plot_workspace"]
-
 COLORS = "viridis"
 BEST_COLOR, ELLIPSOID_COLOR, BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
 DASHES = {"outer": "--", "inner": ":", "shoulder": "-."}

@@ -9,8 +9,6 @@ from dhkit.control import PDGravity
 from dhkit.description import Array, Description
 from dhkit.model import pinocchio_model
 
-__all__ = ["AbaLoop", "default_swing"]
-
 
 class AbaLoop:
     """One arm under PD plus gravity, its torques held over each step of Runge and Kutta's method of order 4.

@@ -9,8 +9,6 @@ import numpy as np
 from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload
 from dhkit.description import Array
 
-__all__ = ["contenders"]
-
 
 def contenders() -> tuple[Contender, ...]:
     """Return a contender for each quantity of dynamics."""

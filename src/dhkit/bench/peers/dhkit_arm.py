@@ -12,8 +12,6 @@ from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, Unavailabl
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 
-__all__ = ["BATCH", "NEW_ARRAYS", "SINGLE", "contenders", "method", "new_output"]
-
 BATCH = "dhkit, out="
 NEW_ARRAYS = "dhkit"
 SINGLE = "dhkit, one call"

@@ -10,8 +10,6 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError
 from dhkit.bench.geometry import JointAxes, joint_axes
 from dhkit.description import Array
 
-__all__ = ["BATCH", "SINGLE", "contenders"]
-
 BATCH = "EAIK IK_batched"
 SINGLE = "EAIK IK"
 

@@ -12,8 +12,6 @@ from dhkit.bench.peers.roboticstoolbox import toolbox_robot
 from dhkit.control import ComputedTorque, Reference
 from dhkit.description import Array, Description
 
-__all__ = ["Fdyn", "own_puma_accelerations"]
-
 
 class Fdyn:
     """One arm that the toolbox simulates.

@@ -15,8 +15,6 @@ from dhkit.bench.contenders import Contender, Mode, Task, Workload, import_peer,
 from dhkit.bench.geometry import bare
 from dhkit.description import Array
 
-__all__ = ["contenders"]
-
 
 def contenders() -> tuple[Contender, ...]:
     """Return ikpy's contenders; it takes one state or pose a call."""

@@ -10,8 +10,6 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import
 from dhkit.bench.geometry import OrthoParallel
 from dhkit.description import Array
 
-__all__ = ["contenders"]
-
 UNMET_LIMITS = [(10.0, 11.0)] * 6
 """rad; joint limits that no branch is within: `reach` returns every branch all the same, and computes no singular
 values of branches outside them."""

@@ -11,8 +11,6 @@ import numpy as np
 from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer
 from dhkit.description import Array
 
-__all__ = ["ABA_BATCH", "CRBA", "FORWARD", "JACOBIANS", "RNEA_BATCH", "contenders"]
-
 FORWARD = "pin.forwardKinematics"
 JACOBIANS = "pin.computeJointJacobians"
 CRBA = "pin.crba"

@@ -11,8 +11,6 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
 from dhkit.description import Convention, Description
 
-__all__ = ["contenders", "toolbox_robot"]
-
 CONVERGED = 1e-20
 """Where ik_LM stops: its default of 1e-6, half a squared error, leaves the tool a millimetre off."""
 SAME_ARM = 1e-12

@@ -16,8 +16,6 @@ from dhkit.arm import Arm
 from dhkit.bench.contenders import Contender, Mode, Task, UnavailableError, Workload, import_peer, one_by_one
 from dhkit.bench.geometry import JointAxes, bare, joint_axes
 
-__all__ = ["contenders"]
-
 BUILD_TIME = 120.0
 """s: an arm without a closed form is derived for up to a minute."""
 

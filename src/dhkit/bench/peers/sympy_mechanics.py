@@ -8,8 +8,6 @@ from typing import Any
 from dhkit.bench.contenders import import_peer
 from dhkit.description import Convention, Description
 
-__all__ = ["lagranges_equations"]
-
 
 def lagranges_equations(description: Description) -> Any:
     """Return its ``LagrangesMethod`` with the equations formed; numbers are rationals, rotor inertia is left out.

@@ -14,8 +14,6 @@ from dhkit.errors import PlanningError
 from dhkit.model import pinocchio_model
 from dhkit.trajectories import Limits
 
-__all__ = ["GRID", "StraightTiming", "ToppraMotion"]
-
 GRID = 500
 """Intervals of s."""
 

@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import fail
 
-__all__ = ["from_mathematica", "from_maxima", "is_mathematica"]
-
 MATHEMATICA = re.compile(
     r"\*\^|\b(?:Sin|Cos|Tan|Sec|Csc|Cot|Sqrt|ArcTan|ArcSin|ArcCos|Derivative|Subscript|Abs|Sign|D|Dt)\[|[A-Za-z0-9\]]'*\[t\]"
     r"|\\\[[A-Z][A-Za-z]*\]|^\s*\{[^\\]*\}\s*$",

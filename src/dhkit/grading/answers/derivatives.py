@@ -8,8 +8,6 @@ from fractions import Fraction
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 
-__all__ = ["time_derivative"]
-
 VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
 MAX_NODES = 2_000
 """Nodes of a derivative: products of many factors grow by their number."""

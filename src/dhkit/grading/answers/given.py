@@ -24,17 +24,6 @@ from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import shown
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-__all__ = [
-    "LEFT_EMPTY",
-    "POSE_NAMES",
-    "Given",
-    "given_branches",
-    "given_quantity",
-    "given_rows",
-    "vocabulary_of",
-    "with_entries_gathered",
-]
-
 LEFT_EMPTY = "left empty"
 KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""

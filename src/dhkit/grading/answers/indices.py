@@ -9,8 +9,6 @@ from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
-__all__ = ["first_index", "without_indices"]
-
 SQUARE = re.compile(r"(?<!\w)([A-Za-z_]\w*)\s*\[\s*(\d{1,4})\s*\](\s*\(\s*t\s*\))?", re.ASCII)
 
 FROM_ZERO = re.compile(r"\*\*|\b(?:np|numpy|math)\s*\.\s*[a-z]|\bpow\s*\(", re.ASCII)

@@ -10,8 +10,6 @@ from dhkit.grading.answers.tokens import closing_bracket, dotted, fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
-__all__ = ["GREEK", "is_latex", "latex_tokens"]
-
 MAX_DEPTH = 50
 MAX_LETTERS = 64
 PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)

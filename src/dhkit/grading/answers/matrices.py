@@ -16,8 +16,6 @@ from dhkit.grading.answers.reading import answer_tokens, answer_tree, without_co
 from dhkit.grading.answers.tokens import check_depth, closing_bracket, fail, nesting, shown
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary
 
-__all__ = ["read_matrix"]
-
 MATRIX_WORDS = frozenset(
     ("sym", "Matrix", "array", "matrix", "simplify", "transpose", "MutableDenseMatrix", "ImmutableMatrix", "DM", "SX")
 )

@@ -20,8 +20,6 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 if TYPE_CHECKING:
     from dhkit.symbolic.programs.graph import Node
 
-__all__ = ["entries_of", "entry_tree", "is_entry"]
-
 STATES = ("q", "qd", "qdd")
 MAX_NODES = 20_000
 """Of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.tokens import shown
 
-__all__ = ["in_one_line", "is_pretty"]
-
 MARKS = frozenset("⎛⎜⎝⎡⎢⎣─⋅")
 BAR = "─"
 DERIVATIVES = (("d", "dt"), ("d^(2)", "dt^(2)"))

@@ -11,8 +11,6 @@ from dhkit.description import Description
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-__all__ = ["SCALARS", "QuantityNames", "Target"]
-
 SCALARS = ("K", "V", "L")
 LONGEST = 40
 """Characters of a name that may be a quantity."""

@@ -17,8 +17,6 @@ from dhkit.grading.answers.rewriting import rewritten
 from dhkit.grading.answers.tokens import fail, folded, nesting, shown, tokens
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
-__all__ = ["answer_tokens", "answer_tree", "meaning_of", "read_answer", "without_comments"]
-
 COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
 """A comment behind an answer, such as its unit: % N m."""
 STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")

@@ -10,8 +10,6 @@ from dhkit.grading.answers.indices import without_indices
 from dhkit.grading.answers.tokens import check_depth, closing_bracket, fail
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
-__all__ = ["rewritten"]
-
 TURNS = ("sin", "cos", "tan")
 SHORTHAND = ("c", "s")
 CALLED = frozenset(FUNCTION_NAMES.values())

@@ -14,30 +14,6 @@ from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import toml_document
 from dhkit.errors import AnswerError, DescriptionError
 
-__all__ = [
-    "ALIASES",
-    "CHOICES",
-    "COLUMNS",
-    "FORMAT",
-    "KEYS",
-    "MAX_BRANCHES",
-    "MAX_BYTES",
-    "MAX_NAMES",
-    "QUANTITY",
-    "AnswerSheet",
-    "Chain",
-    "Entries",
-    "Names",
-    "Refusal",
-    "Task",
-    "quantity_names",
-    "read_sheet",
-    "read_task",
-    "read_text",
-    "shape_of",
-    "sheet_of",
-]
-
 FORMAT = 1
 MAX_BYTES = 4_000_000
 """A PUMA's M and C, multiplied out in numbers, are 2 MB."""

@@ -10,8 +10,6 @@ from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.sheet import AnswerSheet, read_text
 
-__all__ = ["LANGUAGES", "MAX_CHARACTERS", "read_source"]
-
 MAX_CHARACTERS = 1_000_000
 """Characters of code or LaTeX; a notebook may be longer, since its figures do not count."""
 

@@ -10,8 +10,6 @@ from typing import NoReturn
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
 
-__all__ = ["MAX_LENGTH", "check_depth", "closing_bracket", "dotted", "fail", "folded", "nesting", "shown", "tokens"]
-
 MAX_LENGTH = 200_000
 """Characters of one entry: a PUMA's first, multiplied out in numbers, has 30,000."""
 

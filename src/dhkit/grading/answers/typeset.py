@@ -10,8 +10,6 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.grading.judging.numeric import parts_of
 from dhkit.symbolic.equations.latex_names import latex_names
 
-__all__ = ["typeset"]
-
 MAX_NODES = 600
 """Nodes of an entry that is typeset: a longer one fills a page."""
 VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")

@@ -14,8 +14,6 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.grading.answers.tokens import shown
 
-__all__ = ["FUNCTION_NAMES", "Meaning", "Vocabulary", "plain_name"]
-
 Meaning: TypeAlias = tuple[str, ...]
 """Tokens that a name stands for, in the robot's own names."""
 

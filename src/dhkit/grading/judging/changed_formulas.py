@@ -10,23 +10,6 @@ from fractions import Fraction
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.judging.numeric import parts_of
 
-__all__ = [
-    "applied",
-    "equal_parts",
-    "exchanged",
-    "has_call",
-    "leaf_text",
-    "minus",
-    "operands",
-    "product_of",
-    "renamed",
-    "replaced_everywhere",
-    "square_of",
-    "times",
-    "with_calls_changed",
-    "with_operands",
-]
-
 
 def renamed(tree: Tree, change: Mapping[str, Tree]) -> Tree:
     """Return a formula with names and numbers replaced, all at once; ``change`` is by :func:`leaf_text`."""

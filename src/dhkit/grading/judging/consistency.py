@@ -12,8 +12,6 @@ from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Note, NoteKind, Verdict
 from dhkit.symbolic.ring import Element, Elements, element_array
 
-__all__ = ["Consistency"]
-
 Index = tuple[int, ...]
 
 

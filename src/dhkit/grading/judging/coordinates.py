@@ -13,9 +13,6 @@ from dhkit.symbolic import ExactArm
 from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.ring import Element, Elements, angle_name, translated
 
-__all__ = ["ANGLE", "Coordinates"]
-
-
 ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
 """A sine or a cosine as formulas are printed: c12."""
 

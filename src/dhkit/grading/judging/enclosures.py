@@ -18,8 +18,6 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 if TYPE_CHECKING:
     from mpmath import mpf
 
-__all__ = ["PRECISIONS", "LostDigitsError", "TooLargeError", "enclosed"]
-
 PRECISIONS = (60, 250, 1000, 6000)
 """Digits in which a tree is worked out, one after the other until its value is known."""
 MAX_WORK = 1_000_000

@@ -33,8 +33,6 @@ from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, RingError, element_array
 
-__all__ = ["EXACT", "Comparison", "Finding", "Residuals", "compare", "equal", "names_in", "readable"]
-
 MAX_WRITTEN_TERMS = 400
 """Terms of a difference that is written out."""
 MAX_DIVISORS = 3

@@ -10,8 +10,6 @@ import numpy as np
 
 from dhkit.description import Array
 
-__all__ = ["SAME", "Change", "FrameChange", "frame_changes", "joint_changes", "wrapped"]
-
 SAME = 1e-9
 """rad, or share of the reach: two arms whose poses differ by less, in every state tried, are one arm."""
 

@@ -18,8 +18,6 @@ from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Verdict, Witness
 
-__all__ = ["judge_function"]
-
 SAMPLES = 1_000
 TOLERANCE = 1e-9
 """Relative to a quantity's largest entry in a state: a student's doubles, with room for a long formula's rounding."""

@@ -26,8 +26,6 @@ from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.report import Diagnosis, Entry, Note, NoteKind, Verdict, Witness
 
-__all__ = ["CLOSES", "POSE_NAMES", "Closure", "InverseJudgement", "inverse_entries", "judge_inverse"]
-
 MAX_NODES = 5_000
 """Of a formula: a PUMA's longest has 200."""
 

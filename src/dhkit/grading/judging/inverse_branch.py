@@ -16,8 +16,6 @@ from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
 
-__all__ = ["Branch", "Repair", "joint_order"]
-
 RARE = 0.01
 """Share of poses: solutions that a branch meets less often are met by chance."""
 UNFOUND = 0.1

@@ -29,15 +29,6 @@ from dhkit.grading.judging.changed_formulas import (
 )
 from dhkit.grading.judging.numeric import names_of, parts_of
 
-__all__ = [
-    "ROOTS",
-    "Edit",
-    "Lengths",
-    "edits",
-    "renamings",
-    "with_signs_changed",
-]
-
 ORDER = (
     "atan2_arguments",
     "quadrant",

@@ -30,8 +30,6 @@ from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
 from dhkit.grading.judging.numeric import parts_of
 
-__all__ = ["Explanation", "Search"]
-
 MOST_POSES = 100
 """Poses that fail, and poses that close, on which mistakes are looked for."""
 MOST_WORK = 4_000_000

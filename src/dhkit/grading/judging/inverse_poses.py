@@ -14,8 +14,6 @@ from dhkit.description import Array, Description, world_to_tool
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.kinematics import classify, inverse_kinematics, jacobian
 
-__all__ = ["CLOSES", "MATCHES", "Mask", "Poses"]
-
 CLOSES = 1e-9
 """rad, and share of the reach: how near to a pose joint values have to bring the tool."""
 MATCHES = 1e-6

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field, replace
 from dhkit.grading.answers.given import Given
 from dhkit.grading.report import Diagnosis, Entry, Note, Verdict
 
-__all__ = ["KinematicJudgement", "unreadable_entries", "with_texts"]
-
 
 @dataclass(frozen=True)
 class KinematicJudgement:

@@ -13,16 +13,6 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 
-__all__ = [
-    "FUNCTIONS",
-    "EditedDoubles",
-    "doubles",
-    "general_state",
-    "names_of",
-    "parts_of",
-    "state_arrays",
-]
-
 FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp", "min", "max")
 """What an answer may call; secants and the like are read as quotients of these."""
 

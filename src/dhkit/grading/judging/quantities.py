@@ -12,15 +12,14 @@ from dhkit.expressions.syntax import Name, Product, Sum, Tree
 from dhkit.grading.answers.given import LEFT_EMPTY, Given
 from dhkit.grading.answers.sheet import Task
 from dhkit.grading.judging.coordinates import Coordinates
-from dhkit.grading.judging.findings import EXACT, Comparison, Finding, Residuals, compare, names_in
+from dhkit.grading.judging.findings import EXACT, Comparison, Finding, compare, names_in
 from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
+from dhkit.grading.judging.rounding import Residuals
 from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.grading.report import Verdict
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import Element, Elements, RingError
-
-__all__ = ["JudgedQuantity", "judge_quantity", "parameters_in"]
 
 Index = tuple[int, ...]
 NEAR = 5e-3

@@ -13,8 +13,6 @@ from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.symbolic.ring import Element, Ring, RingError
 
-__all__ = ["OutsideTheRingError", "Quotient", "Reading"]
-
 MAX_EXPONENT = 64
 MAX_WORK = 300_000
 """Work that reading one entry may take: pairs of terms in products, weighted by the size of their coefficients. A

@@ -22,9 +22,6 @@ from dhkit.grading.judging.numeric import parts_of
 from dhkit.grading.judging.quotients import Quotient, Reading
 from dhkit.symbolic.ring import Element, Ring, RingError
 
-__all__ = ["Residuals", "has_decimals", "rounding_share"]
-
-
 Residuals = Callable[[Quotient, Element], Sequence[Element]]
 """What must be zero for an answer to be right, given the answer and the truth."""
 Monomial = tuple[tuple[int, int], ...]

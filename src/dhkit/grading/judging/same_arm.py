@@ -14,8 +14,6 @@ from dhkit.description import Array, Convention
 from dhkit.grading.judging.frame_changes import SAME, FrameChange, frame_changes, joint_changes, wrapped
 from dhkit.grading.judging.table_arms import TableArm
 
-__all__ = ["STATES", "Overlay", "overlaid"]
-
 STEPS = 12
 """Of Newton's method, which takes five or six from within an eighth of a turn."""
 STATES = 4

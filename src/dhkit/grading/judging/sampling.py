@@ -16,18 +16,6 @@ from dhkit.symbolic.ring import Element
 if TYPE_CHECKING:
     from mpmath import mpf
 
-__all__ = [
-    "DIGITS",
-    "LEAST",
-    "SAMPLES",
-    "TOLERANCE",
-    "Sample",
-    "differ",
-    "element_value",
-    "samples",
-    "show_state",
-]
-
 SAMPLES = 1_000
 DIGITS = 50
 TOLERANCE, LEAST = 1e-25, 1e-3

@@ -15,8 +15,6 @@ from dhkit.expressions import Expression, exact, substitute
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.numeric import doubles
 
-__all__ = ["ROUNDING", "Row", "TableArm", "link_in_doubles", "number_of", "parameter_values", "row_numbers"]
-
 ROUNDING = 1e-12
 """Share of the largest entry: two A_i that differ by less in doubles may well be equal."""
 FAR = 1e6

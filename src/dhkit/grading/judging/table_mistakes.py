@@ -11,8 +11,6 @@ from dhkit.grading.judging.table_rows import COLUMNS, TableRows
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.report import Diagnosis, Entry, Verdict
 
-__all__ = ["RowMistake", "row_mistakes"]
-
 WRONG_COLUMNS = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
 """What is said of an entry that no mistake explains, by column."""
 

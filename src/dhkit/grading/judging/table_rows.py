@@ -31,8 +31,6 @@ from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring
 from dhkit.symbolic.textbook_kinematics import with_massless_links
 
-__all__ = ["COLUMNS", "Answer", "JudgedRow", "TableRows", "other_convention"]
-
 MOST = 8
 """The largest multiple of a joint variable in an angle that is compared exactly."""
 COLUMNS = ("theta", "d", "a", "alpha")

@@ -25,8 +25,6 @@ from dhkit.grading.judging.table_rows import Answer, JudgedRow, TableRows, other
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.report import Diagnosis, Entry, Note, NoteKind, Verdict
 
-__all__ = ["TableJudgement", "judge_table", "table_entries"]
-
 ASKED = Task()
 """A task that leaves frames and zero pose open."""
 

@@ -16,8 +16,6 @@ from dhkit.symbolic import ExactArm, Lagrangian, lagrangian
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
 
-__all__ = ["DYNAMICS", "Truth", "exact_number", "kinematic_quantity", "substituted", "truth_of"]
-
 DYNAMICS = ("M", "C", "h", "g", "tau", "K", "V", "L")
 """Quantities of the equations of motion, in the order in which they are derived from one another."""
 

@@ -30,8 +30,6 @@ from dhkit.symbolic.textbook_kinematics import (
     derive_kinematics,
 )
 
-__all__ = ["Differences", "Index", "Variants", "variants_of", "varying"]
-
 Index: TypeAlias = tuple[int, ...]
 Differences: TypeAlias = Mapping[Index, Element]
 """Of a quantity's entries answer less truth, zero where it is right; entries that were not handed in are left out."""

@@ -17,8 +17,6 @@ from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, Mad
 from dhkit.symbolic.ring import Element, Elements, element_array, translated
 from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 
-__all__ = ["energy_variants"]
-
 HALF = Fraction(1, 2)
 MILLIMETRES = 1000
 SHAPES = {

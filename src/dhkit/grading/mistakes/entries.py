@@ -18,8 +18,6 @@ from dhkit.grading.report import Diagnosis
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
 
-__all__ = ["described", "distinct", "in_own_angles", "mirrored", "slip_of", "slip_of_C", "slip_shown", "whole_factor"]
-
 MAX_TERMS = 150
 """Terms in which an entry may differ for a slip in one of them to be looked for."""
 MAX_DESCRIBED = 600

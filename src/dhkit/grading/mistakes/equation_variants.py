@@ -18,8 +18,6 @@ from dhkit.symbolic.mistakes import MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, Ma
 from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import TextbookDerivation, derive, scaled, velocity_torques
 
-__all__ = ["equation_variants", "lagrangian_sum"]
-
 
 def equation_variants(truth: Truth) -> Iterator[Variant]:
     """Yield the mistakes that leave the energies right."""

@@ -52,8 +52,6 @@ from dhkit.grading.mistakes.wording import (
 from dhkit.grading.report import Diagnosis
 from dhkit.symbolic.equations import plain_text
 
-__all__ = ["explain"]
-
 PARTS = {
     "M": "in the terms with accelerations",
     "h": "in the terms with products of rates",

@@ -9,8 +9,6 @@ from dhkit.grading.capitals import capitalised
 from dhkit.symbolic.mistakes import MISTAKES, Mistake, Subject, catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, ROW
 
-__all__ = ["FACTORS", "INVERSE", "JACOBIAN", "LIBRARY", "PARAMETER_FACTORS", "TABLE", "UNITS", "hint_of", "sentence_of"]
-
 UNNAMED_HINT = "Look again at the entries that are marked as wrong."
 """Where to look where no mistake is named."""
 

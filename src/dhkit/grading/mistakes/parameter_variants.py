@@ -14,8 +14,6 @@ from dhkit.grading.mistakes.variants import Make, Variant, right, translated_arr
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements
 
-__all__ = ["lengths_of", "parameter_variants"]
-
 MAX_JOINTS = 3
 """Joints of arms of which half of one length may stand for another: of larger ones there are too many pairs."""
 

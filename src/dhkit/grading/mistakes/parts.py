@@ -6,8 +6,6 @@ from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.diagnosis import Differences, Index
 from dhkit.symbolic.ring import Element
 
-__all__ = ["split_in_parts"]
-
 
 def split_in_parts(truth: Truth, name: str, differences: Differences) -> dict[str, Differences]:
     """Split by what the terms are multiplied by; torques of accelerations give M's entries."""

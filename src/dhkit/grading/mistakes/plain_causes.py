@@ -24,18 +24,6 @@ from dhkit.grading.mistakes.wording import diagnosis_of_identity, diagnosis_of_s
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
-__all__ = [
-    "equivalent",
-    "in_degrees",
-    "in_other_units",
-    "one_entry_of_C",
-    "tables_of",
-    "too_few_digits",
-    "weights_on_vertical_axes",
-    "with_inverted_gears",
-    "zeros",
-]
-
 IN_DEGREES = (Fraction(1, 180), Fraction(180))
 ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
 """What is missing where all of a quantity is zero."""

@@ -11,8 +11,6 @@ from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element, Generator, Ring
 
-__all__ = ["Slip", "slip_in"]
-
 Terms = Mapping[tuple[int, ...], Fraction]
 UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
 """Factors of a term in millimetres."""

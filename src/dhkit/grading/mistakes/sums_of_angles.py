@@ -16,8 +16,6 @@ from dhkit.symbolic.exact.compact import parallel_runs, shortened
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
-__all__ = ["derivatives_of_cosines", "sums_of_angles"]
-
 Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]]
 """Gives cosine and sine of a + b from cosine and sine of a, and of b."""
 

@@ -9,8 +9,6 @@ from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element
 
-__all__ = ["describe"]
-
 SHOWN = 3
 """Terms of each kind that are named."""
 

@@ -13,8 +13,6 @@ from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
 from dhkit.symbolic.textbook import velocity_torques
 
-__all__ = ["Change", "Make", "Variant", "changed_only", "nothing", "right", "translated_array"]
-
 Make = Callable[[str], Elements]
 """Returns what a mistake adds to a quantity in the robot's own joint variables."""
 

@@ -12,8 +12,6 @@ from dhkit.grading.mistakes.slips import Slip
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.report import Diagnosis, Entry, Verdict
 
-__all__ = ["diagnosis_of", "diagnosis_of_identity", "diagnosis_of_slip", "entry_names", "merged", "wrong_entries"]
-
 MAX_ALTERNATIVES = 3
 """Mistakes that give the same answers, the more frequent first, that are named in one sentence."""
 

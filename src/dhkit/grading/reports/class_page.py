@@ -10,8 +10,6 @@ from dhkit.grading.reports.html import badge, page, sections, text
 from dhkit.grading.reports.plain import points
 from dhkit.grading.reports.sentences import mistakes_of, own_robots
 
-__all__ = ["html_class"]
-
 
 def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: str = "Class") -> str:
     """Return a class's page; the sheets in the order given."""

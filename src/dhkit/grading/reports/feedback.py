@@ -7,8 +7,6 @@ from dataclasses import replace
 from dhkit.grading.report import Diagnosis, Entry, GradeReport
 from dhkit.grading.rubric import Feedback
 
-__all__ = ["with_feedback"]
-
 
 def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
     """Return what of a report is told.

@@ -9,8 +9,6 @@ from dhkit.grading.report import Entry, GradeReport
 from dhkit.grading.reports.plain import plain
 from dhkit.grading.reports.sentences import found, provenance, remarks, summary, told
 
-__all__ = ["gradescope"]
-
 
 def gradescope(report: GradeReport, marks: Marks) -> dict[str, Any]:
     """Return what Gradescope shows a student: a test for each entry, and one for each quantity that is missing.

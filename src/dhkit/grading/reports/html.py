@@ -12,8 +12,6 @@ from dhkit.grading.reports.plain import plain, points
 from dhkit.grading.reports.sentences import found, provenance, remarks, witness_sentence
 from dhkit.grading.reports.style import STYLE
 
-__all__ = ["badge", "html_report", "page", "sections", "text"]
-
 SIGNS = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),

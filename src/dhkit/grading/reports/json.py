@@ -15,8 +15,6 @@ from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Feedback
 
-__all__ = ["json_report", "read_reports", "report_of"]
-
 MAX_BYTES = 500_000_000
 """Of a file of reports, one a line: a class of a thousand with long answers."""
 

@@ -10,8 +10,6 @@ from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.reports.plain import plain, points
 from dhkit.grading.reports.sentences import found, summary, told
 
-__all__ = ["junit"]
-
 OUTCOMES = {
     Verdict.WRONG: "failure",
     Verdict.INCOMPLETE: "failure",

@@ -11,8 +11,6 @@ from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.plain import plain, points
 
-__all__ = ["cell", "marks_csv"]
-
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 """How a text begins that a spreadsheet would compute."""
 NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")

@@ -6,8 +6,6 @@ import html
 import re
 from xml.etree.ElementTree import Element, ParseError, SubElement, fromstring, tostring
 
-__all__ = ["mathml"]
-
 MOST = 4000
 """Characters of LaTeX that are set: a longer equation nobody reads, and converting it takes seconds."""
 NAMESPACE = re.compile(r"\{.*?\}")

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 from dhkit.grading.report import Note, NoteKind
 
-__all__ = ["note_text"]
-
 AGREEMENT = {
     "M": "the matrix of second derivatives of the sheet's own {} by the rates",
     "C": "what the sheet's own {} gives: C qd = dM/dt qd - dK/dq",

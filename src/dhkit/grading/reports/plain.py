@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dhkit import display
 
-__all__ = ["plain", "points"]
-
 MOST = 4000
 """Characters of one text that a report shows: an answer may be a megabyte."""
 

@@ -10,19 +10,6 @@ from dhkit.grading.report import Entry, GradeReport, Verdict, Witness
 from dhkit.grading.reports.notes import note_text
 from dhkit.grading.reports.plain import plain, points
 
-__all__ = [
-    "fault_of",
-    "found",
-    "mistakes_of",
-    "own_robots",
-    "provenance",
-    "reading",
-    "remarks",
-    "summary",
-    "told",
-    "witness_sentence",
-]
-
 
 def summary(report: GradeReport, marks: Marks) -> str:
     """Return a sheet's verdict and points in a line, or why it could not be judged."""

@@ -24,8 +24,6 @@ from dhkit.grading.reports.sentences import (
     told,
 )
 
-__all__ = ["terminal_class", "terminal_report"]
-
 STYLES = {
     Verdict.CORRECT: "green",
     Verdict.ROUNDED: "green",

@@ -33,8 +33,6 @@ from dhkit.kinematics.closed_form.formulas import (
     where,
 )
 
-__all__ = ["FLIPS", "ArmPlane", "Shoulder", "Vector", "as_pair", "branch_names", "ordered_shoulders", "turned_back"]
-
 FLIPS = ("no-flip", "flip")
 UPRIGHT = 1e-9
 """Sine of the angle by which axis 1 may miss being upright or level."""

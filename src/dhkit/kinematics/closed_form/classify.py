@@ -12,8 +12,6 @@ from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
 from dhkit.kinematics.closed_form.family import Family, Fit
 
-__all__ = ["FAMILIES", "Classification", "classify"]
-
 FAMILIES = (
     Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
     Family("slide_wrist", spherical_wrist.slide_fit, spherical_wrist.slide_formulas),

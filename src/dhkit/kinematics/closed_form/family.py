@@ -16,8 +16,6 @@ from dhkit.kinematics.solutions import LIMIT_SLACK
 if TYPE_CHECKING:
     import casadi as ca
 
-__all__ = ["ALL", "OUTPUT_TYPES", "TURN", "Family", "Fit", "Parameter", "PoseSymbols", "Seen", "limit_parameters"]
-
 ALL = ("x", "y", "z", "rx", "ry", "rz")
 """The coordinates of a pose: position, and rotation about the axes."""
 OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")

@@ -9,36 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-__all__ = [
-    "NOTHING",
-    "ROUNDING",
-    "SINGULAR",
-    "SX",
-    "Branch",
-    "Pair",
-    "TwoLink",
-    "absolute",
-    "angle",
-    "both",
-    "chosen",
-    "clamped_between",
-    "combined",
-    "either",
-    "half_turn",
-    "hypot",
-    "larger",
-    "no",
-    "positive",
-    "rotated",
-    "sign",
-    "sqrt",
-    "times",
-    "two_link",
-    "unit",
-    "where",
-    "wrapped",
-]
-
 SX: TypeAlias = Any
 """A CasADi SX scalar, or a number that stands for one."""
 Pair: TypeAlias = tuple[SX, SX]

@@ -25,8 +25,6 @@ from dhkit.kinematics.closed_form.formulas import (
     where,
 )
 
-__all__ = ["ELBOWS", "Elbow", "elbows", "link_parameters"]
-
 ELBOWS = ("up", "down")
 
 

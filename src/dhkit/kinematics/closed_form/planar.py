@@ -37,15 +37,6 @@ from dhkit.kinematics.closed_form.formulas import (
     where,
 )
 
-__all__ = [
-    "chain_fit",
-    "chain_formulas",
-    "polar_fit",
-    "polar_formulas",
-    "slider_fit",
-    "slider_formulas",
-]
-
 FLAT = 1e-9
 """Share of the reach by which a pose may lie off the plane of an arm that cannot leave it."""
 IDENTITY = np.eye(4)[:3]

@@ -16,8 +16,6 @@ from dhkit.kinematics.closed_form.formulas import SX, Branch, where
 from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.symbolic import Graph
 
-__all__ = ["arm_program", "program"]
-
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     """Return the program of a family: T (4 x 4) and the free joints' angles to q, distance, valid, flags and status.

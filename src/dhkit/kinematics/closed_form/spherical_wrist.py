@@ -45,8 +45,6 @@ from dhkit.kinematics.closed_form.formulas import (
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, turned, wrist_parameters
 
-__all__ = ["elbow_fit", "elbow_formulas", "slide_fit", "slide_formulas"]
-
 
 @dataclass(frozen=True)
 class Region:

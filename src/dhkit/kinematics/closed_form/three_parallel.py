@@ -42,8 +42,6 @@ from dhkit.kinematics.closed_form.formulas import (
 from dhkit.kinematics.closed_form.links import ELBOWS, Elbow, elbows, link_parameters
 from dhkit.kinematics.closed_form.wrist import UNSEEN, ill_determined, joints_5_and_6, turned, wrist_parameters
 
-__all__ = ["three_parallel_fit", "three_parallel_formulas"]
-
 FREE = 1e-12
 """By how much the tool's rotation may miss the pose where that brings a pose near the wrist's singularity in reach."""
 

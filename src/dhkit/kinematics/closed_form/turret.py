@@ -30,15 +30,6 @@ from dhkit.kinematics.closed_form.formulas import (
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
-__all__ = [
-    "pan_tilt_fit",
-    "pan_tilt_formulas",
-    "yaw_three_fit",
-    "yaw_three_formulas",
-    "yaw_two_fit",
-    "yaw_two_formulas",
-]
-
 IDENTITY = np.eye(4)[:3]
 
 

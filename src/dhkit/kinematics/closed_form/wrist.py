@@ -13,8 +13,6 @@ from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Vector, as_pair
 from dhkit.kinematics.closed_form.family import Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import NOTHING, SX, Pair, angle, half_turn, rotated, times, unit, wrapped
 
-__all__ = ["UNSEEN", "Wrist", "ill_determined", "joints_5_and_6", "turned", "wrist_parameters"]
-
 
 def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -> dict[str, Parameter]:
     """Return where arm plane and wrist are, and how the wrist's axes lie at zero joint values.

@@ -21,8 +21,6 @@ import numpy as np
 
 from dhkit.description import Array
 
-__all__ = ["Axes", "Normal", "Path", "angle_costs", "length_costs", "nearest_points", "tidiest_normals", "turn_about"]
-
 ENTRY = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
 OBLIQUE, STRAIGHT, NEGATIVE = 20.0, 2.0, 1.0

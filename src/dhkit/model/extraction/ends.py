@@ -15,8 +15,6 @@ import numpy as np
 from dhkit.description import Array, Convention
 from dhkit.model.extraction.axes import ZERO, Normal, angle_costs, length_costs
 
-__all__ = ["FirstRow", "LastRow", "Tip", "first_row", "frame", "last_row", "screw", "turned"]
-
 OUTSIDE = 5.0
 """Extra cost of a number of the base or the tool: where the table can hold it, it does."""
 INSIDE = 1.0

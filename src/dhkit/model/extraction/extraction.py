@@ -42,8 +42,6 @@ from dhkit.model.mesh_paths import MeshFinder
 from dhkit.model.urdf_chain import Chain, Side, only_tip, read_chain
 from dhkit.model.urdf_tree import UrdfJoint, UrdfShape
 
-__all__ = ["Extraction", "extract_dh", "extracted"]
-
 AGREED = 5e-10
 """Numbers are rounded while M and g stay this close to the URDF, relative: a half of what is asked of a table."""
 AGREED_TOOL = 5e-11

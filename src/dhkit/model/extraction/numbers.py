@@ -11,8 +11,6 @@ from dhkit.description import INERTIA_PLACES, Array, Body, Inertia, Placement, p
 from dhkit.description.values import Vector
 from dhkit.expressions import PI, Expression, exact, exact_angle
 
-__all__ = ["ROUNDINGS", "angle", "body", "length", "placement", "vector"]
-
 ROUNDINGS = (9, 10, 11, 12, 13, None)
 """Decimals that numbers are rounded to, the coarsest first; None: not at all."""
 SIGNIFICANT = 12

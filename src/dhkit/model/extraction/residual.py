@@ -13,8 +13,6 @@ from dhkit.errors import ModelError
 from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_model
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
 
-__all__ = ["Original", "Residual"]
-
 STATES = 100
 """Random states that a residual is taken over."""
 STROKE = 1.0

@@ -11,8 +11,6 @@ from dhkit.description import Array, Convention
 from dhkit.model.extraction.axes import Axes, Normal, Path, nearest_points, tidiest_normals, turn_about
 from dhkit.model.extraction.ends import FirstRow, LastRow, Tip, first_row, frame, last_row, screw
 
-__all__ = ["Table", "chain_axes", "near_parallel", "tidiest_table"]
-
 OBLIQUE = 1e-6
 """Sine of the angle between axes whose common normal may serve other axes: that of others is far away."""
 NEAR = (1e-13, 1e-5)

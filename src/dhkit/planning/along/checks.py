@@ -15,8 +15,6 @@ from dhkit.planning.search import FEASIBLE
 from dhkit.planning.solver import Solution
 from dhkit.trajectories import JointPath, Limits
 
-__all__ = ["refuse", "require_kept", "require_path"]
-
 STANDS_STILL, TOO_STEEP = 1e-6, 1e4
 """Of the path's mean derivative: below the one the path stands still, above the other it is singular."""
 

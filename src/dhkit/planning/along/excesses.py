@@ -8,8 +8,6 @@ from dhkit.description import Array
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.states import States
 
-__all__ = ["excesses"]
-
 
 def excesses(task: TimingTask, states: States, breaks: Array, ends: Array) -> dict[str, Array]:
     """Return by what share each kind of limit is exceeded in each interval of the grid, shape (K, rows)."""

@@ -10,8 +10,6 @@ from dhkit.planning.along.rows import speed_bounds, timing_rows, tool_speeds
 from dhkit.planning.constraints import Constraint
 from dhkit.trajectories import JointPath, Limits
 
-__all__ = ["CORNER", "even_speeds", "jumps", "knots_of"]
-
 CORNER = 1e-6
 """Share of the largest derivative by which it may jump: rounding."""
 EVENLY, TINY = 0.3, 1e-12

@@ -21,8 +21,6 @@ from dhkit.planning.wish import checked_limits
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
-__all__ = ["along_path"]
-
 FEWEST = 6
 """Intervals."""
 

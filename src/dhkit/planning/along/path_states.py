@@ -14,8 +14,6 @@ from dhkit.description import Array, Description
 from dhkit.trajectories import JointPath
 from dhkit.trajectories.pieces import Side
 
-__all__ = ["PathStates"]
-
 
 @dataclass(frozen=True, eq=False)
 class PathStates:

@@ -16,8 +16,6 @@ from dhkit.planning.along.terms import Terms
 from dhkit.planning.objectives import Time
 from dhkit.planning.solver import Solver
 
-__all__ = ["SMALLEST", "TimingProgram", "timing_program"]
-
 SMALLEST = 1e-7
 """The smallest b inside, where 1 is about the path's mean: ipopt widens bounds by a tenth of it."""
 LEAST_TIME, SMOOTH = 1e-7, 1e-8

@@ -15,8 +15,6 @@ from dhkit.planning.constraints import Constraint
 from dhkit.planning.tool_constraints import ToolSpeed
 from dhkit.trajectories import Limits
 
-__all__ = ["TimingRows", "speed_bounds", "timing_rows", "tool_speeds"]
-
 
 @dataclass(frozen=True, eq=False)
 class TimingRows:

@@ -17,8 +17,6 @@ from dhkit.planning.search import FEASIBLE, SLACK, WIDER
 from dhkit.planning.solver import Progress, ProgressCall, Solution, Stopped
 from dhkit.trajectories import Trajectory
 
-__all__ = ["MOST", "Found", "solved"]
-
 MOST = 2000
 """Intervals that may be asked for; refined they may be twice as many."""
 SMALL_STEP = 1e-3

@@ -15,8 +15,6 @@ from dhkit.trajectories import Limits
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["PathPoint", "Terms"]
-
 
 class PathPoint(Point):
     """A state on a path as symbols: constraints and objectives are written in it as in any other."""

@@ -19,8 +19,6 @@ from dhkit.planning.states import States
 from dhkit.planning.tool_constraints import ToolAcceleration, ToolSpeed
 from dhkit.trajectories import JointPath, Limits, Trajectory
 
-__all__ = ["POINTS", "TimingTask"]
-
 QUICKEST = Objective.of("time")
 POINTS = 8
 """States an interval by which a motion is certified: intervals are many."""

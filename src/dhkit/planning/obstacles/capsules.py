@@ -15,8 +15,6 @@ from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
 
-__all__ = ["LinkCapsule", "link_capsules", "world_axes"]
-
 MOST = 2
 """Capsules of a link, at most: each costs an optimizer some hundred operations a point."""
 HARDLY_LARGER = 1.25

@@ -17,8 +17,6 @@ from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacl
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
-__all__ = ["Distances", "deficits", "distance"]
-
 ROUNDING = 1e-7
 """Bounds that are this near each other, m, count as equal: coal's answers are good to about 1e-9."""
 

@@ -9,8 +9,6 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.obstacles.scene import rotations_onto
 
-__all__ = ["Balls", "Enclosure", "enclose", "refine"]
-
 RADII = np.concatenate([[1.0], 1 + np.geomspace(2e-3, 0.5, 13)])
 """Tried radii, of the smallest about an axis: a wider capsule may be so much shorter that it is smaller."""
 WORTH = 0.98

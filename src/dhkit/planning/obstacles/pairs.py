@@ -13,8 +13,6 @@ from dhkit.description import Array, Description
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.segments import segment_distances
 
-__all__ = ["CheckedPairs", "checked_pairs"]
-
 SAMPLES = 4000
 """Random configurations that the choice is made from."""
 SEED = 0

@@ -15,8 +15,6 @@ from dhkit.description.arrays import number_array
 from dhkit.display import listed, repr_line, value_line
 from dhkit.expressions import exact
 
-__all__ = ["Floor", "Obstacle", "Scene", "Solid", "check_obstacles"]
-
 Solid: TypeAlias = Box | Sphere | Capsule
 """What an obstacle may be."""
 

@@ -7,8 +7,6 @@ import numpy as np
 from dhkit.description import Array, Box
 from dhkit.planning.obstacles.scene import Obstacle
 
-__all__ = ["Bounds", "axis_bounds", "segment_distances"]
-
 POINTS = 9
 """Of an axis, at which the distance to a box is taken for its bounds."""
 

@@ -12,8 +12,6 @@ from dhkit.description import Array, Box
 from dhkit.description.arrays import number_array
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 
-__all__ = ["BOX", "CAPSULE", "FLOOR", "ITSELF", "SceneSlots"]
-
 CAPSULE, BOX, FLOOR, ITSELF = 7, 16, 2, 1
 """Parameters of a slot: start (3), end - start (3), radius and margin; R_box_world (9, by rows), centre (3), half
 sizes (3), margin; height, margin; margin."""

@@ -19,8 +19,6 @@ from dhkit.symbolic.differentiable.frames import SymbolicTable
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["clearances"]
-
 CLAMP = 1e-2
 """Where a share of a segment is kept in [0, 1], how wide the bends at 0 and 1 are."""
 EDGE = 1e-2

@@ -13,8 +13,6 @@ from dhkit.planning.obstacles.scene import Obstacle, rotations_onto
 if TYPE_CHECKING:
     CoalModule: TypeAlias = Any
 
-__all__ = ["capsule_distances", "obstacle_distances"]
-
 POINT = 1e-9
 """An axis shorter than this, m, has no direction: its capsule is a ball."""
 TOLERANCE = 1e-9

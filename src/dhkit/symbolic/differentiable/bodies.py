@@ -13,8 +13,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, abou
 if TYPE_CHECKING:
     from dhkit.symbolic.differentiable.joint_frames import JointRow
 
-__all__ = ["Moments", "regrouped"]
-
 
 @dataclass(frozen=True)
 class Moments:

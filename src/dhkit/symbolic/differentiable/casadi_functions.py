@@ -21,8 +21,6 @@ from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gr
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["CasadiFunctions"]
-
 PAYLOAD = {"payload_mass": 1, "payload_com": 3, "payload_inertia": 6}
 """Inputs of the payload layer, and how many numbers each is."""
 

@@ -14,8 +14,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot, p
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["composite_coriolis_matrix", "composite_mass_matrix", "link_velocities"]
-
 Wrench = tuple[Vector3, Vector3]
 """Force, and moment about a joint's origin."""
 Matrix3 = tuple[Vector3, Vector3, Vector3]
@@ -69,6 +67,7 @@ class Flow:
 
     @classmethod
     def none(cls) -> Flow:
+        """Return that of no mass."""
         return cls(NOTHING, (NOTHING, NOTHING, NOTHING))
 
     @classmethod
@@ -79,6 +78,7 @@ class Flow:
         return cls(plus(times(link.mass, v), cross(w, link.first)), (x, y, z))
 
     def joined(self, other: Flow) -> Flow:
+        """Return the sum of both, about one origin and in one frame's axes."""
         x, y, z = (plus(a, b) for a, b in zip(self.G, other.G, strict=True))
         return Flow(plus(self.momentum, other.momentum), (x, y, z))
 

@@ -12,16 +12,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot
 if TYPE_CHECKING:
     import casadi
 
-__all__ = [
-    "kinetic_energy",
-    "lagrange_coriolis_matrix",
-    "lagrange_gravity_torque",
-    "lagrange_inverse_dynamics",
-    "lagrange_mass_matrix",
-    "lagrange_torque",
-    "potential_energy",
-]
-
 
 def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
     """Return K, J, from the links' velocities; drives included.

@@ -12,8 +12,6 @@ from dhkit.symbolic.differentiable.recursive import recursive_bias
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["SINGULAR", "recursive_forward_dynamics", "solve_for_acceleration"]
-
 SINGULAR = 1e-14
 """Of the largest diagonal entry of M: a pivot below that is what rounding leaves of 0."""
 

@@ -16,8 +16,6 @@ from dhkit.display import counted, repr_line
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Entry", "ReferenceAxes", "SymbolicTable", "jacobian", "jacobian_dot", "joint_symbols", "table_pattern"]
-
 Entry: TypeAlias = "float | casadi.SX"
 """A number, or an expression that stands for one."""
 ReferenceAxes: TypeAlias = Literal["world", "tool"]

@@ -13,9 +13,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Friction", "friction_torque"]
-
-
 NARROWEST = 1e-9
 """rad/s or m/s: squares of speeds and widths then neither vanish nor overflow."""
 

@@ -20,8 +20,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, plus
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["InertialTable", "exact_moments", "inertial_pattern"]
-
 
 @dataclass(frozen=True)
 class InertialTable:

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from dhkit.symbolic.differentiable.inertial_table import InertialTable
 
-__all__ = ["JointRow", "Station", "joint_rows", "stations"]
-
 
 @dataclass(frozen=True)
 class JointRow:

@@ -11,8 +11,6 @@ from dhkit.symbolic.differentiable.vectors import Vector3, dot, plus
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["payload_moments"]
-
 
 def payload_moments(description: Description, mass: casadi.SX, com: casadi.SX, inertia: casadi.SX) -> Moments:
     """Return the moments of a load in the joint frame of an arm's last link.

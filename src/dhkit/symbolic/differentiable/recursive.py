@@ -15,8 +15,6 @@ from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, plus, 
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["recursive_bias", "recursive_gravity", "recursive_inverse_dynamics"]
-
 
 @dataclass(frozen=True)
 class Spin:

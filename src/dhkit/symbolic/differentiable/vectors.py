@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-__all__ = ["Scalar", "Vector3", "about_x", "about_x_back", "about_z", "about_z_back", "cross", "dot", "plus", "times"]
-
 Scalar: TypeAlias = Any
 """A float, a Fraction, or an expression (1 x 1)."""
 Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]

@@ -21,8 +21,6 @@ from dhkit.symbolic.differentiable.vectors import (
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["velocity_regressor"]
-
 NOTHING: Vector3 = (0.0, 0.0, 0.0)
 UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -116,6 +114,7 @@ class Step:
 
     @classmethod
     def of(cls, table: SymbolicTable, i: int, q: Scalar) -> Step:
+        """Return the step over joint i, counted from 0, at its position q in rad or m."""
         import casadi
 
         a, d, cos_alpha, sin_alpha, c, s = table.rows[i]

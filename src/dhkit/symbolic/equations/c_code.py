@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = ["equations_c"]
-
 C = Language(item="{array}[{k}]", offset=0, pi=repr(math.pi), functions={"abs": "fabs"})
 
 

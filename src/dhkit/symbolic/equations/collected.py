@@ -16,8 +16,6 @@ from typing import TypeAlias
 
 from dhkit.symbolic.ring import Element, Generator, Ring
 
-__all__ = ["Powers", "Product", "Sum", "collected", "is_reciprocal", "reading_order"]
-
 Powers: TypeAlias = tuple[tuple[int, int], ...]
 """Generators, by their place in the ring, with exponents, in the order in which they are read."""
 

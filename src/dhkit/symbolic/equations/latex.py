@@ -26,8 +26,6 @@ from dhkit.symbolic.equations.quantities import Quantity, check_length
 from dhkit.symbolic.equations.writing import Printer, decimal_text
 from dhkit.symbolic.ring import Element, Generator, Ring
 
-__all__ = ["LatexWriter", "constant_latex", "displays", "equations_latex", "latex_lines", "latex_text"]
-
 LINE = 29.5
 """What a line of an article's text holds, in em, of which some is kept for what the estimate of widths misses."""
 INDENT = r"\qquad "

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["escaped", "latex_document"]
-
 PREAMBLE = r"""\documentclass[11pt]{article}
 \usepackage{amsmath}
 \allowdisplaybreaks

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["latex_width"]
-
 SCRIPT = 0.38
 """Of a letter in a sub- or superscript, em."""
 LETTER = 0.56

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = ["equations_matlab", "matlab_files"]
-
 MATLAB = Language(item="{array}({k})", offset=1, pi="pi", functions={})
 
 

@@ -8,8 +8,6 @@ from functools import lru_cache
 
 from dhkit.symbolic.ring import Element, Generator, Ring, angle_name
 
-__all__ = ["Angle", "Notation", "angles_of", "constants_of", "generators_of", "notation"]
-
 
 @dataclass(frozen=True)
 class Notation:

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = ["INPUTS", "Entry", "Function", "Language", "Parameter", "Program", "harmless", "identifier", "program"]
-
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
 """What each quantity is a function of; those of kinematics of q alone."""
 STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = ["FUNCTION_NAMES", "equations_python"]
-
 FUNCTION_NAMES = {
     "M": "mass_matrix",
     "C": "coriolis_matrix",

@@ -17,18 +17,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-__all__ = [
-    "KINEMATIC_QUANTITIES",
-    "MOST_TERMS",
-    "QUANTITIES",
-    "Quantity",
-    "check_length",
-    "is_kinematic",
-    "kinematic_quantities",
-    "quantities",
-    "readable",
-]
-
 QUANTITIES = {
     "M": "mass matrix",
     "C": "Coriolis matrix",

@@ -14,8 +14,6 @@ from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.ring import Element, Generator
 
-__all__ = ["SympyWriter", "equations_sympy", "sympy_object"]
-
 FUNCTIONS = {"abs": "Abs"}
 
 

@@ -12,8 +12,6 @@ from dhkit.symbolic.equations.quantities import Quantity, check_length
 from dhkit.symbolic.equations.writing import Printer, decimal_text
 from dhkit.symbolic.ring import Element, Generator
 
-__all__ = ["TextWriter", "equations_text", "plain_text"]
-
 WIDTH = 100
 """Columns of a line."""
 INDENT = "      "

@@ -11,8 +11,6 @@ from dhkit.expressions import Atom, Expression
 from dhkit.symbolic.equations.collected import Powers, Product, is_reciprocal
 from dhkit.symbolic.ring import Generator
 
-__all__ = ["Printer", "Writer", "decimal_text", "is_name"]
-
 T = TypeVar("T")
 
 SHORT = 16

@@ -27,8 +27,6 @@ from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
 
-__all__ = ["BaseParameters", "base_parameters"]
-
 SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
 READABLE, LONGEST_DEFINITION = 30, 200

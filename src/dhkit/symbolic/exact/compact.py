@@ -17,8 +17,6 @@ from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-__all__ = ["parallel_runs", "shortened", "shortened_alike"]
-
 WAYS = 24
 """Choices of angles that are tried."""
 

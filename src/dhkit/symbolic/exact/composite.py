@@ -17,8 +17,6 @@ import numpy as np
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.ring import Element, Elements, Ring
 
-__all__ = ["RigidBody", "Step", "joint_bodies", "joint_steps", "mass_matrix", "potential_energy"]
-
 
 @dataclass(frozen=True, eq=False)
 class Step:

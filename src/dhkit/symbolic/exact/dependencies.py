@@ -18,8 +18,6 @@ from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.ring import Element, Ring, RingError, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-__all__ = ["MissingReciprocalError", "independent"]
-
 MOST = 3
 """Parameters that one may depend on: a sliding joint's moment on two of the link that it slides in, and a mass."""
 TRIES = 200

@@ -25,8 +25,6 @@ from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.reading import Direction
 
-__all__ = ["ExactArm", "ExactBody", "ExactRow", "Symbols", "exact_arm"]
-
 
 @dataclass(frozen=True, eq=False)
 class ExactRow:

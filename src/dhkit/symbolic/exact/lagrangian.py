@@ -18,12 +18,11 @@ from dhkit.expressions import Expression
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact import composite
-from dhkit.symbolic.exact.exact_arm import ExactArm, Symbols, exact_arm
+from dhkit.symbolic.exact.exact_arm import ExactArm, exact_arm
+from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.ring import Element, Elements, RingError
 from dhkit.symbolic.ring.elements import READABLE
 from dhkit.symbolic.textbook import TextbookDerivation, derive
-
-__all__ = ["Lagrangian", "Proof", "lagrangian"]
 
 _HALF = Fraction(1, 2)
 

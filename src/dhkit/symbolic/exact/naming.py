@@ -10,8 +10,6 @@ from dhkit.description import INERTIA_PLACES, Body, Description, Drive
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, exact_angle, substitute
 
-__all__ = ["BodyNumbers", "LinkNumbers", "Naming", "Symbols"]
-
 Symbols: TypeAlias = Literal["none", "file", "inertial"]
 """Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
 

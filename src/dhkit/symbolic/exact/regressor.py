@@ -10,8 +10,6 @@ from dhkit.display import repr_line
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof
 from dhkit.symbolic.ring import Elements, RingError
 
-__all__ = ["Regressor", "regressor"]
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Regressor:

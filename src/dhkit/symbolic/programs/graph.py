@@ -13,8 +13,6 @@ from dhkit.display import counted, repr_line
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["Graph", "Node", "Variable"]
-
 
 @dataclass(frozen=True)
 class Variable:

@@ -6,8 +6,6 @@ from collections import Counter
 
 from dhkit.symbolic.programs.graph import Graph
 
-__all__ = ["operation_count"]
-
 NAMES = {
     "add": "additions",
     "subtract": "additions",

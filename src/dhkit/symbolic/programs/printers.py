@@ -9,8 +9,6 @@ from pathlib import Path
 from dhkit.description import write_atomically
 from dhkit.symbolic.programs.graph import Graph, Node
 
-__all__ = ["c_source", "export_c"]
-
 C = {
     "add": "{} + {}",
     "subtract": "{} - {}",

@@ -13,8 +13,6 @@ from dhkit.expressions.exact import Monomial
 from dhkit.symbolic.ring.reading import is_exact, reciprocal_text
 from dhkit.symbolic.ring.ring import Constant
 
-__all__ = ["Constants", "value_of"]
-
 MOST = 8
 """The largest multiple of an angle that is written in the cosine and sine of the angle itself."""
 

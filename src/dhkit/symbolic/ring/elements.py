@@ -20,8 +20,6 @@ from dhkit.symbolic.ring.polynomials import Monomial
 if TYPE_CHECKING:
     from dhkit.symbolic.ring.ring import Ring
 
-__all__ = ["Element", "Elements", "RingError", "Scalar", "element_array", "translated"]
-
 READABLE = 200
 """Terms that are shown unasked."""
 MAX_TERMS = 300_000

@@ -9,8 +9,6 @@ from fractions import Fraction
 from operator import itemgetter
 from typing import Any, Protocol, TypeAlias
 
-__all__ = ["Monomial", "Polynomials", "Relation", "polynomials"]
-
 Monomial: TypeAlias = tuple[int, ...]
 """One exponent a generator."""
 

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from dhkit.expressions.exact import Monomial
     from dhkit.symbolic.ring.ring import Ring
 
-__all__ = ["Direction", "is_exact", "read_angle", "read_expression", "reciprocal_text"]
-
 Direction: TypeAlias = tuple[Element, Element]
 """Cosine and sine of an angle."""
 

@@ -20,11 +20,9 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.expressions import Expression
 from dhkit.expressions.exact import Monomial as TermMonomial
-from dhkit.symbolic.ring.elements import Element, Elements, RingError, translated
+from dhkit.symbolic.ring.elements import Element, RingError, translated
 from dhkit.symbolic.ring.polynomials import Monomial, Relation, polynomials
 from dhkit.symbolic.ring.reading import read_angle, read_expression
-
-__all__ = ["Constant", "Element", "Elements", "Generator", "Ring", "RingError", "translated"]
 
 
 @dataclass(frozen=True)

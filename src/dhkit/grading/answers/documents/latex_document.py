@@ -25,8 +25,6 @@ from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refu
 from dhkit.grading.answers.tokens import folded
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
-__all__ = ["latex_answers"]
-
 MAX_STATEMENTS = 5_000
 MAX_DEFINITIONS = 2_000
 MAX_LEFT_OUT = 20

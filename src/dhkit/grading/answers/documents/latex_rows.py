@@ -6,8 +6,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-__all__ = ["ROWS", "Row", "rows_of"]
-
 ROWS = frozenset(
     (
         "align",

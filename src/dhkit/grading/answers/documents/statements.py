@@ -11,16 +11,6 @@ from dhkit.grading.answers.latex import GREEK, is_latex
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
 
-__all__ = [
-    "STARTS",
-    "STARTS_WITH_RELATION",
-    "Statement",
-    "has_relation",
-    "latex_statements",
-    "left_hand_name",
-    "statements_of",
-]
-
 
 @dataclass(frozen=True)
 class Statement:

@@ -7,23 +7,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TypeAlias
 
-__all__ = [
-    "STRUCTURE",
-    "Binding",
-    "Default",
-    "Formula",
-    "FunctionNamed",
-    "ModuleNamed",
-    "NotUnderstood",
-    "Program",
-    "Read",
-    "Returned",
-    "Scope",
-    "Symbol",
-    "Use",
-    "Value",
-]
-
 
 class Use(Enum):
     """How a formula uses a name."""

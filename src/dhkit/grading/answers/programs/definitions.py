@@ -24,8 +24,6 @@ from dhkit.grading.answers.sheet import Refusal
 from dhkit.grading.answers.tokens import MAX_LENGTH
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
-__all__ = ["MAX_DEFINITIONS", "Definitions", "Node"]
-
 MAX_DEFINITIONS = 2_000
 """Names that answers of one file may be made of; reading each takes about a millisecond."""
 WORDS = frozenset(("t", "T", "top", "pi", "e", "Matrix", "array", "matrix", "sym", "simplify", "transpose", "DM", "SX"))

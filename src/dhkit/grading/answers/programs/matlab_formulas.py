@@ -11,8 +11,6 @@ from dhkit.grading.answers.programs.matlab_statements import MatlabToken
 from dhkit.grading.answers.programs.python_formulas import joined
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-__all__ = ["MatlabFormulas", "closing", "split_rows"]
-
 NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 UNCHANGED = frozenset(("simplify", "expand", "collect", "combine", "simplifyFraction"))
 OPERATORS = frozenset(("+", "-", "*", "/", "^", "**", ".*", "./", ".^", ".**"))

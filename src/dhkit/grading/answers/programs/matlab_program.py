@@ -22,8 +22,6 @@ from dhkit.grading.answers.programs.bindings import (
 from dhkit.grading.answers.programs.matlab_formulas import FUNCTIONS, MatlabFormulas, closing, split_rows
 from dhkit.grading.answers.programs.matlab_statements import MatlabToken, Statement, statements
 
-__all__ = ["matlab_program"]
-
 MAX_STATEMENTS = 5_000
 OPENERS = frozenset(
     (

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from dhkit.errors import AnswerError
 
-__all__ = ["MatlabToken", "Statement", "statements"]
-
 TOKEN = re.compile(
     r"(?P<number>0[xXbB][0-9A-Fa-f]+\w*|(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?[ij]?(?![\w]))"
     r"|(?P<name>[A-Za-z_]\w*)"

@@ -12,8 +12,6 @@ from typing import Any
 
 from dhkit.errors import AnswerError
 
-__all__ = ["Notebook", "notebook_code"]
-
 HARMLESS_MAGICS = frozenset(
     (
         "matplotlib",

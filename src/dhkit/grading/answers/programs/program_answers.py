@@ -24,8 +24,6 @@ from dhkit.grading.answers.programs.standing import NameTable, Standing
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Names, Refusal, quantity_names
 
-__all__ = ["answers_of"]
-
 WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
     "coriolis_matrix": "C",

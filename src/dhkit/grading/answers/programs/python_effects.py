@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from dhkit.grading.answers.programs.python_formulas import MATRIX_CALLS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-__all__ = ["Effects", "Found", "bound_names", "part_names"]
-
 ANYTHING = frozenset(
     (
         "exec",

@@ -17,8 +17,6 @@ from dhkit.grading.answers.rewriting import MODULES
 from dhkit.grading.answers.tokens import folded
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-__all__ = ["EXACT", "MATRIX_CALLS", "PythonFormulas", "constant_index", "joined", "spelled"]
-
 NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 UNCHANGED = frozenset(
     ("simplify", "expand", "trigsimp", "factor", "cancel", "together", "powsimp", "expand_trig", "radsimp", "collect")

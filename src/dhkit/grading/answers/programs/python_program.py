@@ -27,8 +27,6 @@ from dhkit.grading.answers.programs.python_formulas import EXACT, VECTORS, Pytho
 from dhkit.grading.answers.tokens import dotted
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
-__all__ = ["python_program"]
-
 MAX_STATEMENTS = 5_000
 MAX_SYMBOLS = 1_000
 MODULES = frozenset(

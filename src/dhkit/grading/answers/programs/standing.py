@@ -23,8 +23,6 @@ from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.tokens import dotted
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, plain_name
 
-__all__ = ["TOLERANCE", "NameTable", "Standing"]
-
 PROPER = re.compile(r"(?:dd|DD|ddot|dot|d2|d|D)?(?:q|th|theta|Theta|vartheta)(?:dd|d|ddot|dot|pp|p)?\d*\w*", re.ASCII)
 """Spellings of joint variables that nobody uses for anything else; x2 or t1 may be a student's own name."""
 TIMED = re.compile(r"(?:diff|Derivative)\((\w+)(?:\(t\))?, t(, [t2])?\)")

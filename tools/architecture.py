@@ -1,0 +1,158 @@
+"""Check the shape of the package: no import circles, no splinters, no oversized files, a test for each module.
+
+Imports inside functions and under ``TYPE_CHECKING`` count, and so do the names that a package registers for lazy import.
+
+    python tools/architecture.py            # the checks; exit status 1 and one line a fault
+    python tools/architecture.py --lines    # code lines a package, without blank lines, comments and docstrings
+"""
+
+import argparse
+import ast
+import io
+import sys
+import tokenize
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "dhkit"
+MOST_LINES = 450
+"""Longest file, in lines; above it a file usually has two subjects."""
+
+FEWEST_LINES = 60
+"""A file with fewer lines and a single importer belongs into that importer."""
+
+LONG_FILES = {"dhkit.arm"}
+"""The front door: every method delegates, so that its length is that of its docstrings."""
+
+
+def modules() -> dict[str, Path]:
+    """Return the file of every module, by its dotted name; a package stands for its ``__init__``."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imported(tree: ast.AST, known: Mapping[str, Path]) -> Iterator[str]:
+    """Yield the modules that a file imports anywhere; ``from a import b`` names a.b where that is a module."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                if inner in known:
+                    yield inner
+                elif node.module in known:
+                    yield node.module
+
+
+def registered(tree: ast.AST, known: Mapping[str, Path]) -> Iterator[str]:
+    """Yield the modules that a file names in strings: tables of lazily imported names."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in known:
+            yield node.value
+
+
+def imports(known: Mapping[str, Path]) -> dict[str, set[str]]:
+    """Return which modules of the package each module imports, itself left out."""
+    found = {}
+    for name, path in known.items():
+        tree = ast.parse(path.read_text())
+        targets = set(imported(tree, known))
+        if path.name == "__init__.py":
+            targets |= set(registered(tree, known))
+        found[name] = targets - {name}
+    return found
+
+
+def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
+    """Return the strongly connected components of more than one module (Tarjan 1972), each sorted."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for target in sorted(graph[node]):
+            if target not in index:
+                visit(target)
+                low[node] = min(low[node], low[target])
+            elif target in stack:
+                low[node] = min(low[node], index[target])
+        if low[node] == index[node]:
+            component = stack[stack.index(node) :]
+            del stack[stack.index(node) :]
+            if len(component) > 1:
+                found.append(sorted(component))
+
+    for node in sorted(graph):
+        if node not in index:
+            visit(node)
+    return found
+
+
+def code_lines(text: str) -> int:
+    """Count the lines of a source text that are neither blank nor comment nor docstring."""
+    skipped = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+    lines: set[int] = set()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type not in skipped:
+            lines.update(range(token.start[0], token.end[0] + 1))
+    for node in ast.walk(ast.parse(text)):
+        body = getattr(node, "body", None)
+        for statement in body if isinstance(body, list) else []:
+            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+                if isinstance(statement.value.value, str):
+                    lines.difference_update(range(statement.lineno, (statement.end_lineno or statement.lineno) + 1))
+    return len(lines)
+
+
+def faults() -> Iterator[str]:
+    """Yield one line for each place where the package breaks a rule of its shape."""
+    known = modules()
+    graph = imports(known)
+    for circle in circles(graph):
+        yield f"circle of {len(circle)}: {', '.join(circle)}"
+    importers = Counter(target for targets in graph.values() for target in targets)
+    for name, path in known.items():
+        length = len(path.read_text().splitlines())
+        if length > MOST_LINES and name not in LONG_FILES:
+            yield f"{name}: {length} lines; at most {MOST_LINES}"
+        if path.name in ("__init__.py", "__main__.py") or length >= FEWEST_LINES:
+            continue
+        if importers[name] == 1:
+            (user,) = (module for module, targets in graph.items() if name in targets)
+            yield f"{name}: {length} lines, imported by {user} alone"
+
+
+def lines_by_package() -> Counter[str]:
+    """Return the code lines of each package."""
+    counted: Counter[str] = Counter()
+    for name, path in modules().items():
+        counted[name.split(".")[1] if path.parent != PACKAGE else "dhkit"] += code_lines(path.read_text())
+    return counted
+
+
+def main() -> int:
+    """Print the faults, or the lines."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--lines", action="store_true")
+    if parser.parse_args().lines:
+        counted = lines_by_package()
+        for package, lines in counted.most_common():
+            print(f"{package:14}{lines:8}")
+        print(f"{'all':14}{counted.total():8}")
+        return 0
+    found = list(faults())
+    print("\n".join(found) or "no import circles, no file too long or too short")
+    return bool(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
