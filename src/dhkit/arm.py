@@ -18,7 +18,7 @@ from dhkit.errors import DescriptionError
 if TYPE_CHECKING:
     from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
     from dhkit.description import Body, Payload
-    from dhkit.description.table import Quantity
+    from dhkit.description.table_rows import Quantity
     from dhkit.grading import GradeReport, Rubric
     from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
@@ -505,7 +505,7 @@ class Arm:
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
         rate: float | None = 1000.0,
-        plant: Robot = None,
+        plant: Robot | None = None,
         plant_rate: float | None = None,
         *,
         friction: bool | Friction = False,
@@ -559,7 +559,7 @@ class Arm:
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
         rate: float = 1000.0,
-        plant: Robot | Sequence[Robot] = None,
+        plant: Robot | Sequence[Robot] | None = None,
         plant_rate: float | None = None,
         *,
         friction: bool | Friction | None = None,
@@ -582,7 +582,9 @@ class Arm:
         """
         from dhkit.control import simulate_batch
 
-        arms = () if plant is None else plant if isinstance(plant, (list, tuple)) else [plant]
+        arms: Sequence[Robot] = ()
+        if plant is not None:
+            arms = plant if isinstance(plant, Sequence) else [plant]
         return simulate_batch(
             self._description,
             controller,
@@ -607,7 +609,7 @@ class Arm:
         controllers: Sequence[str] | Mapping[str, Any] | None = None,
         bandwidth: float = 20.0,
         damping: float = 1.0,
-        plant: Robot = None,
+        plant: Robot | None = None,
         *,
         friction: bool | Friction = False,
         restitution: float | None = 0.0,
@@ -652,7 +654,7 @@ class Arm:
             tolerance=tolerance,
         )
 
-    def _moving(self, plant: Robot) -> Description:
+    def _moving(self, plant: Robot | None) -> Description:
         """Return what moves: a plant, an arm or its description, or this arm where none is given."""
         return self._description if plant is None else describe.description_of(plant)
 

@@ -47,7 +47,7 @@ def reduced_model(arm, held):
 
 
 def arm_value(arm, value):
-    from dhkit.description.table import quantity
+    from dhkit.description.table_rows import quantity
 
     return quantity("held", value, arm.parameters)
 

@@ -14,7 +14,7 @@ from dhkit.description import Base, Box, Capsule, Convention, Cylinder, Mesh, Pl
 from dhkit.description.frames import world_to_frames
 from dhkit.description.library import library_robot, robots
 from dhkit.description.numbers import matrix
-from dhkit.description.table import from_dh
+from dhkit.description.table_rows import from_dh
 from dhkit.expressions import ZERO, exact, parse
 from dhkit.model.shapes import link_parts
 

@@ -14,7 +14,7 @@ import pytest
 from acceptance import sample_size
 from dhkit import Arm, robots
 from dhkit.description import pose, pose_parts
-from dhkit.description.table import from_dh, quantity
+from dhkit.description.table_rows import from_dh, quantity
 from dhkit.errors import DescriptionError
 from dhkit.lab import Lab
 from dhkit.viewer import View

@@ -17,8 +17,7 @@ from dhkit.control.runs import Progress
 from dhkit.control.sensors import Sensors
 from dhkit.control.step_kernel import StepKernel
 from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import Robot, description_of, takes_robot
+from dhkit.description import Array, Description, Robot, description_of, joint_array, takes_robot
 from dhkit.dynamics import Friction
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory

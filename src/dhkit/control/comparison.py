@@ -20,9 +20,8 @@ from dhkit.control.references import Reference, reference_of
 from dhkit.control.result import SimulationResult
 from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, takes_robot
 from dhkit.description.joint_words import joint_unit
-from dhkit.description.robot import takes_robot
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError
 from dhkit.trajectories import Trajectory

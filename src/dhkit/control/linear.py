@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.control.references import Setpoint
-from dhkit.description import Array, Description, Robot, description_of, joint_vector
+from dhkit.description import Array, Description, Robot, description_of, joint_vector, takes_robot
 from dhkit.description.arrays import number_array
-from dhkit.description.robot import takes_robot
 from dhkit.display import repr_line
 from dhkit.dynamics import bias, gravity_torque, require_inertia
 from dhkit.symbolic import CasadiFunctions

@@ -160,7 +160,7 @@ class FrictionCompensation:
         How dry friction changes with the direction; ``Friction(1e-4)`` unless given.
     """
 
-    def __init__(self, inner: Any, robot: Robot = None, friction: Friction | None = None) -> None:
+    def __init__(self, inner: Any, robot: Robot | None = None, friction: Friction | None = None) -> None:
         if not callable(inner):
             raise TypeError(f"inner is {type(inner).__name__}; expected a controller")
         found = robot if robot is not None else getattr(inner, "description", None)

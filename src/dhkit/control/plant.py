@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from dhkit.control.complementarity import bounded_forces
 from dhkit.control.pushes import Push
 from dhkit.control.step_kernel import StepKernel
-from dhkit.description import Array, Description
-from dhkit.description.robot import description_of
+from dhkit.description import Array, Description, description_of
 from dhkit.display import counted, repr_line
 from dhkit.dynamics import (
     Friction,

@@ -169,7 +169,7 @@ class SimulationResult:
         return save_result(self, path)
 
     @classmethod
-    def load(cls, path: str | Path, robot: Robot = None) -> SimulationResult:
+    def load(cls, path: str | Path, robot: Robot | None = None) -> SimulationResult:
         """Read a file of :meth:`save`; see :func:`dhkit.control.result_files.load_result`. A robot may be an arm."""
         from dhkit.control.result_files import load_result
 

@@ -23,9 +23,8 @@ from dhkit.control.timing import (
     steps_a_period,
     substeps,
 )
-from dhkit.description import Array, Description, joint_vector
+from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.description.joint_words import joint_words, outside_words
-from dhkit.description.robot import takes_robot
 from dhkit.trajectories import Trajectory
 
 log = logging.getLogger(__name__)

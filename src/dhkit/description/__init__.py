@@ -1,7 +1,8 @@
 """A robot as data: its table, bodies, drives and shapes with exact numbers; robot files, the library, frames, poses."""
 
+from dhkit.description.arrays import Array
 from dhkit.description.assets import asset
-from dhkit.description.bodies import require_bodies
+from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia
 from dhkit.description.changes import (
     with_base,
     with_limits,
@@ -15,24 +16,21 @@ from dhkit.description.frames import joint_array, joint_vector, link_transforms,
 from dhkit.description.library import library_robot, robots
 from dhkit.description.locking import lock
 from dhkit.description.named import Named
-from dhkit.description.numbers import Array, Numbers
+from dhkit.description.numbers import Numbers
 from dhkit.description.payload import Payload
 from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
-from dhkit.description.robot import Description, Robot, description_of
-from dhkit.description.robot_file import from_toml, read_robot
-from dhkit.description.table import DHTable, from_dh
-from dhkit.description.toml_writer import to_toml, write_robot
+from dhkit.description.robot import Description, Robot, description_of, require_bodies, takes_robot
+from dhkit.description.robot_file import from_toml, read_robot, to_toml, write_robot
+from dhkit.description.table import DHTable
+from dhkit.description.table_rows import from_dh
 from dhkit.description.values import (
-    INERTIA_PLACES,
     Base,
-    Body,
     Box,
     Capsule,
     Convention,
     Cylinder,
     Drive,
     Geometry,
-    Inertia,
     Joint,
     JointType,
     Mesh,
@@ -85,6 +83,7 @@ __all__ = [
     "read_robot",
     "require_bodies",
     "robots",
+    "takes_robot",
     "to_toml",
     "with_base",
     "with_limits",

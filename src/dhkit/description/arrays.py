@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array: TypeAlias = NDArray[np.float64]
 
-def number_array(value: ArrayLike, name: str, shape: str) -> NDArray[np.float64]:
+
+def number_array(value: ArrayLike, name: str, shape: str) -> Array:
     """Return numbers as a float64 array, itself where it is one.
 
     Raises

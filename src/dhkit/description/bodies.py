@@ -1,22 +1,69 @@
-"""Rigid bodies with exact numbers: moved to another frame, joined, and made from a uniform rod."""
+"""Rigid bodies with exact numbers: made from a uniform rod, moved to another frame, and joined."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description.exact_poses import ExactPose, settled, vector
-from dhkit.description.robot import takes_robot
-from dhkit.description.values import INERTIA_PLACES, Body, Inertia, Vector
-from dhkit.errors import DescriptionError
-from dhkit.expressions import ZERO, Expression
+from dhkit.display import repr_line
+from dhkit.expressions import ZERO, Expression, settled
 
-if TYPE_CHECKING:
-    from dhkit.description.robot import Description
+ExactPose: TypeAlias = NDArray[Any]
+"""A homogeneous transform, shape (4, 4), entries Expression."""
+
+Vector: TypeAlias = tuple[Expression, Expression, Expression]
+"""Three coordinates."""
+
+ORIGIN: Vector = (ZERO, ZERO, ZERO)
+INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+"""Where moments and products stand in a tensor, in the order in which six of them are listed."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Moments and products of inertia about the centre of mass, kg m^2; xy = -integral of x y dm."""
+
+    xx: Expression = ZERO
+    yy: Expression = ZERO
+    zz: Expression = ZERO
+    xy: Expression = ZERO
+    yz: Expression = ZERO
+    xz: Expression = ZERO
+
+    @property
+    def rows(self) -> tuple[Vector, Vector, Vector]:
+        """The symmetric 3x3 tensor."""
+        return (self.xx, self.xy, self.xz), (self.xy, self.yy, self.yz), (self.xz, self.yz, self.zz)
+
+    def __repr__(self) -> str:
+        said = ", ".join(f"{key} {getattr(self, key)}" for key in INERTIA_PLACES)
+        return repr_line("Inertia", said=f"{said} kg m^2")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body's mass, kg, centre of mass, m, and inertia about it, in the axes of its link's own DH frame."""
+
+    mass: Expression
+    com: Vector = ORIGIN
+    inertia: Inertia = Inertia()
+    unphysical: bool = False
+    """The inertia is known to be impossible and kept as published: a warning, no error."""
+    name: str = ""
+    """Empty: the joint calls it ``body 1``, ``body 2`` ... by its place, where its link has several bodies."""
+
+    def __repr__(self) -> str:
+        return repr_line("Body", self.name, f"{self.mass} kg, centre of mass {vector_text(self.com)} m")
+
+
+def vector(entries: Sequence[Expression] | NDArray[Any]) -> Vector:
+    """Return three settled coordinates."""
+    x, y, z = (settled(entry) for entry in entries)
+    return x, y, z
 
 
 def moved_body(body: Body, T: ExactPose) -> Body:
@@ -57,25 +104,6 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     return Body(mass, vector((first + last) / 2), _inertia(_steiner(last - first, mass / 12)))
 
 
-@takes_robot
-def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
-    """Return the bodies of each link, and refuse an arm whose dynamics are unknown.
-
-    Raises
-    ------
-    DescriptionError
-        Names the joints whose links have no body.
-    """
-    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if not joint.bodies]
-    if bare:
-        raise DescriptionError(
-            f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
-            f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
-            "or use with_uniform_links (--uniform-links in the command)"
-        )
-    return tuple(joint.bodies for joint in description.joints)
-
-
 def _steiner(lever: NDArray[Any], mass: Expression) -> NDArray[Any]:
     """Return mass (l^2 1 - l l^T)."""
     square = sum((x * x for x in lever), ZERO)
@@ -87,3 +115,8 @@ def _steiner(lever: NDArray[Any], mass: Expression) -> NDArray[Any]:
 
 def _inertia(tensor: NDArray[Any]) -> Inertia:
     return Inertia(**{key: settled(tensor[place]) for key, place in INERTIA_PLACES.items()})
+
+
+def vector_text(vector: Vector) -> str:
+    """Return three coordinates as text: ``(0, l1/2, 0.1)``."""
+    return f"({', '.join(map(str, vector))})"

@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description.arrays import number_array
-from dhkit.description.bodies import moved_body, rod
-from dhkit.description.exact_poses import ExactPose, fixed_row, inverse, pose_of
+from dhkit.description.bodies import INERTIA_PLACES, ORIGIN, Body, ExactPose, Inertia, Vector, moved_body, rod
+from dhkit.description.exact_poses import fixed_row, inverse, pose_of
 from dhkit.description.frames import one_each
 from dhkit.description.named import Named
 from dhkit.description.parameters import resolved
 from dhkit.description.poses import check_pose, pose_parts
 from dhkit.description.robot import Description, takes_robot
-from dhkit.description.table import Quantity, quantity
+from dhkit.description.table_rows import Quantity, quantity
 from dhkit.description.traversal import names_in
 from dhkit.description.validation import check_body
-from dhkit.description.values import INERTIA_PLACES, ORIGIN, Base, Body, Convention, Inertia, Placement, Tool, Vector
+from dhkit.description.values import Base, Convention, Placement, Tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 

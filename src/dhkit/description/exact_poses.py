@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dhkit.description.bodies import ExactPose, vector
 from dhkit.description.poses import pose_parts
-from dhkit.description.values import Convention, Joint, Placement, Vector
+from dhkit.description.values import Convention, Joint, Placement
 from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
 
-ExactPose: TypeAlias = NDArray[Any]
-"""Shape (4, 4), entries Expression."""
-
 ONE = Expression.number(1)
-DIGITS = 30
-"""Of a coefficient that products of decimals have made longer: far below the rounding of a double."""
 
 
 def identity() -> ExactPose:
@@ -83,23 +77,6 @@ def placement_of(T: ExactPose) -> Placement:
         yaw, pitch, roll = (exact_angle(exact(float(angle))) for angle in euler)
         angles = roll, pitch, yaw
     return Placement(vector(T[:3, 3]), angles)
-
-
-def vector(entries: Sequence[Expression] | NDArray[Any]) -> Vector:
-    """Return three settled coordinates."""
-    x, y, z = (settled(entry) for entry in entries)
-    return x, y, z
-
-
-def settled(value: Expression, *, angle: bool = False) -> Expression:
-    """Return a value without parameters as a plain number where it is not one already.
-
-    ``sin(0.5)`` is a symbol to the exact arithmetic; written into a table it is 0.479425538604203.
-    """
-    if value.symbols or value.rational is not None or value.half_turns is not None:
-        return value.with_digits(DIGITS)
-    number = exact(float(value))
-    return exact_angle(number) if angle else number
 
 
 def inverse(T: ExactPose) -> ExactPose:

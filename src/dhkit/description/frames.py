@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description.arrays import number_array
-from dhkit.description.numbers import Array
+from dhkit.description.arrays import Array, number_array
 from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
 

@@ -18,9 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description.bodies import joined, moved_body
+from dhkit.description.bodies import Body, ExactPose, joined, moved_body
 from dhkit.description.exact_poses import (
-    ExactPose,
     fixed_row,
     identity,
     inverse,
@@ -29,17 +28,29 @@ from dhkit.description.exact_poses import (
     pose_of,
     rotation_x,
     rotation_z,
-    settled,
     translation,
 )
 from dhkit.description.named import Named
 from dhkit.description.parameters import needs, resolved
 from dhkit.description.robot import Description, takes_robot
-from dhkit.description.table import Quantity, quantity
+from dhkit.description.table_rows import Quantity, quantity
 from dhkit.description.traversal import expressions_in, names_in, with_values
-from dhkit.description.values import Base, Body, Convention, Joint, Shape, Tool
+from dhkit.description.values import Base, Convention, Joint, Shape, Tool
 from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import PI, ZERO, Budget, Expression, arc_tangent, cos, exact_angle, parse, sin, sqrt, substitute
+from dhkit.expressions import (
+    PI,
+    ZERO,
+    Budget,
+    Expression,
+    arc_tangent,
+    cos,
+    exact_angle,
+    parse,
+    settled,
+    sin,
+    sqrt,
+    substitute,
+)
 
 log = logging.getLogger(__name__)
 

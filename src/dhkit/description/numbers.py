@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.description.arrays import Array
+from dhkit.description.bodies import INERTIA_PLACES, Body, Vector, joined
+from dhkit.description.exact_poses import pose_of
 from dhkit.description.parameters import resolved
-from dhkit.description.values import INERTIA_PLACES
+from dhkit.description.robot_data import RobotData
+from dhkit.description.traversal import with_values
+from dhkit.description.values import Joint, Placement
 from dhkit.display import counted, repr_line
 from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from dhkit.description.robot import Description
-    from dhkit.description.values import Body, Joint, Placement, Vector
-
-Array: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +89,7 @@ class Numbers:
         return np.concatenate([m, m * c, listed], axis=-1)
 
     @classmethod
-    def of(cls, description: Description) -> Numbers:
+    def of(cls, description: RobotData) -> Numbers:
         """Round a description's exact numbers."""
         values = resolved(description.parameters)
         joints = description.joints
@@ -161,17 +158,12 @@ def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
 @lru_cache(maxsize=1024)
 def _matrix(placement: Placement, values: tuple[tuple[str, Expression], ...]) -> Array:
     """Remember matrices: an exact pose costs 1 ms, and base, tool and shapes stay while a person edits the table."""
-    from dhkit.description.exact_poses import pose_of
-
     pose = pose_of(placement, dict(values))
     return np.array([[float(substitute(entry, dict(values))) for entry in row] for row in pose], dtype=float)
 
 
 def _as_one(bodies: tuple[Body, ...], values: dict[str, Expression]) -> Body | None:
     """Return a link's bodies as one, several joined as numbers: a parameter that is zero divides nothing then."""
-    from dhkit.description.bodies import joined
-    from dhkit.description.traversal import with_values
-
     if len(bodies) < 2:
         return bodies[0] if bodies else None
     return joined(with_values(bodies, values))

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dhkit.description.arrays import number_array
+from dhkit.description.arrays import Array, number_array
+from dhkit.description.bodies import INERTIA_PLACES
 from dhkit.description.changes import SYMMETRIC, with_payload
-from dhkit.description.numbers import Array
 from dhkit.description.robot import Description
-from dhkit.description.values import INERTIA_PLACES
 from dhkit.display import value_line
 from dhkit.errors import DescriptionError
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description.arrays import number_array
-from dhkit.description.numbers import Array
+from dhkit.description.arrays import Array, number_array
 
 ORTHONORMAL = 1e-6
 """Largest entry of R^T R - 1 that still counts as a rotation: six digits typed by hand."""

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, wraps
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeAlias, TypeVar, cast
 
-from dhkit.description.named import Named
-from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units, Vector
+from dhkit.description.bodies import Body
+from dhkit.description.numbers import Numbers
+from dhkit.description.parameters import resolved
+from dhkit.description.robot_data import RobotData, data_of
+from dhkit.description.table import DHTable
+from dhkit.description.toml_writer import toml_text
+from dhkit.description.validation import check
 from dhkit.display import html_block, html_lines, repr_line
-from dhkit.expressions import Expression, substitute
-
-if TYPE_CHECKING:
-    from dhkit.description.numbers import Numbers
+from dhkit.errors import DescriptionError
+from dhkit.expressions import substitute
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-Robot = Any
-"""An arm, or its description."""
-
 
 @dataclass(frozen=True)
-class Description:
+class Description(RobotData):
     """A serial robot as data: everything in its robot file, with exact numbers.
 
     Two descriptions are equal when they mean the same robot, whatever units their files were written in.
@@ -36,51 +35,16 @@ class Description:
         The values describe no robot; the message names joint and key, what was found and what was expected.
     """
 
-    name: str
-    convention: Convention
-    joints: tuple[Joint, ...]
-    parameters: Named[Expression] = field(default_factory=Named)
-    gravity: Vector = STANDARD_GRAVITY
-    """Free-fall acceleration in the world frame, m/s^2."""
-    base: Base = field(default=Base())
-    tool: Tool = field(default=Tool())
-    configurations: Named[tuple[Expression, ...]] = field(default_factory=Named)
-    """Joint vectors by name, rad and m."""
-    source: str = ""
-    notes: str = ""
-    drawn: bool = True
-    """Whether links and tools without shapes are drawn from the table, where other links have shapes."""
-    units: Units = field(default=Units(), compare=False)
-    """What :func:`dhkit.description.to_toml` writes numbers in."""
-    mesh_folder: Path | None = field(default=None, compare=False)
-    """The folder that mesh paths are relative to."""
-    warnings: tuple[str, ...] = field(default=(), init=False, compare=False)
-    """What is odd about the values, but carried on with."""
-
     def __post_init__(self) -> None:
-        from dhkit.description.validation import check
-
         joints = tuple(
             joint if joint.name else replace(joint, name=f"joint{i}") for i, joint in enumerate(self.joints, start=1)
         )
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "warnings", check(self))
 
-    @property
-    def n(self) -> int:
-        """The number of joints."""
-        return len(self.joints)
-
-    @property
-    def kinds(self) -> str:
-        """One letter a joint, R or P."""
-        return "".join("R" if joint.is_revolute else "P" for joint in self.joints)
-
     @cached_property
     def numbers(self) -> Numbers:
         """The float view: read-only arrays of the table, the limits, bodies and drives."""
-        from dhkit.description.numbers import Numbers
-
         return Numbers.of(self)
 
     @property
@@ -98,9 +62,7 @@ class Description:
         >>> len(library_robot("puma560").digest)
         12
         """
-        from dhkit.description.toml_writer import to_toml
-
-        return hashlib.sha256(to_toml(self).encode()).hexdigest()[:12]
+        return hashlib.sha256(toml_text(self).encode()).hexdigest()[:12]
 
     # Whatever is made once for a robot is found by its hash, on every call: it is worked out once.
     def __hash__(self) -> int:
@@ -111,7 +73,7 @@ class Description:
         return hash(tuple(getattr(self, item.name) for item in fields(self) if item.compare))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone: what is worked out from them is worked out anew, and hashes of text differ by process."""
+        """Return the fields alone, without cached values: a hash of text differs from process to process."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __repr__(self) -> str:
@@ -122,8 +84,6 @@ class Description:
         )
 
     def _repr_html_(self) -> str:
-        from dhkit.description.table import DHTable
-
         values = [f"{name} = {value:.6g}" for name, value in self.numbers.values.items()]
         lines = [*self.carried_words, *([f"parameters (SI): {', '.join(values)}"] if values else [])]
         lines += [f"warning: {warning}" for warning in self.warnings]
@@ -132,8 +92,6 @@ class Description:
     @property
     def carried_words(self) -> list[str]:
         """Where the tool is in the last frame, unless there, and the mass of payloads, in words."""
-        from dhkit.description.parameters import resolved
-
         found = []
         x, y, z = (float(entry) + 0.0 for entry in self.numbers.T_last_tool[:3, 3])
         if (x, y, z) != (0.0, 0.0, 0.0):
@@ -143,6 +101,18 @@ class Description:
         if masses:
             found.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
         return found
+
+
+class HasDescription(Protocol):
+    """An arm, or another object that carries a description."""
+
+    @property
+    def description(self) -> Description:
+        """The robot as data."""
+
+
+Robot: TypeAlias = Description | HasDescription
+"""An arm, or its description."""
 
 
 def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:
@@ -169,7 +139,23 @@ def description_of(robot: Robot) -> Description:
     TypeError
         Neither.
     """
-    found = getattr(robot, "description", robot)
-    if not isinstance(found, Description):
-        raise TypeError(f"found {type(robot).__name__}; expected an arm or its description")
-    return found
+    return cast("Description", data_of(robot))
+
+
+@takes_robot
+def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
+    """Return the bodies of each link, and refuse an arm whose dynamics are unknown.
+
+    Raises
+    ------
+    DescriptionError
+        Names the joints whose links have no body.
+    """
+    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if not joint.bodies]
+    if bare:
+        raise DescriptionError(
+            f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
+            f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
+            "or use with_uniform_links (--uniform-links in the command)"
+        )
+    return tuple(joint.bodies for joint in description.joints)

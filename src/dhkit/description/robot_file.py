@@ -6,19 +6,19 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dhkit.description.files import read_bounded
+from dhkit.description.bodies import Body, Inertia, Vector
+from dhkit.description.files import read_bounded, write_atomically
 from dhkit.description.named import Named
-from dhkit.description.robot import Description
+from dhkit.description.robot import Description, takes_robot
 from dhkit.description.toml_text import toml_document
+from dhkit.description.toml_writer import toml_text
 from dhkit.description.values import (
     Base,
-    Body,
     Box,
     Capsule,
     Convention,
     Cylinder,
     Drive,
-    Inertia,
     Joint,
     JointType,
     Mesh,
@@ -27,7 +27,6 @@ from dhkit.description.values import (
     Sphere,
     Tool,
     Units,
-    Vector,
 )
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
@@ -73,6 +72,21 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
             return _Reader(validated(toml_document(text)), mesh_folder).description()
     except DescriptionError as error:
         raise DescriptionError(f"{file}: {error}") from None
+
+
+@takes_robot
+def to_toml(description: Description) -> str:
+    """Return a description as a robot file's text.
+
+    Reading it gives an equal description in the same units. Comments of a file that was read are not kept.
+    """
+    return toml_text(description)
+
+
+@takes_robot
+def write_robot(description: Description, path: str | Path) -> None:
+    """Write a robot file; it is there whole or not at all."""
+    write_atomically(Path(path), toml_text(description))
 
 
 class _Reader:

@@ -1,177 +1,18 @@
-"""The Denavit-Hartenberg table: rows in, a description out; and the table as a person reads it."""
+"""The Denavit-Hartenberg table of a robot as people read it: in a terminal, in a notebook, in LaTeX."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from decimal import Decimal
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias
 
-from dhkit.description.named import Named
-from dhkit.description.parameters import check_parameter_name
-from dhkit.description.robot import Description, Robot, description_of
-from dhkit.description.values import INERTIA_PLACES, Body, Convention, Inertia, Joint, JointType, Units
+from dhkit.description.robot_data import data_of
+from dhkit.description.values import Convention, Joint, Units
 from dhkit.display import counted, html_table, repr_line
-from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import Expression, exact, exact_angle, parse
-
-Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
-"""A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
+from dhkit.expressions import Expression
 
 COLUMNS = ("theta", "d", "a", "alpha")
 LONGEST_ENTRY = 400
 """Characters of an entry in a notebook and on a page of equations."""
-
-
-def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
-    """Return an argument's exact value; bare numbers are in ``unit``, text is in SI.
-
-    Raises
-    ------
-    DescriptionError
-        Not a finite number or expression; begins with ``where``.
-    """
-    try:
-        if isinstance(value, str):
-            return parse(value, tuple(names))
-        number = exact(value)
-        return number if unit is None or isinstance(value, Expression) else number * unit
-    except ExpressionError as error:
-        raise DescriptionError(f"{where}: {error}") from None
-
-
-def from_dh(
-    rows: Sequence[Sequence[Quantity]],
-    *,
-    order: Sequence[str] = COLUMNS,
-    kinds: str | Sequence[str] | None = None,
-    convention: str = "standard",
-    angle: str = "rad",
-    length: str = "m",
-    name: str = "arm",
-    parameters: Mapping[str, Quantity] | None = None,
-    limits: Sequence[Sequence[Quantity] | None] | None = None,
-    bodies: Sequence[Body | Mapping[str, Any] | None] | None = None,
-) -> Description:
-    """Return the description of a Denavit-Hartenberg table.
-
-    Parameters
-    ----------
-    rows
-        One row a joint: four numbers, in the units given, or text in metres and radians.
-    order
-        What the columns are.
-    kinds
-        One letter a joint: R or P; all revolute if not given.
-    convention
-        ``"standard"`` or ``"modified"`` (row i then holds alpha_(i-1) and a_(i-1)).
-    angle, length
-        Units of bare numbers: rad or deg; m, mm, cm or in.
-    name
-        The robot's name.
-    parameters
-        Values of the names that occur in text.
-    limits
-        Of each joint: its lowest and highest value, in the units given, or None.
-    bodies
-        Of each link: a :class:`Body`, or ``{"mass": 2.0, "com": (x, y, z), "inertia": ((…), (…), (…))}`` in kg, m and
-        kg m^2, about the centre of mass in the axes of the link's own DH frame; or None.
-
-    Raises
-    ------
-    DescriptionError
-        Another number of columns, an unknown kind, unit or convention, or a value that is no finite number.
-
-    Examples
-    --------
-    >>> arm = from_dh([(0, 0.3, 0, "pi/2"), (0, 0, "l", 0)], kinds="RR", parameters={"l": 0.5})
-    >>> arm.n, float(arm.numbers.a[1])
-    (2, 0.5)
-    """
-    if sorted(order) != sorted(COLUMNS):
-        raise DescriptionError(f"order is {tuple(order)}; expected {', '.join(COLUMNS)} in some order")
-    for what, found, known in (
-        ("convention", convention, [c.value for c in Convention]),
-        ("angle", angle, list(Units.ANGLES)),
-        ("length", length, list(Units.LENGTHS)),
-    ):
-        if found not in known:
-            raise DescriptionError(f"{what} is {found!r}; expected one of {', '.join(known)}")
-    types = "".join(kinds or "R" * len(rows)).upper()
-    if len(types) != len(rows) or set(types) - {"R", "P"}:
-        raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
-    units = Units(length, angle)
-    named = dict(parameters or {})
-    for key in named:
-        check_parameter_name(key)
-    joints = [
-        _joint(i, row, order, type, units, named) for i, (row, type) in enumerate(zip(rows, types, strict=True), 1)
-    ]
-    for what, given in (("limits", limits), ("bodies", bodies)):
-        if given is not None and len(given) != len(joints):
-            raise DescriptionError(f"{what}: {len(given)} entries; expected {len(joints)}, one a joint")
-    for i, pair in enumerate(limits or ()):
-        if pair is not None:
-            joints[i] = replace(joints[i], limits=_limits(i + 1, pair, joints[i], units, named))
-    for i, body in enumerate(bodies or ()):
-        if body is not None:
-            joints[i] = replace(joints[i], bodies=(_body(i + 1, body, named),))
-    return Description(
-        name=name,
-        convention=Convention(convention),
-        joints=tuple(joints),
-        parameters=Named({key: quantity(f"parameters.{key}", value, named) for key, value in named.items()}),
-        units=units,
-    )
-
-
-def _joint(
-    number: int,
-    row: Sequence[Quantity],
-    order: Sequence[str],
-    type: str,
-    units: Units,
-    names: Mapping[str, object],
-) -> Joint:
-    if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != len(COLUMNS):
-        raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
-    entries: dict[str, Expression] = {
-        key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
-        for key, value in zip(order, row, strict=True)
-    }
-    for key in ("theta", "alpha"):
-        entries[key] = exact_angle(entries[key])
-    a, alpha, d, theta = (entries[key] for key in ("a", "alpha", "d", "theta"))
-    return Joint(JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, a, alpha, d, theta)
-
-
-def _limits(
-    number: int, pair: Sequence[Quantity], joint: Joint, units: Units, names: Mapping[str, object]
-) -> tuple[Expression, Expression]:
-    if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
-        raise DescriptionError(f"limits of joint {number}: found {pair!r}; expected lowest and highest value, or None")
-    unit = units.radians if joint.is_revolute else units.metres
-    low, high = (quantity(f"limits of joint {number}", value, names, unit) for value in pair)
-    return low, high
-
-
-def _body(number: int, body: object, names: Mapping[str, object]) -> Body:
-    if isinstance(body, Body):
-        return body
-    where = f"body of link {number}"
-    if not isinstance(body, Mapping) or "mass" not in body or set(body) - {"mass", "com", "inertia"}:
-        raise DescriptionError(f"{where}: found {str(body)[:80]}; expected a Body, or mass, com and inertia by name")
-    com = tuple(quantity(f"{where}: com", value, names) for value in body.get("com", (0, 0, 0)))
-    if len(com) != 3:
-        raise DescriptionError(f"{where}: com has {len(com)} numbers; expected 3")
-    rows = [
-        [quantity(f"{where}: inertia", value, names) for value in row] for row in body.get("inertia", [[0] * 3] * 3)
-    ]
-    if [len(row) for row in rows] != [3, 3, 3] or any(rows[i][j] != rows[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
-        raise DescriptionError(f"{where}: inertia: expected a symmetric 3x3 matrix, kg m^2 about the centre of mass")
-    inertia = Inertia(**{key: rows[i][j] for key, (i, j) in INERTIA_PLACES.items()})
-    return Body(quantity(f"{where}: mass", body["mass"], names), (com[0], com[1], com[2]), inertia)
 
 
 def length(value: Expression, units: Units) -> str:
@@ -213,9 +54,9 @@ class DHTable:
     latex_rows: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def of(cls, description: Robot) -> DHTable:
+    def of(cls, robot: object) -> DHTable:
         """Read a robot's table, in the units of its file."""
-        description = description_of(description)
+        description = data_of(robot)
         # An expression is in metres, and then so is the whole table.
         symbolic = any(joint.a.symbols or joint.d.symbols for joint in description.joints)
         units = Units() if symbolic else description.units

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import tomlkit
 from tomlkit.items import Array, Float, InlineTable, Item, Table, Trivia
 
-from dhkit.description.files import write_atomically
-from dhkit.description.robot import Description, takes_robot
+from dhkit.description.bodies import Body
+from dhkit.description.robot_data import RobotData
 from dhkit.description.values import (
     STANDARD_GRAVITY,
     UNSCALED,
-    Body,
     Box,
     Drive,
     Joint,
@@ -30,17 +28,10 @@ ONE = exact(1)
 Content: TypeAlias = Mapping[str, Any]
 
 
-@takes_robot
-def write_robot(description: Description, path: str | Path) -> None:
-    """Write a robot file; it is there whole or not at all."""
-    write_atomically(Path(path), to_toml(description))
-
-
-@takes_robot
-def to_toml(description: Description) -> str:
+def toml_text(description: RobotData) -> str:
     """Return a description as a robot file's text.
 
-    Reading it gives an equal description in the same units. Comments of a file that was read are not kept.
+    See :func:`dhkit.description.to_toml`.
     """
     units = description.units
     document = tomlkit.document()

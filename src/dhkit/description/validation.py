@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dhkit.description.assets import MESH_FORMATS, inside
+from dhkit.description.bodies import Body
 from dhkit.description.joint_words import outside_words
+from dhkit.description.mesh_files import check_mesh_file
 from dhkit.description.parameters import check_parameter_name, resolved
+from dhkit.description.robot_data import RobotData
+from dhkit.description.values import Box, Drive, Geometry, Joint, Mesh, Placement, Shape
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
-
-if TYPE_CHECKING:
-    from dhkit.description.robot import Description
-    from dhkit.description.values import Body, Drive, Geometry, Joint, Mesh, Placement, Shape
 
 MAX_JOINTS = 32
 LARGEST = 1e12
@@ -46,7 +46,7 @@ WHOLE_TURN, SEVERAL_TURNS, LARGEST_DEGREES = math.tau + 1e-9, 2 * math.tau + 1e-
 Value = Callable[[str, Expression], float]
 
 
-def check(description: Description) -> tuple[str, ...]:
+def check(description: RobotData) -> tuple[str, ...]:
     """Check a description; return its warnings.
 
     Raises
@@ -97,7 +97,7 @@ def _finite(where: str, expression: Expression, values: Mapping[str, Expression]
     return value
 
 
-def _check_counts(description: Description) -> None:
+def _check_counts(description: RobotData) -> None:
     for what, count, least, most in (
         ("joints", description.n, 1, MAX_JOINTS),
         ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
@@ -107,7 +107,7 @@ def _check_counts(description: Description) -> None:
             raise DescriptionError(f"{count} {what}; expected {least} to {most}")
 
 
-def _check_names(description: Description) -> None:
+def _check_names(description: RobotData) -> None:
     if not NAME.fullmatch(description.name):
         raise DescriptionError(
             f"name: found {description.name[:80]!r}; expected letters, digits, '_', '.', '-', beginning with a letter"
@@ -240,7 +240,7 @@ def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None
         pass
 
 
-def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: Description) -> Iterator[str]:
+def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: RobotData) -> Iterator[str]:
     if len(shapes) > MAX_SHAPES:
         raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
     for shape in shapes:
@@ -250,9 +250,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
         yield from _check_geometry(shape.geometry, f"{where}: shape", value, description)
 
 
-def _check_geometry(geometry: Geometry, where: str, value: Value, description: Description) -> Iterator[str]:
-    from dhkit.description.values import Box, Mesh
-
+def _check_geometry(geometry: Geometry, where: str, value: Value, description: RobotData) -> Iterator[str]:
     if isinstance(geometry, Mesh):
         yield from _check_mesh(geometry, where, value, description)
         return
@@ -266,11 +264,8 @@ def _check_geometry(geometry: Geometry, where: str, value: Value, description: D
             raise DescriptionError(f"{where}.{key} is {found:g}; expected a positive number")
 
 
-def _check_mesh(mesh: Mesh, where: str, value: Value, description: Description) -> Iterator[str]:
+def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) -> Iterator[str]:
     """Refuse a path or a scale that is none; a file that is none is a warning, for the arm works without it."""
-    from dhkit.description.assets import MESH_FORMATS, inside
-    from dhkit.description.mesh_files import check_mesh_file
-
     file = inside(description.mesh_folder, mesh.path, where)
     if not mesh.path.lower().endswith(MESH_FORMATS):
         raise DescriptionError(f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
@@ -287,7 +282,7 @@ def _check_mesh(mesh: Mesh, where: str, value: Value, description: Description) 
         yield f"{where}.mesh: {mesh.path!r} {what}; the link is drawn from the table"
 
 
-def _check_configurations(description: Description, value: Value) -> Iterator[str]:
+def _check_configurations(description: RobotData, value: Value) -> Iterator[str]:
     for name, q in description.configurations.items():
         if not NAME.fullmatch(name):
             raise DescriptionError(f"configurations: {name[:80]!r} is no name")

@@ -7,13 +7,10 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeAlias
 
+from dhkit.description.bodies import ORIGIN, Body, Vector, joined, vector_text
 from dhkit.display import counted, repr_line, value_line
 from dhkit.expressions import PI, ZERO, Expression, exact
 
-Vector: TypeAlias = tuple[Expression, Expression, Expression]
-"""Three coordinates."""
-
-ORIGIN: Vector = (ZERO, ZERO, ZERO)
 ONE = exact(1)
 UNSCALED: Vector = (ONE, ONE, ONE)
 STANDARD_GRAVITY: Vector = (ZERO, ZERO, exact(-9.81))
@@ -58,47 +55,6 @@ class Units:
         return self.ANGLES[self.angle]
 
 
-INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
-"""Where moments and products stand in a tensor, in the order in which six of them are listed."""
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Moments and products of inertia about the centre of mass, kg m^2; xy = -integral of x y dm."""
-
-    xx: Expression = ZERO
-    yy: Expression = ZERO
-    zz: Expression = ZERO
-    xy: Expression = ZERO
-    yz: Expression = ZERO
-    xz: Expression = ZERO
-
-    @property
-    def rows(self) -> tuple[Vector, Vector, Vector]:
-        """The symmetric 3x3 tensor."""
-        return (self.xx, self.xy, self.xz), (self.xy, self.yy, self.yz), (self.xz, self.yz, self.zz)
-
-    def __repr__(self) -> str:
-        said = ", ".join(f"{key} {getattr(self, key)}" for key in INERTIA_PLACES)
-        return repr_line("Inertia", said=f"{said} kg m^2")
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body's mass, kg, centre of mass, m, and inertia about it, in the axes of its link's own DH frame."""
-
-    mass: Expression
-    com: Vector = ORIGIN
-    inertia: Inertia = Inertia()
-    unphysical: bool = False
-    """The inertia is known to be impossible and kept as published: a warning, no error."""
-    name: str = ""
-    """Empty: the joint calls it ``body 1``, ``body 2`` ... by its place, where its link has several bodies."""
-
-    def __repr__(self) -> str:
-        return repr_line("Body", self.name, f"{self.mass} kg, centre of mass {_triple(self.com)} m")
-
-
 @dataclass(frozen=True)
 class Drive:
     """Motor and gear of a joint, motor side: the joint sees gear^2 J, gear^2 B and abs(gear) Tc."""
@@ -131,7 +87,7 @@ class Placement:
     rpy: Vector = ORIGIN
 
     def __repr__(self) -> str:
-        return repr_line("Placement", said=f"xyz {_triple(self.xyz)} m, rpy {_triple(self.rpy)} rad")
+        return repr_line("Placement", said=f"xyz {vector_text(self.xyz)} m, rpy {vector_text(self.rpy)} rad")
 
 
 @dataclass(frozen=True)
@@ -143,7 +99,7 @@ class Mesh:
     """Factors along the file's x, y and z; negative ones mirror."""
 
     def __repr__(self) -> str:
-        return repr_line("Mesh", self.path, f"times {_triple(self.scale)}")
+        return repr_line("Mesh", self.path, f"times {vector_text(self.scale)}")
 
 
 @dataclass(frozen=True)
@@ -201,8 +157,9 @@ class Shape:
     """``#rrggbb``."""
 
     def __repr__(self) -> str:
-        colour = "" if self.color is None else f", {self.color}"
-        return repr_line("Shape", type(self.geometry).__name__.lower(), f"at {_triple(self.placement.xyz)} m{colour}")
+        position = f"at {vector_text(self.placement.xyz)} m"
+        said = position if self.color is None else f"{position}, {self.color}"
+        return repr_line("Shape", type(self.geometry).__name__.lower(), said)
 
 
 @dataclass(frozen=True)
@@ -242,8 +199,6 @@ class Joint:
     @cached_property
     def body(self) -> Body | None:
         """The link as one rigid body: the only one itself, several joined about their common centre of mass."""
-        from dhkit.description.bodies import joined
-
         return joined(self.bodies) if self.bodies else None
 
     @property
@@ -266,7 +221,7 @@ class Base:
     """Moves nothing; holds what was locked to the base."""
 
     def __repr__(self) -> str:
-        return repr_line("Base", said=f"at {_triple(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
+        return repr_line("Base", said=f"at {vector_text(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
 
 
 @dataclass(frozen=True)
@@ -277,8 +232,4 @@ class Tool:
     shapes: tuple[Shape, ...] = ()
 
     def __repr__(self) -> str:
-        return repr_line("Tool", said=f"at {_triple(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
-
-
-def _triple(vector: Vector) -> str:
-    return f"({', '.join(map(str, vector))})"
+        return repr_line("Tool", said=f"at {vector_text(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")

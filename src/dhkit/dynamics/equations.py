@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.dynamics.loads import external_torque
 from dhkit.dynamics.programs import evaluate
 from dhkit.symbolic import Friction

@@ -7,8 +7,7 @@ import logging
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.dynamics.equations import mass_matrix
 from dhkit.dynamics.loads import external_torque
 from dhkit.dynamics.programs import evaluate

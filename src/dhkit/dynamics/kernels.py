@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.dynamics.loads import friction_kernel, wrench_kernel
 from dhkit.dynamics.programs import EXPRESSIONS, dynamics_kernel
 from dhkit.kernels import Kernel

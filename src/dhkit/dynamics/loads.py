@@ -7,9 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.description.arrays import number_array
-from dhkit.description.robot import takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
 from dhkit.symbolic import friction_torque as friction_expression

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import INERTIA_PLACES, Array, Description, joint_array
+from dhkit.description import INERTIA_PLACES, Array, Description, joint_array, takes_robot
 from dhkit.description.frames import carrying, world_to_frames
-from dhkit.description.robot import takes_robot
 
 
 @takes_robot

@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.dynamics.regressor import regressor
 from dhkit.kernels import Kernel, fill, kernel

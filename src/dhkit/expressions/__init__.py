@@ -2,7 +2,7 @@
 
 from dhkit.expressions.budget import Budget
 from dhkit.expressions.exact import PI, ZERO, Atom, Expression, exact, exact_angle
-from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, decimals, sin, sqrt, substitute
+from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, decimals, settled, sin, sqrt, substitute
 from dhkit.expressions.parser import CONSTANTS, parse
 from dhkit.expressions.syntax import decimal_fraction, read
 
@@ -23,6 +23,7 @@ __all__ = [
     "exact_angle",
     "parse",
     "read",
+    "settled",
     "sin",
     "sqrt",
     "substitute",

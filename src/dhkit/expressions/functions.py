@@ -8,10 +8,12 @@ from fractions import Fraction
 from functools import cache
 
 from dhkit.errors import ExpressionError
-from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exact
+from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exact, exact_angle
 
 NOTHING = 1e-40
 """A function's value below this is taken for 0: no length times it is ever seen, and its digits would be many."""
+SETTLED_DIGITS = 30
+"""Digits kept of a coefficient that products of decimals have made longer; a double has 17."""
 LARGEST_FACTORED = 10**6
 """Square roots of numbers below this are split into those of primes, so that sqrt(6) is sqrt(2)*sqrt(3)."""
 
@@ -243,3 +245,14 @@ def _prime_factors(number: int) -> list[tuple[int, int]]:
             factors.append((prime, power))
         prime += 1
     return [*factors, (number, 1)] if number > 1 else factors
+
+
+def settled(value: Expression, *, angle: bool = False) -> Expression:
+    """Return a value without parameters as a plain number where it is not one already.
+
+    ``sin(0.5)`` is a symbol to the exact arithmetic; written into a table it is 0.479425538604203.
+    """
+    if value.symbols or value.rational is not None or value.half_turns is not None:
+        return value.with_digits(SETTLED_DIGITS)
+    number = exact(float(value))
+    return exact_angle(number) if angle else number

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.display import repr_line
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form import classify

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import limit_parameters
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols

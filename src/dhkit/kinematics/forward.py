@@ -6,8 +6,7 @@ from functools import lru_cache
 
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 

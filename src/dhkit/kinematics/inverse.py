@@ -9,9 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.description.frames import configuration
-from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify

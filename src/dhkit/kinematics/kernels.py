@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.kernels import Kernel
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.inverse import solver_of

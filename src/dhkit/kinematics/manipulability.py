@@ -9,8 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import listed, repr_line
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian

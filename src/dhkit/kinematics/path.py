@@ -8,8 +8,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description, joint_vector
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows

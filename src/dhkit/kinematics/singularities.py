@@ -20,8 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array, world_to_tool
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot, world_to_tool
 from dhkit.display import html_table, repr_line
 from dhkit.errors import ModelError
 from dhkit.kinematics.closed_form import classify

@@ -9,8 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array, Convention, Description, world_to_tool
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Convention, Description, takes_robot, world_to_tool
 from dhkit.display import counted, html_block, html_lines, html_table, listed, repr_line
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability

@@ -10,7 +10,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array, Convention, Description, to_toml
-from dhkit.description.table import quantity
+from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError
 from dhkit.kinematics import classify
 from dhkit.lab.desk import Desk

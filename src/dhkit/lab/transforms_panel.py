@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.description.table import quantity
+from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError, ModelError
 from dhkit.grading.reports.mathml import mathml
 from dhkit.lab.desk import Desk

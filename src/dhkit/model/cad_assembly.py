@@ -22,7 +22,9 @@ from dhkit.description import (
     Joint,
     JointType,
     Mesh,
+    Robot,
     Shape,
+    description_of,
     joint_vector,
     read_robot,
     world_to_frames,
@@ -30,7 +32,6 @@ from dhkit.description import (
     write_robot,
 )
 from dhkit.description.assets import inside
-from dhkit.description.robot import Robot, description_of
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.urdf import urdf_text
 

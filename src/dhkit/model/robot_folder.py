@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from dhkit.description import Description, Mesh, Shape, to_toml, write_atomically
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, Mesh, Shape, takes_robot, to_toml, write_atomically
 from dhkit.errors import DescriptionError, ModelError
 
 MESHES = "meshes"

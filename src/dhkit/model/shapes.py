@@ -15,12 +15,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from dhkit.description import Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere
+from dhkit.description import Array, Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere, takes_robot
 from dhkit.description.assets import inside
 from dhkit.description.mesh_files import is_mesh_file
-from dhkit.description.numbers import Array, matrix
+from dhkit.description.numbers import matrix
 from dhkit.description.parameters import resolved
-from dhkit.description.robot import takes_robot
 from dhkit.display import repr_line
 from dhkit.expressions import Expression, exact, substitute
 
@@ -91,7 +90,7 @@ def link_parts(description: Description) -> tuple[Part, ...]:
 
     Examples
     --------
-    >>> from dhkit.description.table import from_dh
+    >>> from dhkit.description.table_rows import from_dh
     >>> parts = link_parts(from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)]))
     >>> sorted({part.link for part in parts})
     [0, 1, 2]

@@ -29,9 +29,9 @@ from dhkit.description import (
     Mesh,
     Sphere,
     pose_parts,
+    takes_robot,
     write_atomically,
 )
-from dhkit.description.robot import takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.shapes import Part, link_parts
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dhkit.description import Array, Description, Payload
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.planning.clear import NOTHING, Surroundings
 from dhkit.planning.constraints import Constraint

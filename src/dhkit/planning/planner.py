@@ -11,9 +11,8 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Payload
+from dhkit.description import Array, Payload, Robot, description_of
 from dhkit.description.frames import world_to_tool
-from dhkit.description.robot import Robot, description_of
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.symbolic import equations
 from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact.exact_arm import ExactArm

@@ -16,8 +16,7 @@ from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.display import repr_line
 from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, exact_arm, point_inertia

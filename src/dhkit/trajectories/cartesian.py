@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.trajectories.following import joint_path
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.paths import quintic_law

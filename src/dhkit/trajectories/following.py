@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, takes_robot
 from dhkit.description.joint_words import degrees_hint, joint_words
-from dhkit.description.robot import takes_robot
 from dhkit.errors import PlanningError
 from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
 from dhkit.kinematics.newton import Newton

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.trajectories.interpolation import cubic_hermite, quintic_hermite
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.trajectories.interpolation import check_times
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques

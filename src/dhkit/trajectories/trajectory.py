@@ -316,7 +316,7 @@ class Trajectory:
         return save_trajectory(self, path, rate)
 
     @classmethod
-    def load(cls, path: str | Path, robot: Robot = None) -> Trajectory:
+    def load(cls, path: str | Path, robot: Robot | None = None) -> Trajectory:
         """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm."""
         from dhkit.trajectories.files import load_trajectory
 

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit import dynamics, kinematics
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.errors import DescriptionError
 from dhkit.model import pinocchio_model
 from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error

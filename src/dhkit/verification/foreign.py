@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dhkit import dynamics, kinematics
-from dhkit.description import Array, Description, pose_parts
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, pose_parts, takes_robot
 from dhkit.errors import ModelError
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, read_chain
 from dhkit.verification.comparison import Comparison, largest, worst

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 

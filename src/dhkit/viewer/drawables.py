@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from dhkit.description import Box, Capsule, Cylinder, Mesh, Sphere
-from dhkit.description.numbers import Array
+from dhkit.description import Array, Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.errors import ModelError
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.stl import binary_stl

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Convention, Description
+from dhkit.description import Array, Convention, Description, takes_robot
 from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
-from dhkit.description.numbers import Array
-from dhkit.description.robot import takes_robot
 from dhkit.viewer.motion import check_motion
 from dhkit.viewer.notebook_figure import new_figure
 from dhkit.viewer.scene import first_configuration, frame_labels, scene_size

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.control import SimulationResult
-from dhkit.description import Description
+from dhkit.description import Array, Description
 from dhkit.description.frames import joint_array
-from dhkit.description.numbers import Array
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
 

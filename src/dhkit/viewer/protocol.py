@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description.numbers import Array
+from dhkit.description import Array
 
 if TYPE_CHECKING:
     from dhkit.viewer.drawables import Lowered

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Description
+from dhkit.description import Array, Description
 from dhkit.description.frames import world_to_frames
-from dhkit.description.numbers import Array
 from dhkit.errors import ModelError
 from dhkit.viewer.drawables import Lowered, grid_object, part_object, part_transform, triad_object
 

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Description
+from dhkit.description import Description, Robot, description_of
 from dhkit.description.files import write_atomically
 from dhkit.description.frames import joint_array
-from dhkit.description.robot import Robot, description_of
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array, world_to_frames, world_to_tool
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot, world_to_frames, world_to_tool
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from dhkit.description import Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, takes_robot
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret

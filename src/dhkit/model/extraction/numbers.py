@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from dhkit.description import INERTIA_PLACES, Array, Body, Inertia, Placement, pose_parts
-from dhkit.description.values import Vector
+from dhkit.description.bodies import Vector
 from dhkit.expressions import PI, Expression, exact, exact_angle
 
 ROUNDINGS = (9, 10, 11, 12, 13, None)

@@ -6,8 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dhkit.description import Description, Payload
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, Payload, takes_robot
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_kept, require_path
 from dhkit.planning.along.search import MOST, solved

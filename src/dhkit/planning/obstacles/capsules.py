@@ -55,7 +55,7 @@ def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
 
     Examples
     --------
-    >>> from dhkit.description.table import from_dh
+    >>> from dhkit.description.table_rows import from_dh
     >>> [capsule.link for capsule in link_capsules(from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)]))]
     [0, 1, 1, 2, 2]
     """

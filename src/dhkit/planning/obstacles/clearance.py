@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description, joint_array
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import checked_pairs

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from dhkit.description import Description
-from dhkit.description.robot import Robot, description_of
+from dhkit.description import Description, Robot, description_of
 from dhkit.display import repr_line
 from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description
+from dhkit.description import Array, Convention, Description, Robot, description_of, takes_robot
 from dhkit.description.frames import carrying
-from dhkit.description.robot import Robot, description_of, takes_robot
 from dhkit.display import counted, repr_line
 
 if TYPE_CHECKING:

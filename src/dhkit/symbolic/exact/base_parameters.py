@@ -16,8 +16,7 @@ from itertools import chain
 
 import numpy as np
 
-from dhkit.description import Description, Named
-from dhkit.description.robot import takes_robot
+from dhkit.description import Description, Named, takes_robot
 from dhkit.display import MOST_ROWS, counted, html_table, repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic.exact import composite

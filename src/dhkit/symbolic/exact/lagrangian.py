@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description
-from dhkit.description.robot import takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.display import repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic import equations

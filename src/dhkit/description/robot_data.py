@@ -1,0 +1,61 @@
+"""A robot's fields as its file holds them, not checked: what the checks, the float view and the printers read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from dhkit.description.bodies import Vector
+from dhkit.description.named import Named
+from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units
+from dhkit.expressions import Expression
+
+
+@dataclass(frozen=True)
+class RobotData:
+    """The fields of a :class:`dhkit.description.Description`, which is the one class that derives from this."""
+
+    name: str
+    convention: Convention
+    joints: tuple[Joint, ...]
+    parameters: Named[Expression] = field(default_factory=Named)
+    gravity: Vector = STANDARD_GRAVITY
+    """Free-fall acceleration in the world frame, m/s^2."""
+    base: Base = field(default=Base())
+    tool: Tool = field(default=Tool())
+    configurations: Named[tuple[Expression, ...]] = field(default_factory=Named)
+    """Joint vectors by name, rad and m."""
+    source: str = ""
+    notes: str = ""
+    drawn: bool = True
+    """Whether links and tools without shapes are drawn from the table, where other links have shapes."""
+    units: Units = field(default=Units(), compare=False)
+    """What :func:`dhkit.description.to_toml` writes numbers in."""
+    mesh_folder: Path | None = field(default=None, compare=False)
+    """The folder that mesh paths are relative to."""
+    warnings: tuple[str, ...] = field(default=(), init=False, compare=False)
+    """What is odd about the values, but carried on with."""
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.joints)
+
+    @property
+    def kinds(self) -> str:
+        """One letter a joint, R or P."""
+        return "".join("R" if joint.is_revolute else "P" for joint in self.joints)
+
+
+def data_of(robot: object) -> RobotData:
+    """Return the description of an arm, or itself.
+
+    Raises
+    ------
+    TypeError
+        Neither.
+    """
+    found = getattr(robot, "description", robot)
+    if not isinstance(found, RobotData):
+        raise TypeError(f"found {type(robot).__name__}; expected an arm or its description")
+    return found
