@@ -32,9 +32,9 @@ KINDS: dict[str, tuple[str, dict[str, set[str]]]] = {
         "an `Arm` or its `Description`",
         {
             "description": {"Description", "Robot"},
-            "robot": {"Robot"},
+            "robot": {"Robot", "Robot | None"},
             "arm": {"Robot"},
-            "plant": {"Robot", "Robot | Sequence[Robot]"},
+            "plant": {"Robot", "Robot | None", "Robot | Sequence[Robot] | None"},
             "arms": {"Sequence[Robot]"},
         },
     ),

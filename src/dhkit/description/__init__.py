@@ -19,7 +19,8 @@ from dhkit.description.named import Named
 from dhkit.description.numbers import Numbers
 from dhkit.description.payload import Payload
 from dhkit.description.poses import check_pose, pose, pose_parts, pose_quaternion
-from dhkit.description.robot import Description, Robot, description_of, require_bodies, takes_robot
+from dhkit.description.robot import Description, description_of, require_bodies, takes_robot
+from dhkit.description.robot_data import Robot
 from dhkit.description.robot_file import from_toml, read_robot, to_toml, write_robot
 from dhkit.description.table import DHTable
 from dhkit.description.table_rows import from_dh

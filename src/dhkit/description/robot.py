@@ -6,12 +6,12 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, wraps
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeAlias, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from dhkit.description.bodies import Body
 from dhkit.description.numbers import Numbers
 from dhkit.description.parameters import resolved
-from dhkit.description.robot_data import RobotData, data_of
+from dhkit.description.robot_data import Robot, RobotData, data_of
 from dhkit.description.table import DHTable
 from dhkit.description.toml_writer import toml_text
 from dhkit.description.validation import check
@@ -101,18 +101,6 @@ class Description(RobotData):
         if masses:
             found.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
         return found
-
-
-class HasDescription(Protocol):
-    """An arm, or another object that carries a description."""
-
-    @property
-    def description(self) -> Description:
-        """The robot as data."""
-
-
-Robot: TypeAlias = Description | HasDescription
-"""An arm, or its description."""
 
 
 def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
 from dhkit.description.bodies import Vector
 from dhkit.description.named import Named
@@ -47,7 +48,19 @@ class RobotData:
         return "".join("R" if joint.is_revolute else "P" for joint in self.joints)
 
 
-def data_of(robot: object) -> RobotData:
+class HasDescription(Protocol):
+    """An arm, or another object that carries a description."""
+
+    @property
+    def description(self) -> RobotData:
+        """The robot as data."""
+
+
+Robot: TypeAlias = RobotData | HasDescription
+"""An arm, or its description."""
+
+
+def data_of(robot: Robot) -> RobotData:
     """Return the description of an arm, or itself.
 
     Raises

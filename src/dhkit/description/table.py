@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from dhkit.description.robot_data import data_of
+from dhkit.description.robot_data import Robot, data_of
 from dhkit.description.values import Convention, Joint, Units
 from dhkit.display import counted, html_table, repr_line
 from dhkit.expressions import Expression
@@ -54,9 +54,9 @@ class DHTable:
     latex_rows: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def of(cls, robot: object) -> DHTable:
+    def of(cls, description: Robot) -> DHTable:
         """Read a robot's table, in the units of its file."""
-        description = data_of(robot)
+        description = data_of(description)
         # An expression is in metres, and then so is the whole table.
         symbolic = any(joint.a.symbols or joint.d.symbols for joint in description.joints)
         units = Units() if symbolic else description.units
