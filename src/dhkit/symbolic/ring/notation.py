@@ -1,0 +1,130 @@
+"""What the generators of a ring are called, so that no two are called alike."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from dhkit.symbolic.ring import Element, Generator, Ring, angle_name
+
+
+@dataclass(frozen=True)
+class Notation:
+    """Names of constants: their own, but for those that mean something else in our equations.
+
+    Attributes
+    ----------
+    names
+        Of each constant's symbol what it is written as.
+    """
+
+    names: dict[str, str]
+
+    def __call__(self, name: str) -> str:
+        """Return what a constant is written as."""
+        return self.names.get(name, name)
+
+    def printed(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return constants' values by what the constants are written as."""
+        return {self(name): value for name, value in values.items()}
+
+
+@dataclass(frozen=True)
+class Angle:
+    """A sine or cosine that occurs: of the sum of these joints' values."""
+
+    name: str
+    function: str
+    joints: tuple[int, ...]
+
+    @property
+    def text(self) -> str:
+        """The angle: q2 + q3."""
+        return " + ".join(f"q{joint + 1}" for joint in self.joints)
+
+
+@lru_cache(maxsize=64)
+def notation(ring: Ring) -> Notation:
+    """Return the names of a ring's constants; one that already means something else gets an underscore."""
+    return Notation(
+        distinct(sorted(symbols_of(constants_of(ring.generators))), {*variables(ring), *entry_names(ring.n)})
+    )
+
+
+def variables(ring: Ring) -> set[str]:
+    """Return what joints' variables, rates and accelerations and the sines and cosines of their sums are called."""
+    runs = [range(a, b) for a in range(ring.n) for b in range(a + 1, ring.n + 1)]
+    names = {f"{function}{angle_name(run)}" for function in "sc" for run in runs}
+    names |= {g.text for g in ring.generators if g.kind != "constant"}
+    return names | {f"{kind}{i + 1}" for i in range(ring.n) for kind in ("q", "qd", "qdd")}
+
+
+def entry_names(n: int) -> set[str]:
+    """Return what the entries of all quantities of n joints are called: M12, g1, K."""
+    vectors = {entry_name(name, (i,)) for name in ("h", "g", "tau") for i in range(n)}
+    square = {entry_name(name, (i, j)) for name in "MC" for i in range(n) for j in range(n)}
+    kinematic = {entry_name("T", (i, j)) for i in range(4) for j in range(4)}
+    kinematic |= {entry_name("J", (i, j)) for i in range(6) for j in range(n)} | {f"A{i + 1}" for i in range(n)}
+    return vectors | square | kinematic | {"K", "V"}
+
+
+def entry_name(quantity: str, place: tuple[int, ...]) -> str:
+    """Return an entry's name, counted from 1: M12, or M1_12 where an index has two digits."""
+    return quantity + (angle_name(place) if place else "")
+
+
+def renamings(elements: Iterable[Element]) -> list[str]:
+    """Return which constants of elements are written otherwise than in the file, in words."""
+    notes: dict[str, None] = {}
+    for element in elements:
+        used = symbols_of(constants_of(generators_of([element])))
+        notes |= dict.fromkeys(
+            f"{name} is written {written}: {name} means something else in the equations"
+            for name, written in notation(element.ring).names.items()
+            if name != written and name in used
+        )
+    return list(notes)
+
+
+def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
+    """Return for each name itself, with underscores behind it until it is neither taken nor another's."""
+    names = list(names)
+    used = {*taken, *names}
+    written = {}
+    for name in names:
+        changed = name
+        while changed in taken or (changed != name and changed in used):
+            changed += "_"
+        used.add(changed)
+        written[name] = changed
+    return written
+
+
+def symbols_of(generators: Iterable[Generator]) -> set[str]:
+    """Return the names that constants are written in."""
+    found: set[str] = set()
+    for g in generators:
+        found |= {g.text} if g.meaning is None else g.meaning.symbols
+    return found
+
+
+def generators_of(elements: Iterable[Element]) -> list[Generator]:
+    """Return the generators that occur in elements, which may be of several rings of one arm."""
+    found: dict[Generator, None] = {}
+    for element in elements:
+        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
+        found |= dict.fromkeys(element.ring.generators[k] for k in sorted(used))
+    return list(found)
+
+
+def constants_of(generators: Iterable[Generator]) -> list[Generator]:
+    """Return the constants among generators."""
+    return [g for g in generators if g.kind == "constant"]
+
+
+def angles_of(generators: Iterable[Generator]) -> list[Angle]:
+    """Return the sines and cosines among generators, joint by joint, cosines first."""
+    # Entries in other angles have generators of their own of the same name.
+    found = {Angle(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
+    return sorted(found, key=lambda angle: (len(angle.joints) > 1, angle.joints, angle.function))
