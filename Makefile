@@ -43,7 +43,7 @@ test-all: $(TEST_READY)  ## all tests, laws at a small sample size
 coverage: $(TEST_READY)  ## the same traced: which lines they run; 90 % at least
 	$(PYTEST) --cov=dhkit --cov-report=term:skip-covered --cov-fail-under=90
 
-check: $(CHECK_READY)  ## ruff, mypy --strict, import order
+check: $(CHECK_READY)  ## ruff, mypy --strict, import order, shape of the package
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

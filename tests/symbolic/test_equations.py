@@ -10,9 +10,9 @@ from dhkit.description import library_robot, read_robot, robots
 from dhkit.expressions import parse
 from dhkit.symbolic.equations import equations_sympy, equations_text, plain_text, quantities
 from dhkit.symbolic.equations.collected import collected
-from dhkit.symbolic.equations.notation import notation
 from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.ring import Constant, Ring, RingError
+from dhkit.symbolic.ring.notation import notation
 
 SMALL = [name for name in robots() if library_robot(name).n <= 4]
 CLASHING = """

@@ -8,10 +8,9 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-__all__ = ["INTERRUPTED", "main"]
+from dhkit.cli.exit_status import ExitStatus
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
+__all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -26,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if not _is_interruption(error):
             raise
         sys.stderr.write("dhkit: interrupted\n")
-        status = INTERRUPTED
+        status = ExitStatus.INTERRUPTED
     sys.exit(status)
 
 

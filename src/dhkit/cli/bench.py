@@ -10,7 +10,7 @@ from pathlib import Path
 from dhkit.arm import Arm
 from dhkit.bench import BenchReport, Ending
 from dhkit.bench import run as run_bench
-from dhkit.cli import INTERRUPTED
+from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
@@ -48,7 +48,7 @@ def run(
         if outcome.ending is not Ending.COMPLETE:
             sys.stderr.write(f"dhkit: {'note: ' if outcome.ok else ''}{outcome}\n")
     if report.interrupted:
-        return INTERRUPTED
+        return ExitStatus.INTERRUPTED
     return 0 if all(outcome.ok for outcome in report.outcomes) else 1
 
 

@@ -15,8 +15,8 @@ from typer.core import TyperGroup
 
 from dhkit import __version__
 from dhkit.arm import Arm
-from dhkit.cli import INTERRUPTED
 from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
+from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import ReaderGone, print_json, say
 from dhkit.cli.streams import accept_every_letter
 from dhkit.description.files import check_place
@@ -111,7 +111,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         raise KeyboardInterrupt from None
     finally:
         DEGREES.reset(degrees)
-    if status == INTERRUPTED:  # which some versions of typer make of Ctrl-C
+    if status == ExitStatus.INTERRUPTED:  # which some versions of typer make of Ctrl-C
         raise KeyboardInterrupt
     return status if isinstance(status, int) else 0
 

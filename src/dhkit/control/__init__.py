@@ -16,6 +16,7 @@ from dhkit.control.result import EnergyAudit, ErrorNorms, SimulationResult
 from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
 from dhkit.control.tool_poses import ToolPoses
+from dhkit.formats import register_formats
 
 __all__ = [
     "CONTROLLERS",
@@ -49,3 +50,5 @@ __all__ = [
     "simulate",
     "simulate_batch",
 ]
+
+register_formats("dhkit.control.result_files", "save_result", "load_result")

@@ -12,6 +12,7 @@ import numpy as np
 from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.joint_words import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
+from dhkit.formats import format_function
 from dhkit.kinematics import forward_kinematics
 
 
@@ -164,16 +165,16 @@ class SimulationResult:
 
     def save(self, path: str | Path) -> Path:
         """Write a file by its suffix and return its path; see :func:`dhkit.control.result_files.save_result`."""
-        from dhkit.control.result_files import save_result
-
-        return save_result(self, path)
+        saved: Path = format_function("save_result")(self, path)
+        return saved
 
     @classmethod
     def load(cls, path: str | Path, robot: Robot | None = None) -> SimulationResult:
         """Read a file of :meth:`save`; see :func:`dhkit.control.result_files.load_result`. A robot may be an arm."""
-        from dhkit.control.result_files import load_result
-
-        return load_result(path, None if robot is None else description_of(robot))
+        result: SimulationResult = format_function("load_result")(
+            path, None if robot is None else description_of(robot)
+        )
+        return result
 
     def __repr__(self) -> str:
         unit = joint_unit(self.description.numbers.prismatic)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dhkit.formats import register_formats
 from dhkit.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from dhkit.symbolic.differentiable.bodies import Moments
     from dhkit.symbolic.differentiable.casadi_functions import CasadiFunctions
     from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
     from dhkit.symbolic.differentiable.energies import (
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     )
     from dhkit.symbolic.differentiable.friction import Friction, friction_torque, smooth_direction
     from dhkit.symbolic.differentiable.inertial_table import InertialTable, inertial_pattern
+    from dhkit.symbolic.differentiable.moments import Moments
     from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
     from dhkit.symbolic.differentiable.velocity_regressor import velocity_regressor
     from dhkit.symbolic.exact.base_parameters import BaseParameters, base_parameters
@@ -111,7 +112,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "dhkit.symbolic.differentiable.bodies": ("Moments",),
+        "dhkit.symbolic.differentiable.moments": ("Moments",),
         "dhkit.symbolic.differentiable.casadi_functions": ("CasadiFunctions",),
         "dhkit.symbolic.differentiable.composite_bodies": ("composite_coriolis_matrix", "composite_mass_matrix"),
         "dhkit.symbolic.differentiable.energies": (
@@ -158,3 +159,11 @@ __getattr__, __dir__ = lazy_names(
         "dhkit.symbolic.textbook": ("TextbookDerivation", "derive"),
     },
 )
+
+register_formats("dhkit.symbolic.equations.text", "plain_text", "equations_text")
+register_formats("dhkit.symbolic.equations.latex", "latex_text", "equations_latex")
+register_formats("dhkit.symbolic.equations.sympy_objects", "equations_sympy")
+register_formats("dhkit.symbolic.equations.python_code", "equations_python")
+register_formats("dhkit.symbolic.equations.c_code", "equations_c")
+register_formats("dhkit.symbolic.equations.matlab_code", "equations_matlab")
+register_formats("dhkit.symbolic.equations.quantities", "readable", "quantities", "kinematic_quantities")

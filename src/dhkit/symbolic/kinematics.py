@@ -11,19 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, takes_robot
-from dhkit.symbolic import equations
-from dhkit.symbolic.equations.notation import notation
+from dhkit.formats import format_function
 from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import READABLE
+from dhkit.symbolic.ring.notation import notation
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
 
-CODE = {
-    "python": equations.equations_python,
-    "c": equations.equations_c,
-    "matlab": equations.equations_matlab,
-}
+LANGUAGES = ("python", "c", "matlab")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,22 +144,24 @@ class SymbolicKinematics:
 
     def matrix(self, name: str) -> SymbolicMatrix:
         """Return one of A1 ... An, T and J by its name."""
-        (quantity,) = equations.kinematic_quantities(self, [name], shorten=False)
-        return SymbolicMatrix(quantity.name, quantity.elements, self)
+        return SymbolicMatrix(name, self.elements(name), self)
 
     # Reading
 
     def text(self, what: str | Sequence[str] = ("A", "T")) -> str:
         """Return some of A (all links), A1 ... An, T and J as text."""
-        return equations.equations_text(equations.kinematic_quantities(self, what))
+        return str(format_function("equations_text")(format_function("kinematic_quantities")(self, what)))
 
     def latex(self, what: str | Sequence[str] = ("A", "T")) -> str:
         """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath."""
-        return equations.equations_latex(equations.kinematic_quantities(self, what))
+        return str(format_function("equations_latex")(format_function("kinematic_quantities")(self, what)))
 
     def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, Any]:
         """Return sympy matrices by name, not simplified."""
-        return equations.equations_sympy(equations.kinematic_quantities(self, what))
+        matrices: dict[str, Any] = format_function("equations_sympy")(
+            format_function("kinematic_quantities")(self, what)
+        )
+        return matrices
 
     def code(self, what: str | Sequence[str] = ("T", "J"), language: str = "python") -> str:
         """Return functions that compute some of A, A1 ... An, T and J, in ``"python"``, ``"c"`` or ``"matlab"``.
@@ -173,9 +171,9 @@ class SymbolicKinematics:
         ValueError
             Another language, or no such quantity.
         """
-        if language not in CODE:
-            raise ValueError(f"language is {language!r}; expected one of {', '.join(CODE)}")
-        return CODE[language](self, equations.kinematic_quantities(self, what))
+        if language not in LANGUAGES:
+            raise ValueError(f"language is {language!r}; expected one of {', '.join(LANGUAGES)}")
+        return str(format_function(f"equations_{language}")(self, format_function("kinematic_quantities")(self, what)))
 
     def __str__(self) -> str:
         return self.text("A")
@@ -184,7 +182,16 @@ class SymbolicKinematics:
         return f"<SymbolicKinematics of {self.description.name}: A(1) ... A({self.n}), T, J>"
 
     def elements(self, name: str) -> Elements:
-        """Return a quantity's entries by its name, as an array of elements."""
+        """Return a quantity's entries by its name, as an array of elements.
+
+        Raises
+        ------
+        ValueError
+            The name is none of A1 ... An, T and J.
+        """
+        names = [*(f"A{i}" for i in range(1, self.n + 1)), "T", "J"]
+        if name not in names:
+            raise ValueError(f"no quantity {name!r}; expected one of {', '.join(names)}")
         found = self.derivation.A[int(name[1:]) - 1] if name.startswith("A") else getattr(self.derivation, name)
         entries = np.empty(found.shape, dtype=object)
         zero = self.arm.ring.zero

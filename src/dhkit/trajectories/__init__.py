@@ -1,5 +1,6 @@
 """Motions over time: exact piecewise polynomials, their limits, files, and the classical ones of textbooks."""
 
+from dhkit.formats import register_formats
 from dhkit.trajectories.cartesian import circle, straight_line
 from dhkit.trajectories.files import read_motion, written_by_dhkit
 from dhkit.trajectories.following import joint_path
@@ -35,3 +36,5 @@ __all__ = [
     "trapezoidal",
     "written_by_dhkit",
 ]
+
+register_formats("dhkit.trajectories.files", "save_trajectory", "load_trajectory", "read_samples")

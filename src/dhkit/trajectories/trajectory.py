@@ -16,6 +16,7 @@ from dhkit.description import Array, Description, Payload, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.description.joint_words import joint_words
 from dhkit.errors import DescriptionError
+from dhkit.formats import format_function
 from dhkit.kernels import check_whole
 from dhkit.symbolic import Friction
 from dhkit.trajectories.interpolation import interpolated
@@ -311,16 +312,14 @@ class Trajectory:
 
     def save(self, path: str | Path, rate: float | None = None) -> Path:
         """Write a file by its suffix and return its path; see :func:`dhkit.trajectories.files.save_trajectory`."""
-        from dhkit.trajectories.files import save_trajectory
-
-        return save_trajectory(self, path, rate)
+        saved: Path = format_function("save_trajectory")(self, path, rate)
+        return saved
 
     @classmethod
     def load(cls, path: str | Path, robot: Robot | None = None) -> Trajectory:
         """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm."""
-        from dhkit.trajectories.files import load_trajectory
-
-        return load_trajectory(path, None if robot is None else description_of(robot))
+        motion: Trajectory = format_function("load_trajectory")(path, None if robot is None else description_of(robot))
+        return motion
 
     @classmethod
     def read(
@@ -331,9 +330,9 @@ class Trajectory:
         columns: Mapping[str, str] | None = None,
     ) -> Trajectory:
         """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`. A robot may be an arm."""
-        from dhkit.trajectories.files import read_samples
-
-        return read_samples(path, description_of(robot), degrees=degrees, columns=columns)
+        read_samples = format_function("read_samples")
+        motion: Trajectory = read_samples(path, description_of(robot), degrees=degrees, columns=columns)
+        return motion
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Trajectory):

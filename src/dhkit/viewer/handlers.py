@@ -9,19 +9,17 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
+from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from dhkit.viewer.page import SECURITY_POLICY
 from dhkit.viewer.protocol import ProtocolError
-from dhkit.viewer.requests import Shown, decode_message
-
-if TYPE_CHECKING:
-    from dhkit.viewer.server import ViewerServer
-    from dhkit.viewer.session import Session
+from dhkit.viewer.requests import Request, Shown, decode_message
+from dhkit.viewer.session import Session
 
 MOST_REQUESTS = 64
 """Of one page that wait for an answer, or whose answer the page has not taken yet."""
@@ -29,10 +27,34 @@ MOST_PAGES = 100
 """Pages at a time: each may keep the samples of some minutes waiting."""
 
 
+class PageServer(Protocol):
+    """What the handlers ask of the server whose requests they answer."""
+
+    token: str
+    """Random part of every address."""
+    files: Mapping[str, tuple[str, bytes]]
+    """Content type and content of the page's files, by name."""
+    pages: set[Page]
+    """Open pages."""
+
+    @property
+    def hosts(self) -> Collection[str]:
+        """Values of the Host header that are the server's own: address and port."""
+
+    def replay(self) -> Session:
+        """Return a session that has everything shown so far to send."""
+
+    def ask(self, page: Page, request: Request) -> None:
+        """Have a page's request answered."""
+
+    def forget(self, page: Page) -> None:
+        """Drop a page that is closed, and what waits for it."""
+
+
 class Guarded(RequestHandler):
     """A request that is refused unless it comes from our own page and knows the token."""
 
-    def initialize(self, server: ViewerServer) -> None:
+    def initialize(self, server: PageServer) -> None:
         """Know the server."""
         self.server = server
 

@@ -1,4 +1,4 @@
-"""An arm's mechanics as CasADi functions, for optimizers: made when first asked for."""
+"""An arm's mechanics as CasADi functions for optimizers, each derived when it is first used."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from dhkit.description import Description, Robot, description_of
+from dhkit.description import Convention, Description, Robot, description_of
 from dhkit.display import repr_line
 from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
@@ -14,14 +14,15 @@ from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleratio
 from dhkit.symbolic.differentiable.frames import SymbolicTable, jacobian, joint_symbols
 from dhkit.symbolic.differentiable.friction import Friction, friction_torque
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
-from dhkit.symbolic.differentiable.payload import payload_moments
+from dhkit.symbolic.differentiable.moments import Moments
 from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+from dhkit.symbolic.differentiable.vectors import Vector3, dot, plus
 
 if TYPE_CHECKING:
     import casadi
 
 PAYLOAD = {"payload_mass": 1, "payload_com": 3, "payload_inertia": 6}
-"""Inputs of the payload layer, and how many numbers each is."""
+"""Inputs of the payload layer, with their lengths."""
 
 
 class CasadiFunctions:
@@ -48,7 +49,7 @@ class CasadiFunctions:
     DescriptionError
         By the functions of dynamics: a link without a body.
     TypeError
-        A layer that is none.
+        ``friction`` is neither a bool nor a :class:`Friction`, or another layer is no bool.
 
     Examples
     --------
@@ -109,12 +110,12 @@ class CasadiFunctions:
 
     @cached_property
     def gravity_torque(self) -> casadi.Function:
-        """What holds the arm at rest, q -> g, n x 1."""
+        """The torques that hold the arm at rest, q -> g, n x 1, N m and N."""
         return self._dynamics("gravity_torque", {"q": self._q}, {"g": recursive_gravity(self._table, self._q)})
 
     @cached_property
     def bias(self) -> casadi.Function:
-        """What a motion without acceleration takes, q, qd -> h = C qd + g, n x 1."""
+        """The torques of a motion without acceleration, q, qd -> h = C qd + g, n x 1, N m and N."""
         h = recursive_bias(self._table, self._q, self._qd)
         return self._dynamics("bias", {"q": self._q, "qd": self._qd}, {"h": h})
 
@@ -151,7 +152,7 @@ class CasadiFunctions:
         tau = lagrange_torque(self._table, self._q, self._qd, self._qdd)
         return self._dynamics("lagrange", {"q": self._q, "qd": self._qd, "qdd": self._qdd}, {"tau": tau})
 
-    # What they are made of
+    # Symbols and tables
 
     @cached_property
     def _q(self) -> casadi.SX:
@@ -179,7 +180,7 @@ class CasadiFunctions:
         if not self._payload:
             return table
         mass, com, inertia = self._load_symbols.values()
-        load = payload_moments(self._description, mass, com, inertia)
+        load = _payload_moments(self._description, mass, com, inertia)
         return table.with_load(load, -self._lifted(mass))
 
     def _lifted(self, mass: casadi.SX) -> Any:
@@ -227,6 +228,46 @@ class CasadiFunctions:
 def _function(name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]) -> casadi.Function:
     import casadi
 
-    # Without "cse" CasADi would work out equal products twice.
+    # With "cse" CasADi computes equal products once.
     expressions = [casadi.densify(casadi.SX(x)) for x in outputs.values()]
     return casadi.Function(name, list(inputs.values()), expressions, list(inputs), list(outputs), {"cse": True})
+
+
+def _payload_moments(description: Description, mass: casadi.SX, com: casadi.SX, inertia: casadi.SX) -> Moments:
+    """Return the moments of a load in the joint frame of an arm's last link.
+
+    Parameters
+    ----------
+    description
+        The arm that carries it.
+    mass
+        kg.
+    com
+        3 x 1, centre of mass in the tool's frame, m.
+    inertia
+        6 x 1: xx, yy, zz, xy, yz, xz of the tensor about the centre of mass in the tool's axes, kg m^2.
+    """
+    R, p = _tool_in_joint_frame(description)
+    xx, yy, zz, xy, yz, xz = (inertia[i] for i in range(6))
+    tensor: list[Vector3] = [(xx, xy, xz), (xy, yy, yz), (xz, yz, zz)]
+    half = [_rotate(R, row) for row in tensor]
+    turned = [_rotate(R, (column[0], column[1], column[2])) for column in zip(*half, strict=True)]
+    return Moments.of_body(mass, plus(p, _rotate(R, (com[0], com[1], com[2]))), turned)
+
+
+def _rotate(R: list[Vector3], a: Vector3) -> Vector3:
+    return dot(R[0], a), dot(R[1], a), dot(R[2], a)
+
+
+def _tool_in_joint_frame(description: Description) -> tuple[list[Vector3], Vector3]:
+    numbers = description.numbers
+    T = numbers.T_last_tool.tolist()
+    rows: list[Vector3] = [(row[0], row[1], row[2]) for row in T[:3]]
+    x, y, z = (row[3] for row in T[:3])
+    if description.convention is Convention.MODIFIED:
+        return rows, (x, y, z)
+    # The transform from the joint frame to DH frame n is Tx(a) Rx(alpha).
+    a, c, s = (float(column[-1]) for column in (numbers.a, numbers.cos_alpha, numbers.sin_alpha))
+    behind: list[Vector3] = [(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)]
+    columns = [_rotate(behind, (column[0], column[1], column[2])) for column in zip(*rows, strict=True)]
+    return [(r[0], r[1], r[2]) for r in zip(*columns, strict=True)], plus((a, 0.0, 0.0), _rotate(behind, (x, y, z)))

@@ -1,4 +1,4 @@
-"""Mass and Coriolis matrices by composite bodies: all links behind a joint, taken as one."""
+"""Mass and Coriolis matrices by composite rigid bodies: all links that a joint carries, taken as one body."""
 
 from __future__ import annotations
 
@@ -6,28 +6,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.equation_frames import EquationFrame, equation_frames, link_velocities
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
-from dhkit.symbolic.differentiable.joint_frames import Station, stations
-from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot, plus, times
+from dhkit.symbolic.differentiable.moments import Moments
+from dhkit.symbolic.differentiable.vectors import ZERO_VECTOR, Scalar, Vector3, cross, dot, plus, times
 
 if TYPE_CHECKING:
     import casadi
 
 Wrench = tuple[Vector3, Vector3]
-"""Force, and moment about a joint's origin."""
+"""Force, N, and moment about a joint's origin, N m."""
 Matrix3 = tuple[Vector3, Vector3, Vector3]
-NOTHING: Vector3 = (0.0, 0.0, 0.0)
 
 
 def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
     """Return M, n x n, with drives, by the composite rigid body method (Walker & Orin 1982, method 3)."""
-    made = stations(table, q)
-    entries: list[list[Scalar]] = [[0.0] * table.n for _ in made]
-    for j, composite in _composites(made):
-        wrench = _driven(made[j], composite)
-        for i, (force, moment) in _carried(made, j, wrench):
-            entries[i][j] = entries[j][i] = (force if made[i].prismatic else moment)[2]
+    frames = equation_frames(table, q)
+    entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
+    for j, composite in _composites(frames):
+        wrench = _unit_acceleration_wrench(frames[j], composite)
+        for i, (force, moment) in _wrench_at_each_joint(frames, j, wrench):
+            entries[i][j] = entries[j][i] = (force if frames[i].prismatic else moment)[2]
         entries[j][j] = entries[j][j] + table.armature[j]
     return _matrix(entries)
 
@@ -35,111 +34,112 @@ def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
 def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
     """Return the Christoffel C, n x n, so that C_ij = sum over all mass of J_i . dJ_j/dt dm.
 
-    With J_j(r) the velocity that joint j alone gives to a point. What depends on the velocities of the links behind a
-    joint is summed over them: the integrals of V and of r V^T (the 12 numbers that are left of the 36 of the Coriolis
-    inertia of Echeandia & Wensing 2021, for a column's rate is the field w_j x V(r) and what the axis itself does).
+    J_j(r) is the velocity of a point at r per unit rate of joint j. The part that depends on the velocities V of the
+    links that a joint carries is summed over them as two integrals over mass, of V and of r V^T: 12 numbers, where the
+    Coriolis inertia of Echeandia & Wensing 2021 has 36.
     """
-    made = stations(table, q)
-    velocities = link_velocities(made, qd)
-    entries: list[list[Scalar]] = [[0.0] * table.n for _ in made]
-    flow = Flow.none()
-    for j, composite in _composites(made):
-        station, (w, v) = made[j], velocities[j]
-        flow = flow.joined(Flow.of_link(station.own, w, v))
-        column = _column_rate(station, composite, flow, w, v)
-        for i, (force, moment) in _carried(made, j, column):
-            entries[i][j] = (force if made[i].prismatic else moment)[2]
-        couples = dict(_turned_down(made, j, flow.couple(station.prismatic)))
-        for i, wrench in _carried(made, j, _driven(station, composite)):
+    frames = equation_frames(table, q)
+    velocities = link_velocities(frames, qd)
+    entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
+    rates = VelocityMoments.none()
+    for j, composite in _composites(frames):
+        frame, (w, v) = frames[j], velocities[j]
+        rates = rates.joined(VelocityMoments.of_link(frame.moments, w, v))
+        column = _column_rate(frame, composite, rates, w, v)
+        for i, (force, moment) in _wrench_at_each_joint(frames, j, column):
+            entries[i][j] = (force if frames[i].prismatic else moment)[2]
+        couples = dict(_couple_at_each_joint(frames, j, rates.couple(frame.prismatic)))
+        for i, wrench in _wrench_at_each_joint(frames, j, _unit_acceleration_wrench(frame, composite)):
             if i < j:
-                entries[j][i] = _row_rate(made[i], wrench, couples[i], *velocities[i])
-        flow = flow.before(station)
+                entries[j][i] = _row_rate(frames[i], wrench, couples[i], *velocities[i])
+        rates = rates.about_previous(frame)
     return _matrix(entries)
 
 
 @dataclass(frozen=True)
-class Flow:
-    """Velocities integrated over mass: of V, and of r V^T, about an origin."""
+class VelocityMoments:
+    """Integrals of V and of r V^T over the mass of some links; V is velocity, r position from a joint's origin."""
 
     momentum: Vector3
+    """kg m/s."""
     G: Matrix3
-    """Row i, column j: the integral of r_i V_j."""
+    """Row i, column j: the integral of r_i V_j, kg m^2/s."""
 
     @classmethod
-    def none(cls) -> Flow:
-        """Return that of no mass."""
-        return cls(NOTHING, (NOTHING, NOTHING, NOTHING))
+    def none(cls) -> VelocityMoments:
+        """Return the integrals over no mass."""
+        return cls(ZERO_VECTOR, (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR))
 
     @classmethod
-    def of_link(cls, link: Moments, w: Vector3, v: Vector3) -> Flow:
-        """Return those of a body whose origin moves with v: V = v + w x r."""
+    def of_link(cls, link: Moments, w: Vector3, v: Vector3) -> VelocityMoments:
+        """Return the integrals over a link that turns with w, rad/s, and whose origin moves with v, m/s."""
         rows = zip(link.first, link.tensor, strict=True)
         x, y, z = (plus(times(first, v), cross(w, row)) for first, row in rows)
         return cls(plus(times(link.mass, v), cross(w, link.first)), (x, y, z))
 
-    def joined(self, other: Flow) -> Flow:
-        """Return the sum of both, about one origin and in one frame's axes."""
+    def joined(self, other: VelocityMoments) -> VelocityMoments:
+        """Return the sum with the integrals over other links, given about the same origin and in the same axes."""
         x, y, z = (plus(a, b) for a, b in zip(self.G, other.G, strict=True))
-        return Flow(plus(self.momentum, other.momentum), (x, y, z))
+        return VelocityMoments(plus(self.momentum, other.momentum), (x, y, z))
 
     def couple(self, prismatic: bool) -> Vector3:
-        """Return the integral of V x J_j, J_j = z x r of a revolute joint and z of a prismatic one."""
+        """Return the integral of V x J_j over the mass; J_j is z x r for a revolute joint and z for a prismatic one."""
         if prismatic:
             return self.momentum[1], -self.momentum[0], 0.0
         return -self.G[0][2], -self.G[1][2], self.G[0][0] + self.G[1][1]
 
-    def before(self, station: Station) -> Flow:
-        """Return it about the joint before, in the axes of its link's equations."""
-        p = station.down(self.momentum)
-        half = [station.down(row) for row in self.G]
-        columns = [station.down((c[0], c[1], c[2])) for c in zip(*half, strict=True)]
+    def about_previous(self, frame: EquationFrame) -> VelocityMoments:
+        """Return the integrals about the previous joint's origin, in the axes of its link's equations."""
+        p = frame.to_previous(self.momentum)
+        half = [frame.to_previous(row) for row in self.G]
+        columns = [frame.to_previous((c[0], c[1], c[2])) for c in zip(*half, strict=True)]
         rows = [(r[0], r[1], r[2]) for r in zip(*columns, strict=True)]
-        x, y, z = (plus(row, times(lever, p)) for row, lever in zip(rows, station.lever, strict=True))
-        return Flow(p, (x, y, z))
+        x, y, z = (plus(row, times(lever, p)) for row, lever in zip(rows, frame.lever, strict=True))
+        return VelocityMoments(p, (x, y, z))
 
 
-def _composites(made: list[Station]) -> Iterator[tuple[int, Moments]]:
-    """Yield, from the last joint on, the moments of all that it carries, in the axes of its link's equations."""
+def _composites(frames: list[EquationFrame]) -> Iterator[tuple[int, Moments]]:
+    """Yield each joint, the last first, with the moments of all links that it carries, in its link's equation axes."""
     composite = Moments.none()
-    for j in reversed(range(len(made))):
-        station = made[j]
-        composite = composite.joined(station.own)
+    for j in reversed(range(len(frames))):
+        frame = frames[j]
+        composite = composite.joined(frame.moments)
         yield j, composite
-        composite = composite.about_z(*station.turn).about_x(station.cos_alpha, station.sin_alpha).moved(station.lever)
+        composite = composite.about_z(*frame.rotation).about_x(frame.cos_alpha, frame.sin_alpha).moved(frame.lever)
 
 
-def _driven(station: Station, body: Moments) -> Wrench:
-    """Return what a unit acceleration of a joint takes, at rest."""
+def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> Wrench:
+    """Return the wrench on a body at rest that a unit acceleration of the joint that carries it needs."""
     x, y, _ = body.first
-    if station.prismatic:
+    if frame.prismatic:
         return (0.0, 0.0, body.mass), (y, -x, 0.0)
     return (-y, x, 0.0), (-body.xz, -body.yz, body.xx + body.yy)
 
 
-def _column_rate(station: Station, body: Moments, flow: Flow, w: Vector3, v: Vector3) -> Wrench:
-    """Return the integral of the rate of a joint's column, over all that it carries."""
+def _column_rate(frame: EquationFrame, body: Moments, rates: VelocityMoments, w: Vector3, v: Vector3) -> Wrench:
+    """Return the integral, over the mass that a joint carries, of the time derivative of its Jacobian column J_j(r)."""
     axis_rate = (w[1], -w[0], 0.0)  # w x z
-    if station.prismatic:
+    if frame.prismatic:
         return times(body.mass, axis_rate), cross(body.first, axis_rate)
     # z x (V - v) + (w x z) x r
     slip = (v[1], -v[0], 0.0)
-    p, G = flow.momentum, flow.G
+    p, G = rates.momentum, rates.G
     force = plus((-p[1], p[0], 0.0), plus(times(body.mass, slip), cross(axis_rate, body.first)))
     moment = plus((-G[2][0], -G[2][1], G[0][0] + G[1][1]), cross(body.first, slip))
-    return force, plus(moment, _turning(body, axis_rate))
+    return force, plus(moment, _inertia_times(body, axis_rate))
 
 
-def _row_rate(station: Station, wrench: Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
-    """Return the power of a wrench along the rate of a joint's column."""
+def _row_rate(frame: EquationFrame, wrench: Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
+    """Return the power of a wrench along the time derivative of a joint's Jacobian column."""
     force, moment = wrench
     axis_rate = (w[1], -w[0], 0.0)
-    if station.prismatic:
+    if frame.prismatic:
         return dot(axis_rate, force)
     return dot(axis_rate, moment) + dot((v[1], -v[0], 0.0), force) + couple[2]
 
 
-def _turning(body: Moments, w: Vector3) -> Vector3:
-    """Return J w for w without z: J = tr(S) 1 - S."""
+def _inertia_times(body: Moments, w: Vector3) -> Vector3:
+    """Return J w for a w whose z component is 0; J = tr(S) 1 - S."""
     x, y, _ = w
     return (
         (body.yy + body.zz) * x - body.xy * y,
@@ -148,35 +148,19 @@ def _turning(body: Moments, w: Vector3) -> Vector3:
     )
 
 
-def _carried(made: list[Station], j: int, wrench: Wrench) -> Iterator[tuple[int, Wrench]]:
-    """Yield joint j's wrench as every joint from j to the first feels it."""
+def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: Wrench) -> Iterator[tuple[int, Wrench]]:
+    """Yield joint j's wrench about the origin and in the equation axes of every joint from j down to the first."""
     force, moment = wrench
     for i in reversed(range(j + 1)):
         yield i, (force, moment)
-        force, moment = made[i].down(force), made[i].down(moment)
-        moment = plus(moment, cross(made[i].lever, force))
+        force, moment = frames[i].to_previous(force), frames[i].to_previous(moment)
+        moment = plus(moment, cross(frames[i].lever, force))
 
 
-def _turned_down(made: list[Station], j: int, couple: Vector3) -> Iterator[tuple[int, Vector3]]:
+def _couple_at_each_joint(frames: list[EquationFrame], j: int, couple: Vector3) -> Iterator[tuple[int, Vector3]]:
     for i in reversed(range(j + 1)):
         yield i, couple
-        couple = made[i].down(couple)
-
-
-def link_velocities(made: list[Station], qd: casadi.SX) -> list[tuple[Vector3, Vector3]]:
-    """Return angular velocity and that of the joint's origin, in the axes of each link's equations."""
-    w, v = NOTHING, NOTHING
-    found = []
-    for i, station in enumerate(made):
-        v = station.to_approach(plus(v, cross(w, station.lever)))
-        w = station.to_approach(w)
-        if station.prismatic:
-            v = v[0], v[1], v[2] + qd[i]
-        else:
-            w = w[0], w[1], w[2] + qd[i]
-        w, v = station.to_link(w), station.to_link(v)
-        found.append((w, v))
-    return found
+        couple = frames[i].to_previous(couple)
 
 
 def _matrix(entries: list[list[Scalar]]) -> casadi.SX:

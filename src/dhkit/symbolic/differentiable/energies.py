@@ -1,12 +1,11 @@
-"""Kinetic and potential energy, and what follows from them alone: Lagrange's equations by differentiation."""
+"""Kinetic and potential energy, and Lagrange's equations by differentiating them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.differentiable.composite_bodies import link_velocities
+from dhkit.symbolic.differentiable.equation_frames import equation_frames, link_velocities
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
-from dhkit.symbolic.differentiable.joint_frames import stations
 from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, dot
 
 if TYPE_CHECKING:
@@ -14,17 +13,17 @@ if TYPE_CHECKING:
 
 
 def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return K, J, from the links' velocities; drives included.
+    """Return the kinetic energy, J, of links and drives.
 
-    Of each link half of m v^2 + w . (J w) + 2 v . (w x m c), v of the joint frame's origin (Siciliano et al., Robotics,
-    2009, section 7.1.1).
+    Each link adds (m v^2 + w . (J w) + 2 v . (w x m c)) / 2, with v the velocity of the joint frame's origin (Siciliano
+    et al., Robotics, 2009, section 7.1.1).
     """
     import casadi
 
-    made = stations(table, q)
+    frames = equation_frames(table, q)
     twice: Scalar = casadi.SX(0)
-    for i, (station, (w, v)) in enumerate(zip(made, link_velocities(made, qd), strict=True)):
-        own = station.own
+    for i, (frame, (w, v)) in enumerate(zip(frames, link_velocities(frames, qd), strict=True)):
+        own = frame.moments
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = own.tensor
         x, y, z = w
         spinning = (yy + zz) * (x * x) + (xx + zz) * (y * y) + (xx + yy) * (z * z)
@@ -35,16 +34,16 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
 
 
 def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return V = -sum(m g . c), J, of the moving links; 0 where the world's origin is."""
+    """Return the potential energy V = -sum(m g . c) of the moving links, J; zero at the world's origin."""
     import casadi
 
     gravity: Vector3 = table.gravity
     energy: Scalar = casadi.SX(table.potential)
-    height: Scalar = 0.0  # g . p of the joint's origin
-    for station in stations(table, q):
-        height = height + dot(gravity, station.lever)
-        gravity = station.to_link(station.to_approach(gravity))
-        energy -= station.own.mass * height + dot(gravity, station.own.first)
+    height: Scalar = 0.0  # g . p, p the joint's origin, m^2/s^2
+    for frame in equation_frames(table, q):
+        height = height + dot(gravity, frame.lever)
+        gravity = frame.from_twisted(frame.to_twisted(gravity))
+        energy -= frame.moments.mass * height + dot(gravity, frame.moments.first)
     return casadi.SX(energy)
 
 

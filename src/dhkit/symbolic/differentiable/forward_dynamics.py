@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import casadi
 
 SINGULAR = 1e-14
-"""Of the largest diagonal entry of M: a pivot below that is what rounding leaves of 0."""
+"""M counts as singular when a pivot is below this share of its largest diagonal entry: rounding leaves as much."""
 
 
 def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:

@@ -1,4 +1,4 @@
-"""Frames, tool and Jacobian of an arm as CasADi SX expressions of its joint values."""
+"""Frames, tool pose and Jacobian of an arm as CasADi SX expressions of its joint positions."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from dhkit.description import Array, Convention, Description, Robot, description_of, takes_robot
 from dhkit.description.frames import carrying
 from dhkit.display import counted, repr_line
+from dhkit.symbolic.differentiable.number_patterns import NumberPattern
 
 if TYPE_CHECKING:
     import casadi
@@ -18,45 +19,38 @@ if TYPE_CHECKING:
 Entry: TypeAlias = "float | casadi.SX"
 """A number, or an expression that stands for one."""
 ReferenceAxes: TypeAlias = Literal["world", "tool"]
-"""Whose axes the tool's velocity is resolved in."""
-
-FOLDED = (0.0, 1.0, -1.0)
-"""Numbers that shorten an expression: cosines of right angles, lengths that are not there."""
+"""The axes in which the tool's velocity is given."""
 
 
 @dataclass(frozen=True)
 class SymbolicTable:
     """The numbers that an arm's frames depend on, each a float or a symbol.
 
-    ``SymbolicTable.of`` takes the arm's own numbers. ``SymbolicTable.parametric`` keeps those that are 0, 1 or -1 and
-    puts symbols for the rest, so that one derivation, and one compiled kernel, serve every arm of the same pattern.
+    ``SymbolicTable.of`` holds the arm's own numbers. ``SymbolicTable.parametric`` keeps numbers that are 0, 1 or -1 and
+    has symbols for the others, so that one derivation and one compiled kernel serve every arm of the same pattern.
     """
 
     convention: Convention
     prismatic: tuple[bool, ...]
     rows: tuple[tuple[Entry, ...], ...]
-    """a, d, cos alpha, sin alpha, cos theta, sin theta of each row."""
+    """a, d, cos alpha, sin alpha, cos theta, sin theta of each row, m and without unit."""
     base: tuple[Entry, ...]
-    """Frame 0 in the world: three rows of the 4x4 matrix, 12 entries."""
+    """T_world_base without its last row: 12 entries, row by row."""
     tool: tuple[Entry, ...]
-    """The tool in frame n, likewise."""
+    """T_last_tool, the tool in frame n, likewise."""
 
     @classmethod
     def of(cls, description: Robot) -> SymbolicTable:
         """Return the table of an arm, rounded once from its exact numbers."""
         description = description_of(description)
-        return cls._filled(description, table_numbers(description).tolist())
+        return cls._filled(description, (table_numbers(description) + 0.0).tolist())
 
     @classmethod
     def parametric(cls, description: Robot) -> tuple[SymbolicTable, casadi.SX]:
         """Return a table of symbols, and the symbols; their values are ``table_pattern(description)[1]``."""
-        import casadi
-
         description = description_of(description)
-        numbers = table_numbers(description)
-        symbols = casadi.SX.sym("parameter", int(np.sum(~np.isin(numbers, FOLDED))))
-        waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
-        return cls._filled(description, [x if x in FOLDED else next(waiting) for x in numbers.tolist()]), symbols
+        entries, symbols = _pattern(description).entries()
+        return cls._filled(description, entries), symbols
 
     def __repr__(self) -> str:
         return repr_line("SymbolicTable", counted(self.n, "joint"), f"{self.convention.value} DH")
@@ -78,12 +72,12 @@ class SymbolicTable:
         return len(self.rows)
 
     def link_transform(self, i: int, q: casadi.SX) -> casadi.SX:
-        """Return A_(i+1), 4x4, of row i (from 0) at the joint's value q."""
+        """Return A_(i+1), 4 x 4: frame i+1 in frame i, for row i, counted from 0, at joint position q, rad or m."""
         import casadi
 
         a, d, cos_alpha, sin_alpha, cos_theta, sin_theta = self.rows[i]
         cos_q, sin_q = (1.0, 0.0) if self.prismatic[i] else (casadi.cos(q), casadi.sin(q))
-        # The table's own angle enters by the sum's formula: an offset of 90 degrees is exact and costs nothing.
+        # The table's own angle enters by the addition theorem: an offset of 90 degrees is exact and costs nothing.
         c = cos_q * cos_theta - sin_q * sin_theta
         s = sin_q * cos_theta + cos_q * sin_theta
         if self.prismatic[i]:
@@ -101,19 +95,19 @@ class SymbolicTable:
         )
 
     def world_to_frames(self, q: casadi.SX) -> list[casadi.SX]:
-        """Return DH frames 0 ... n in the world, each 4x4, for q (n x 1), rad and m."""
+        """Return DH frames 0 ... n in the world, each 4 x 4, for q (n x 1), rad and m."""
         frames = [_matrix(self.base[0:4], self.base[4:8], self.base[8:12])]
         for i in range(self.n):
             frames.append(frames[-1] @ self.link_transform(i, q[i]))
         return frames
 
     def world_to_tool(self, q: casadi.SX) -> casadi.SX:
-        """Return the tool in the world, 4x4."""
+        """Return the tool in the world, 4 x 4, for q (n x 1), rad and m."""
         return self.world_to_frames(q)[-1] @ self.last_to_tool
 
     @property
     def last_to_tool(self) -> casadi.SX:
-        """The tool in frame n, 4x4."""
+        """The tool in frame n, 4 x 4."""
         return _matrix(self.tool[0:4], self.tool[4:8], self.tool[8:12])
 
 
@@ -125,26 +119,29 @@ def joint_symbols(name: str, n: int) -> casadi.SX:
 
 
 def table_numbers(description: Description) -> Array:
-    """Return the floats of a table in one row: six of each joint, then twelve of the base and of the tool."""
+    """Return the numbers of an arm's frames, shape (6 n + 24,): six a joint, twelve each of base and tool."""
     numbers = description.numbers
     columns = (numbers.a, numbers.d, numbers.cos_alpha, numbers.sin_alpha, numbers.cos_theta, numbers.sin_theta)
     joints = np.stack(columns, axis=1).ravel()
-    return np.concatenate([joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()]) + 0.0
+    return np.concatenate([joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()])
 
 
 @takes_robot
 def table_pattern(description: Description) -> tuple[str, Array]:
-    """Return what a parametric table's expressions depend on, as text, and the values of its symbols.
+    """Return the pattern of an arm's frames as text, and the values of its parametric table's symbols, (symbols,).
 
     Arms of equal pattern (convention, kinds of joints, which numbers are 0, 1 or -1) have equal expressions.
     """
-    numbers = table_numbers(description)
-    codes = np.select([numbers == x for x in FOLDED], list("0+-"), "p")
-    return f"{description.convention.value} {description.kinds} {''.join(codes)}", numbers[codes == "p"]
+    pattern = _pattern(description)
+    return f"{description.convention.value} {description.kinds} {pattern.code}", pattern.parameters[0]
+
+
+def _pattern(description: Description) -> NumberPattern:
+    return NumberPattern.of(table_numbers(description)[None])
 
 
 def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
-    """Return the tool's geometric Jacobian, 6 x n.
+    """Return the tool's geometric Jacobian, 6 x n: linear velocity in m/s, then angular velocity in rad/s, by qd.
 
     Column i is (z x (p_tool - p); z) for a revolute joint about the axis z through p, and (z; 0) for a prismatic one
     (Siciliano et al., Robotics, 2009, eq. 3.30).
@@ -167,7 +164,7 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
 
 
 def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
-    """Return the Jacobian's time derivative along qd, 6 x n; in ``"tool"`` axes that of its components."""
+    """Return the time derivative of the Jacobian along qd, 6 x n; for ``"tool"`` that of its components."""
     import casadi
 
     J = jacobian(table, q, frame)

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     import casadi
 
 NARROWEST = 1e-9
-"""rad/s or m/s: squares of speeds and widths then neither vanish nor overflow."""
+"""Smallest width, rad/s or m/s: its square neither underflows nor makes the quotient overflow."""
 
 
 @dataclass(frozen=True)
 class Friction:
-    """How dry friction changes with the direction of motion.
+    """Dry friction near rest: how its torque changes sign with the direction of motion.
 
     With width 0 it is a step, 0 at rest. Otherwise it is smooth: with s = v / sqrt(v^2 + width^2) the torque is
     (c_pos - c_neg) / 2 s + (c_pos + c_neg) / 2 s^2, which tends to c_pos and c_neg far from 0 and takes energy at every
@@ -41,12 +41,12 @@ class Friction:
 
     @classmethod
     def chosen(cls, friction: bool | Friction | None) -> Friction | None:
-        """Return what an argument ``friction=`` means: nothing, a step for True, or itself.
+        """Return the model that an argument ``friction=`` means: None for False, a step for True, or itself.
 
         Raises
         ------
         TypeError
-            Something else.
+            The argument is neither.
         """
         if friction is None or isinstance(friction, Friction):
             return friction
@@ -55,14 +55,14 @@ class Friction:
         return cls() if friction else None
 
     def direction(self, speed: Scalar) -> Scalar:
-        """Return which way an expression goes: -1 to 1."""
+        """Return the direction of a speed, rad/s or m/s: -1 to 1."""
         import casadi
 
         return smooth_direction(speed, self.width) if self.width else casadi.sign(speed)
 
 
 def smooth_direction(speed: Scalar, width: Scalar) -> Scalar:
-    """Return v / sqrt(v^2 + width^2)."""
+    """Return v / sqrt(v^2 + width^2), without unit; speed and width in rad/s or m/s."""
     import casadi
 
     return speed / casadi.sqrt(speed * speed + width * width)
@@ -71,16 +71,16 @@ def smooth_direction(speed: Scalar, width: Scalar) -> Scalar:
 def friction_torque(
     qd: casadi.SX, viscous: Sequence[Scalar], coulomb: Sequence[tuple[Scalar, Scalar]], directions: Sequence[Scalar]
 ) -> casadi.SX:
-    """Return the torques that friction takes, n x 1: viscous qd, and c_pos against positive, c_neg against negative.
+    """Return friction torques, n x 1, N m and N: viscous qd, plus c_pos for positive and c_neg for negative rates.
 
     Parameters
     ----------
     qd
         Joint rates, n x 1.
     viscous, coulomb
-        Joint side, of each joint; c_neg is at most 0.
+        At the joint side, N m s/rad and N m (or N s/m and N), one entry a joint; c_neg is at most 0.
     directions
-        Of each joint -1 to 1; see :class:`Friction`.
+        Direction of each joint's motion, -1 to 1; see :class:`Friction`.
     """
     import casadi
 

@@ -1,4 +1,4 @@
-"""The numbers that an arm's dynamics depend on: of one arm, or symbols for all arms of a pattern."""
+"""The numbers that an arm's dynamics depend on: of one arm, or as symbols for all arms of a pattern."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention, Description, Robot, description_of, require_bodies
 from dhkit.display import counted, repr_line
-from dhkit.symbolic.differentiable.bodies import Moments, regrouped
-from dhkit.symbolic.differentiable.frames import FOLDED
 from dhkit.symbolic.differentiable.joint_frames import JointRow, joint_rows
+from dhkit.symbolic.differentiable.moments import Moments, regroup
+from dhkit.symbolic.differentiable.number_patterns import NumberPattern
 from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, plus
 
 if TYPE_CHECKING:
@@ -25,19 +24,19 @@ if TYPE_CHECKING:
 class InertialTable:
     """Joint frames, moments of links, drives and gravity, each number a float or a symbol.
 
-    ``InertialTable.of`` takes an arm's own numbers. ``InertialTable.parametric`` keeps those that are 0, 1 or -1 and
-    puts symbols for the rest: one derivation, and one compiled kernel, serve every arm of the same pattern.
-    Links hold their base parameters (:func:`dhkit.symbolic.differentiable.bodies.regrouped`).
+    ``InertialTable.of`` holds an arm's own numbers. ``InertialTable.parametric`` keeps numbers that are 0, 1 or -1 and
+    has symbols for the others, so that one derivation and one compiled kernel serve every arm of the same pattern.
+    Links hold their base parameters (:func:`dhkit.symbolic.differentiable.moments.regroup`).
     """
 
     rows: tuple[JointRow, ...]
     links: tuple[Moments, ...]
     armature: tuple[Scalar, ...]
-    """gear^2 rotor inertia, kg m^2 or kg."""
+    """Rotor inertias at the joint side, gear^2 times rotor inertia, kg m^2 or kg."""
     gravity: Vector3
     """Free-fall acceleration in frame 0, m/s^2."""
     potential: Scalar
-    """J: the potential energy of what has been regrouped to the base, zero at the world's origin."""
+    """Potential energy of the mass regrouped to the base, J; zero at the world's origin."""
 
     @classmethod
     def of(cls, description: Robot) -> InertialTable:
@@ -49,17 +48,12 @@ class InertialTable:
             A link without a body.
         """
         description = description_of(description)
-        return cls._filled(description, _numbers(description).tolist())
+        return cls._filled(description, (_numbers(description) + 0.0).tolist())
 
     @classmethod
     def parametric(cls, *descriptions: Description) -> tuple[InertialTable, casadi.SX]:
         """Return a table of symbols, and the symbols; their values are those of :func:`inertial_pattern`."""
-        import casadi
-
-        numbers, folded = _folded(descriptions)
-        symbols = casadi.SX.sym("parameter", int(np.sum(~folded)))
-        waiting = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
-        entries = [x if fold else next(waiting) for x, fold in zip(numbers[0].tolist(), folded, strict=True)]
+        entries, symbols = _pattern(descriptions).entries()
         return cls._filled(descriptions[0], entries), symbols
 
     def __repr__(self) -> str:
@@ -85,30 +79,30 @@ class InertialTable:
 
     @property
     def prismatic(self) -> tuple[bool, ...]:
-        """Which joints slide."""
+        """Whether each joint is prismatic."""
         return tuple(row.prismatic for row in self.rows)
 
     def with_load(self, load: Moments, potential: Scalar) -> InertialTable:
-        """Return the table with mass joined to the last link.
+        """Return the table with a load added to the last link.
 
         Parameters
         ----------
         load
-            Its moments in the last joint frame.
+            The load's moments in the last joint frame.
         potential
-            Its potential energy if it were in the origin of frame 0, J.
+            The load's potential energy if it were at the origin of frame 0, J.
         """
         links = (*self.links[:-1], self.links[-1].joined(load))
         return replace(self, links=links, potential=self.potential + potential)
 
 
 def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
-    """Return what a parametric table's expressions depend on, as text, and the values of its symbols.
+    """Return the pattern of an arm's dynamics as text, and the values of its parametric table's symbols.
 
     Parameters
     ----------
     descriptions
-        An arm, or several of the same kinds of joints that are to share a table.
+        One arm, or several arms of the same kinds of joints that share a table.
 
     Returns
     -------
@@ -120,53 +114,49 @@ def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
     DescriptionError
         A link without a body.
     """
-    numbers, folded = _folded(descriptions)
-    codes = np.where(folded, np.select([numbers[0] == x for x in FOLDED], list("0+-"), "p"), "p")
-    values: Array = numbers[:, ~folded]
-    return f"{descriptions[0].kinds} {''.join(codes)}", values[0] if len(descriptions) == 1 else values
+    pattern = _pattern(descriptions)
+    values = pattern.parameters
+    return f"{descriptions[0].kinds} {pattern.code}", values[0] if len(descriptions) == 1 else values
 
 
-def _folded(descriptions: Sequence[Description]) -> tuple[Array, NDArray[np.bool_]]:
-    """Return all numbers, a row for each arm, and which of them are 0, 1 or -1 in all arms alike."""
+def _pattern(descriptions: Sequence[Description]) -> NumberPattern:
+    # A batch repeats few arms: each is worked out once.
     rows = {id(description): _numbers(description) for description in {id(x): x for x in descriptions}.values()}
-    numbers = np.stack([rows[id(description)] for description in descriptions])
-    folded: NDArray[np.bool_] = np.isin(numbers[0], FOLDED) & (numbers == numbers[0]).all(axis=0)
-    return numbers, folded
+    return NumberPattern.of(np.stack([rows[id(description)] for description in descriptions]))
 
 
 def _numbers(description: Description) -> Array:
-    """Return all numbers in one row: six of each joint, ten of each link, drives, gravity and the base's energy."""
+    """Return an arm's numbers, shape (17 n + 4,): six a joint, ten a link, armatures, gravity, the base's energy."""
     require_bodies(description)
     numbers = description.numbers
     rows = joint_rows(description)
-    # Exact arithmetic of the rounded numbers: what cancels leaves 0, and the equations change by one rounding at most.
-    base, links = regrouped(exact_moments(description), rows)
+    # Regrouped in exact arithmetic: moments that cancel become 0, and the result is rounded once.
+    base, links = regroup(exact_moments(description), rows)
     gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
     mass = base.mass + sum(link.mass for link in links)
     energy = -(gravity @ _floats(base.first)) - float(mass) * (numbers.gravity @ numbers.T_world_base[:3, 3])
     joints = [entry for row in rows for entry in row.entries]
     moments = [float(entry) for link in links for entry in link.entries]
-    # Adding 0.0 turns -0.0, which a pattern would call 0 as well, into 0.0.
-    return np.array([*joints, *moments, *numbers.armature, *gravity, energy], dtype=float) + 0.0
+    return np.array([*joints, *moments, *numbers.armature, *gravity, energy], dtype=float)
 
 
 def exact_moments(description: Description) -> list[Moments]:
-    """Return the links' moments in their joint frames, exact."""
+    """Return the links' moments in their joint frames, as exact fractions."""
     numbers = description.numbers
     standard = description.convention is Convention.STANDARD
-    made = []
+    moments = []
     for i in range(description.n):
         inertia = [[Fraction(x) for x in row] for row in numbers.inertia[i].tolist()]
         x, y, z = (Fraction(x) for x in numbers.com[i].tolist())
         com: Vector3 = (x, y, z)
         if standard:
-            # DH frame i lies behind the joint: Tx(a) Rx(alpha) from the joint frame.
+            # The transform from the joint frame to DH frame i is Tx(a) Rx(alpha).
             c, s = Fraction(float(numbers.cos_alpha[i])), Fraction(float(numbers.sin_alpha[i]))
             com = plus((Fraction(float(numbers.a[i])), 0, 0), about_x(c, s, com))
             half = [about_x(c, s, (row[0], row[1], row[2])) for row in inertia]
             inertia = [list(about_x(c, s, (col[0], col[1], col[2]))) for col in zip(*half, strict=True)]
-        made.append(Moments.of_body(Fraction(float(numbers.mass[i])), com, inertia))
-    return made
+        moments.append(Moments.of_body(Fraction(float(numbers.mass[i])), com, inertia))
+    return moments
 
 
 def _floats(a: Vector3) -> Array:

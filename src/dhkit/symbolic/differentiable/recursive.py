@@ -1,4 +1,4 @@
-"""Inverse dynamics by recursion over the links: the fewest operations."""
+"""Inverse dynamics by recursion over the links (Newton-Euler), with the fewest operations."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.differentiable.bodies import Moments
+from dhkit.symbolic.differentiable.equation_frames import EquationFrame, equation_frames
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
-from dhkit.symbolic.differentiable.joint_frames import Station, stations
+from dhkit.symbolic.differentiable.moments import Moments
 from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, plus, times
 
 if TYPE_CHECKING:
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Spin:
-    """How a link turns: a point at r from its origin accelerates by U r against it, U = [wd]x + [w]x [w]x.
+class AngularMotion:
+    """A link's angular velocity w, rad/s, and the matrix U = [wd]x + [w]x [w]x of its angular acceleration wd, rad/s^2.
 
-    Only what U is made of is kept: w, wd_z, and U's last column, which stays the same across a joint about z.
+    A point at r from the link's origin accelerates by U r relative to it. Stored are w, wd_z and the last column of U,
+    which does not change across a joint about z; the rest of U follows from them.
     """
 
     w: Vector3
@@ -30,12 +31,12 @@ class Spin:
 
     @cached_property
     def wd_y(self) -> Scalar:
-        """wd_y = U_xz - w_x w_z."""
+        """wd_y = U_xz - w_x w_z, rad/s^2."""
         return self.column[0] - self.w[0] * self.w[2]
 
     @cached_property
     def U(self) -> tuple[Vector3, Vector3, Vector3]:
-        """U, row by row."""
+        """The matrix U, row by row, 1/s^2."""
         x, y, z = self.w
         xy, xx, zz = x * y, x * x, z * z
         U_xz, U_yz, U_zz = self.column
@@ -46,26 +47,26 @@ class Spin:
         )
 
     def times(self, r: Vector3) -> Vector3:
-        """Return U r."""
+        """Return U r, m/s^2."""
         a, b, c = (row[0] * r[0] + row[1] * r[1] + row[2] * r[2] for row in self.U)
         return a, b, c
 
-    def crossed(self, station: Station) -> Spin:
-        """Return it in the approach of the next joint."""
-        c, s = station.cos_alpha, station.sin_alpha
+    def in_twisted_axes(self, frame: EquationFrame) -> AngularMotion:
+        """Return the same motion in the twisted axes of the next joint."""
+        c, s = frame.cos_alpha, frame.sin_alpha
         axis = self.times((0.0, -s, c))
-        return Spin(station.to_approach(self.w), c * self.wd_z - s * self.wd_y, station.to_approach(axis))
+        return AngularMotion(frame.to_twisted(self.w), c * self.wd_z - s * self.wd_y, frame.to_twisted(axis))
 
-    def driven(self, qd: Scalar, qdd: Scalar) -> Spin:
-        """Return it behind a revolute joint."""
-        return Spin((self.w[0], self.w[1], self.w[2] + qd), self.wd_z + qdd, self.column)
+    def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> AngularMotion:
+        """Return the motion with that of a revolute joint about z added: rates rad/s and rad/s^2."""
+        return AngularMotion((self.w[0], self.w[1], self.w[2] + qd), self.wd_z + qdd, self.column)
 
-    def turned(self, station: Station) -> Spin:
-        """Return it in the axes of a link's equations."""
-        return Spin(station.to_link(self.w), self.wd_z, station.to_link(self.column))
+    def in_link_axes(self, frame: EquationFrame) -> AngularMotion:
+        """Return the same motion, given in twisted axes, in the axes of the link's equations."""
+        return AngularMotion(frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column))
 
     def moment(self, link: Moments) -> Vector3:
-        """Return the integral of r x U r over a link's mass."""
+        """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
         (U_xx, U_xy, U_xz), (U_yx, U_yy, U_yz), (U_zx, U_zy, U_zz) = self.U
         x, y, z = self.w
         S = link
@@ -82,42 +83,44 @@ def recursive_inverse_dynamics(
     """Return the joint torques of a motion by Newton's and Euler's equations, n x 1, N m and N; drives included.
 
     Luh, Walker & Paul 1980, with accelerations by U and base parameters (Khalil & Kleinfinger 1987), in the axes that
-    :class:`dhkit.symbolic.differentiable.joint_frames.Station` chooses.
+    :class:`dhkit.symbolic.differentiable.equation_frames.EquationFrame` chooses.
     """
     import casadi
 
-    made = stations(table, q)
-    spin = Spin((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
-    a = times(-1.0, table.gravity)  # an arm that accelerates upwards feels its weight
+    frames = equation_frames(table, q)
+    motion = AngularMotion((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
+    a = times(-1.0, table.gravity)  # gravity acts like an acceleration of the base upwards
     wrenches = []
-    for i, station in enumerate(made):
-        a = station.to_approach(plus(a, spin.times(station.lever)))
-        spin = spin.crossed(station)
-        if station.prismatic:
+    for i, frame in enumerate(frames):
+        a = frame.to_twisted(plus(a, motion.times(frame.lever)))
+        motion = motion.in_twisted_axes(frame)
+        if frame.prismatic:
             double = qd[i] + qd[i]
-            a = a[0] + double * spin.w[1], a[1] - double * spin.w[0], a[2] + qdd[i]
+            a = a[0] + double * motion.w[1], a[1] - double * motion.w[0], a[2] + qdd[i]
         else:
-            spin = spin.driven(qd[i], qdd[i])
-        a, spin = station.to_link(a), spin.turned(station)
-        own = station.own
-        wrenches.append((plus(times(own.mass, a), spin.times(own.first)), plus(spin.moment(own), cross(own.first, a))))
+            motion = motion.with_joint_motion(qd[i], qdd[i])
+        a, motion = frame.from_twisted(a), motion.in_link_axes(frame)
+        own = frame.moments
+        wrenches.append(
+            (plus(times(own.mass, a), motion.times(own.first)), plus(motion.moment(own), cross(own.first, a)))
+        )
     f: Vector3 = (0.0, 0.0, 0.0)
     n: Vector3 = (0.0, 0.0, 0.0)
     tau = [0.0] * table.n
     for i in reversed(range(table.n)):
-        station = made[i]
+        frame = frames[i]
         f, n = plus(wrenches[i][0], f), plus(wrenches[i][1], n)
-        tau[i] = (f if station.prismatic else n)[2] + table.armature[i] * qdd[i]
-        f, n = station.down(f), station.down(n)
-        n = plus(n, cross(station.lever, f))
+        tau[i] = (f if frame.prismatic else n)[2] + table.armature[i] * qdd[i]
+        f, n = frame.to_previous(f), frame.to_previous(n)
+        n = plus(n, cross(frame.lever, f))
     return casadi.SX(casadi.vertcat(*tau))
 
 
 def recursive_bias(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return C qd + g, n x 1: the torques of a motion without acceleration."""
+    """Return C qd + g, n x 1: the torques, N m and N, of a motion without acceleration."""
     return recursive_inverse_dynamics(table, q, qd, [0.0] * table.n)
 
 
 def recursive_gravity(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return g, n x 1: the torques at rest."""
+    """Return g, n x 1: the torques at rest, N m and N."""
     return recursive_inverse_dynamics(table, q, [0.0] * table.n, [0.0] * table.n)

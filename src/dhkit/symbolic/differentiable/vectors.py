@@ -1,6 +1,6 @@
-"""Three numbers at a time: floats, exact fractions or CasADi expressions, one text for all of them.
+"""Vectors of three floats, exact fractions or CasADi expressions.
 
-Plain tuples in place of CasADi's matrices: a product with an exact 0 or 1 disappears before it becomes an expression.
+They are plain tuples, no CasADi matrices, so that a product with an exact 0 or 1 never becomes an expression.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ Scalar: TypeAlias = Any
 Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]
 
 NUMBER = (float, int)
+ZERO_VECTOR: Vector3 = (0.0, 0.0, 0.0)
 
 
 def plus(a: Vector3, b: Vector3) -> Vector3:
@@ -40,31 +41,31 @@ def cross(a: Vector3, b: Vector3) -> Vector3:
 
 def about_z(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
     """Return Rz a, for the angle's cosine and sine."""
-    return (*_turned(c, s, a[0], a[1]), a[2])
+    return (*_rotate(c, s, a[0], a[1]), a[2])
 
 
 def about_z_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
     """Return Rz^T a."""
-    y, x = _turned(c, s, a[1], a[0])
+    y, x = _rotate(c, s, a[1], a[0])
     return x, y, a[2]
 
 
 def about_x(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
     """Return Rx a."""
-    return (a[0], *_turned(c, s, a[1], a[2]))
+    return (a[0], *_rotate(c, s, a[1], a[2]))
 
 
 def about_x_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
     """Return Rx^T a."""
-    z, y = _turned(c, s, a[2], a[1])
+    z, y = _rotate(c, s, a[2], a[1])
     return a[0], y, z
 
 
-def _turned(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+def _rotate(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
     return _difference(_product(c, x), _product(s, y)), _sum(_product(s, x), _product(c, y))
 
 
-# CasADi drops zeros as well, but takes a hundred times as long to be asked.
+# CasADi drops products with 0 and 1 as well; asking it takes a hundred times as long as these comparisons.
 
 
 def _product(a: Scalar, b: Scalar) -> Scalar:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dhkit.description import INERTIA_PLACES, Convention
 from dhkit.symbolic.differentiable.frames import SymbolicTable
 from dhkit.symbolic.differentiable.vectors import (
+    ZERO_VECTOR,
     Scalar,
     Vector3,
     about_x_back,
@@ -21,7 +22,6 @@ from dhkit.symbolic.differentiable.vectors import (
 if TYPE_CHECKING:
     import casadi
 
-NOTHING: Vector3 = (0.0, 0.0, 0.0)
 UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -46,10 +46,10 @@ def velocity_regressor(
     import casadi
 
     Y = casadi.SX(table.n, 10 * table.n)
-    motion = Motion(NOTHING, NOTHING, NOTHING, times(-1.0, gravity))
+    motion = BilinearMotion(ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR, times(-1.0, gravity))
     columns: list[tuple[Vector3, Vector3]] = []
     for i in range(table.n):
-        step = Step.of(table, i, q[i])
+        step = FrameStep.of(table, i, q[i])
         motion = step.carried(motion, qd[i], qd_r[i], qdd_r[i])
         columns = [step.carried_column(column) for column in columns] + [step.own_column]
         for j, (v, w) in enumerate(columns):
@@ -58,20 +58,20 @@ def velocity_regressor(
 
 
 @dataclass(frozen=True)
-class Motion:
-    """A link's angular velocities, and accelerations that are bilinear in the two rates, in its DH frame's axes."""
+class BilinearMotion:
+    """A link's angular velocities by qd and qd_r, and accelerations bilinear in both, in its DH frame's axes."""
 
     w: Vector3
-    """By qd, rad/s."""
+    """Angular velocity by qd, rad/s."""
     w_r: Vector3
-    """By qd_r, rad/s."""
+    """Angular velocity by qd_r, rad/s."""
     wd: Vector3
     """Angular acceleration, rad/s^2."""
     a: Vector3
-    """Acceleration of the frame's origin less gravity, m/s^2."""
+    """Acceleration of the frame's origin minus gravity, m/s^2."""
 
-    def swung(self, r: Vector3) -> Vector3:
-        """Return U r, by which a point at r from the origin accelerates against it.
+    def relative_acceleration(self, r: Vector3) -> Vector3:
+        """Return U r, the acceleration of a point at r, m, relative to the frame's origin, m/s^2.
 
         U = [wd]x + ([w]x [w_r]x + [w_r]x [w]x) / 2.
         """
@@ -79,11 +79,11 @@ class Motion:
         return plus(cross(self.wd, r), times(0.5, both))
 
     def power(self, v: Vector3, w: Vector3) -> list[Scalar]:
-        """Return the power that the link needs to move with v (of its origin) and w, for each of its ten parameters.
+        """Return, for each of the link's ten parameters, the power needed to move with v (of its origin) and w.
 
         Force m a + U (m c) and moment m c x a + I wd + (w x I w_r + w_r x I w) / 2 about the frame's origin.
         """
-        first = [dot(v, self.swung(unit)) + dot(w, cross(unit, self.a)) for unit in UNITS]
+        first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in UNITS]
         second = []
         turned, turned_r = cross(w, self.w), cross(w, self.w_r)  # w . (w_i x I w_r) = (w x w_i) . I w_r
         for i, j in INERTIA_PLACES.values():
@@ -98,8 +98,8 @@ def _entry(i: int, j: int, a: Vector3, b: Vector3) -> Scalar:
 
 
 @dataclass(frozen=True)
-class Step:
-    """From one DH frame to the next, in the axes of the next."""
+class FrameStep:
+    """The step from one DH frame to the next, in the axes of the next."""
 
     prismatic: bool
     standard: bool
@@ -108,12 +108,12 @@ class Step:
     theta: tuple[Scalar, Scalar]
     """Cosine and sine of the joint's angle."""
     lever: Vector3
-    """From the frame before to this one, m."""
+    """The position of this frame's origin from the previous one's, m."""
     axis: Vector3
-    """The joint's axis."""
+    """Unit vector along the joint's axis."""
 
     @classmethod
-    def of(cls, table: SymbolicTable, i: int, q: Scalar) -> Step:
+    def of(cls, table: SymbolicTable, i: int, q: Scalar) -> FrameStep:
         """Return the step over joint i, counted from 0, at its position q in rad or m."""
         import casadi
 
@@ -128,8 +128,8 @@ class Step:
         axis: Vector3 = (0.0, sin_alpha, cos_alpha) if standard else (0.0, 0.0, 1.0)
         return cls(table.prismatic[i], standard, (cos_alpha, sin_alpha), (c, s), lever, axis)
 
-    def turned(self, x: Vector3) -> Vector3:
-        """Return a vector of the frame before in this one's axes."""
+    def to_own_axes(self, x: Vector3) -> Vector3:
+        """Return a vector of the previous frame's axes in this frame's axes."""
         if self.standard:
             return about_x_back(*self.alpha, about_z_back(*self.theta, x))
         return about_z_back(*self.theta, about_x_back(*self.alpha, x))
@@ -138,30 +138,30 @@ class Step:
     def own_column(self) -> tuple[Vector3, Vector3]:
         """The joint's own column of the Jacobian: velocity of the next frame's origin, and angular velocity."""
         if self.prismatic:
-            return self.axis, NOTHING
+            return self.axis, ZERO_VECTOR
         # In the modified convention the frame's origin lies on the axis.
-        return (cross(self.axis, self.lever) if self.standard else NOTHING), self.axis
+        return (cross(self.axis, self.lever) if self.standard else ZERO_VECTOR), self.axis
 
     def carried_column(self, column: tuple[Vector3, Vector3]) -> tuple[Vector3, Vector3]:
-        """Return an earlier joint's column for this frame."""
-        v, w = self.turned(column[0]), self.turned(column[1])
+        """Return an earlier joint's column, given for the previous frame, for this frame."""
+        v, w = self.to_own_axes(column[0]), self.to_own_axes(column[1])
         return plus(v, cross(w, self.lever)), w
 
-    def carried(self, before: Motion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> Motion:
-        """Return this link's motion from that of the link before and the joint's rates."""
-        motion = Motion(*(self.turned(x) for x in (before.w, before.w_r, before.wd, before.a)))
+    def carried(self, before: BilinearMotion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> BilinearMotion:
+        """Return this link's motion from the previous link's, the joint's rates v, v_r and acceleration dv_r."""
+        motion = BilinearMotion(*(self.to_own_axes(x) for x in (before.w, before.w_r, before.wd, before.a)))
         # v w_r x z + v_r w x z: twice the bilinear form of v w x z.
         turning = plus(times(v, cross(motion.w_r, self.axis)), times(v_r, cross(motion.w, self.axis)))
         driven = times(dv_r, self.axis)
         if self.prismatic:
-            a = plus(plus(motion.a, motion.swung(self.lever)), plus(turning, driven))
-            return Motion(motion.w, motion.w_r, motion.wd, a)
-        after = Motion(
+            a = plus(plus(motion.a, motion.relative_acceleration(self.lever)), plus(turning, driven))
+            return BilinearMotion(motion.w, motion.w_r, motion.wd, a)
+        after = BilinearMotion(
             plus(motion.w, times(v, self.axis)),
             plus(motion.w_r, times(v_r, self.axis)),
             plus(motion.wd, plus(times(0.5, turning), driven)),
             motion.a,
         )
         # The lever turns with this link in the standard convention, with the link before in the modified one.
-        swung = (after if self.standard else motion).swung(self.lever)
-        return Motion(after.w, after.w_r, after.wd, plus(after.a, swung))
+        swung = (after if self.standard else motion).relative_acceleration(self.lever)
+        return BilinearMotion(after.w, after.w_r, after.wd, plus(after.a, swung))

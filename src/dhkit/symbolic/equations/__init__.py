@@ -4,11 +4,9 @@ from dhkit.symbolic.equations.c_code import equations_c
 from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_lines, latex_text
 from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
-from dhkit.symbolic.equations.notation import constants_of, generators_of, renamings, symbols_of
 from dhkit.symbolic.equations.python_code import equations_python
 from dhkit.symbolic.equations.quantities import (
     KINEMATIC_QUANTITIES,
-    QUANTITIES,
     Quantity,
     is_kinematic,
     kinematic_quantities,
@@ -17,6 +15,8 @@ from dhkit.symbolic.equations.quantities import (
 )
 from dhkit.symbolic.equations.sympy_objects import equations_sympy, sympy_object
 from dhkit.symbolic.equations.text import equations_text, plain_text
+from dhkit.symbolic.exact.lagrangian import QUANTITIES
+from dhkit.symbolic.ring.notation import constants_of, generators_of, renamings, symbols_of
 
 __all__ = [
     "KINEMATIC_QUANTITIES",

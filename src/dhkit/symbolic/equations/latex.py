@@ -12,7 +12,10 @@ from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.latex_width import latex_width
-from dhkit.symbolic.equations.notation import (
+from dhkit.symbolic.equations.quantities import Quantity, check_length
+from dhkit.symbolic.equations.writing import Printer, decimal_text
+from dhkit.symbolic.ring import Element, Generator, Ring
+from dhkit.symbolic.ring.notation import (
     Angle,
     Notation,
     angles_of,
@@ -22,9 +25,6 @@ from dhkit.symbolic.equations.notation import (
     renamings,
     variables,
 )
-from dhkit.symbolic.equations.quantities import Quantity, check_length
-from dhkit.symbolic.equations.writing import Printer, decimal_text
-from dhkit.symbolic.ring import Element, Generator, Ring
 
 LINE = 29.5
 """What a line of an article's text holds, in em, of which some is kept for what the estimate of widths misses."""

@@ -11,19 +11,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dhkit.symbolic.equations.collected import Product, collected, is_reciprocal
-from dhkit.symbolic.equations.notation import angles_of, constants_of, generators_of, symbols_of
 from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.equations.writing import Printer, is_name
+from dhkit.symbolic.exact.lagrangian import Lagrangian
+from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.ring import Element, Generator
-
-if TYPE_CHECKING:
-    from dhkit.symbolic.exact.lagrangian import Lagrangian
-    from dhkit.symbolic.kinematics import SymbolicKinematics
+from dhkit.symbolic.ring.notation import angles_of, constants_of, generators_of, symbols_of
 
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
 """What each quantity is a function of; those of kinematics of q alone."""

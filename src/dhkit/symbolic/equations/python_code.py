@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from dhkit.symbolic.equations.programs import Entry, Function, Language, Program, program, wrapped
 from dhkit.symbolic.equations.quantities import Quantity
-
-if TYPE_CHECKING:
-    from dhkit.symbolic.exact.lagrangian import Lagrangian
-    from dhkit.symbolic.kinematics import SymbolicKinematics
+from dhkit.symbolic.exact.lagrangian import Lagrangian
+from dhkit.symbolic.kinematics import SymbolicKinematics
 
 FUNCTION_NAMES = {
     "M": "mass_matrix",

@@ -5,34 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dhkit.symbolic.equations.notation import entry_name, generators_of
 from dhkit.symbolic.exact.compact import shortened
+from dhkit.symbolic.exact.lagrangian import QUANTITIES, Lagrangian
+from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.ring import Element, Elements, RingError, element_array
+from dhkit.symbolic.ring.notation import entry_name, generators_of
 
-if TYPE_CHECKING:
-    from dhkit.symbolic.exact.lagrangian import Lagrangian
-    from dhkit.symbolic.kinematics import SymbolicKinematics
-
-QUANTITIES = {
-    "M": "mass matrix",
-    "C": "Coriolis matrix",
-    "h": "Coriolis and centrifugal torques",
-    "g": "gravity torques",
-    "tau": "joint torques",
-    "K": "kinetic energy",
-    "V": "potential energy",
-}
-"""What can be printed, with its name in words."""
 KINEMATIC_QUANTITIES = {
     "A": "link transforms",
     "T": "pose of the tool in the world",
     "J": "Jacobian of the tool, in the world's axes",
 }
-"""The same of kinematics; A stands for A1 ... An."""
+"""The quantities of kinematics that can be printed, with their names in words; A stands for A1 ... An."""
 LINK = re.compile(r"A([1-9][0-9]*)")
 MOST_TERMS = 2_000
 """Terms of an entry that people are asked to read."""
@@ -106,9 +93,7 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     return [Quantity(name, shortened(lag.arm, element_array(getattr(lag, name)))) for name in dict.fromkeys(names)]
 
 
-def kinematic_quantities(
-    kinematics: SymbolicKinematics, what: str | Sequence[str], *, shorten: bool = True
-) -> list[Quantity]:
+def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[str]) -> list[Quantity]:
     """Return A1 ... An (A: all of them), T and J by name, in the angles that make each entry shortest.
 
     Raises
@@ -125,7 +110,7 @@ def kinematic_quantities(
             f"no quantity {unknown[0] if unknown else ''!r}; expected some of A, {links[0]} ... {links[-1]}, T, J"
         )
     found = {name: kinematics.elements(name) for name in dict.fromkeys(names)}
-    return [Quantity(name, shortened(kinematics.arm, x) if shorten else x) for name, x in found.items()]
+    return [Quantity(name, shortened(kinematics.arm, x)) for name, x in found.items()]
 
 
 def is_kinematic(what: str | Sequence[str]) -> bool:

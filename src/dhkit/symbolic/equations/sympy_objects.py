@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from dhkit.symbolic.equations.collected import collected
-from dhkit.symbolic.equations.notation import Notation, notation
 from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.ring import Element, Generator
+from dhkit.symbolic.ring.notation import Notation, notation
 
 FUNCTIONS = {"abs": "Abs"}
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from dhkit.symbolic.equations.collected import collected
-from dhkit.symbolic.equations.notation import Notation, angles_of, generators_of, notation, renamings
 from dhkit.symbolic.equations.quantities import Quantity, check_length
 from dhkit.symbolic.equations.writing import Printer, decimal_text
 from dhkit.symbolic.ring import Element, Generator
+from dhkit.symbolic.ring.notation import Notation, angles_of, generators_of, notation, renamings
 
 WIDTH = 100
 """Columns of a line."""

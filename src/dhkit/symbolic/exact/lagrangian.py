@@ -14,16 +14,26 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description, takes_robot
 from dhkit.display import repr_line
 from dhkit.expressions import Expression
-from dhkit.symbolic import equations
-from dhkit.symbolic.equations.notation import notation
+from dhkit.formats import format_function
 from dhkit.symbolic.exact import composite
 from dhkit.symbolic.exact.exact_arm import ExactArm, exact_arm
 from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.ring import Element, Elements, RingError
 from dhkit.symbolic.ring.elements import READABLE
+from dhkit.symbolic.ring.notation import notation
 from dhkit.symbolic.textbook import TextbookDerivation, derive
 
 _HALF = Fraction(1, 2)
+QUANTITIES = {
+    "M": "mass matrix",
+    "C": "Coriolis matrix",
+    "h": "Coriolis and centrifugal torques",
+    "g": "gravity torques",
+    "tau": "joint torques",
+    "K": "kinetic energy",
+    "V": "potential energy",
+}
+"""The quantities of a Lagrangian that can be printed, by attribute, with their names in words."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,8 +189,8 @@ class Lagrangian:
             No such quantity, another shape, or entries that are no elements of this ring.
         """
         for name, given in quantities.items():
-            if name not in equations.QUANTITIES:
-                raise ValueError(f"no quantity {name!r}; expected {', '.join(equations.QUANTITIES)}")
+            if name not in QUANTITIES:
+                raise ValueError(f"no quantity {name!r}; expected {', '.join(QUANTITIES)}")
             shape = np.shape(getattr(self, name))
             entries = np.ravel(np.asarray(given, dtype=object)) if shape else [given]
             own = all(isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries)
@@ -210,7 +220,7 @@ class Lagrangian:
         RingError
             An entry is too long to be read.
         """
-        return equations.equations_text(equations.readable(self, what))
+        return str(format_function("equations_text")(format_function("readable")(self, what)))
 
     def latex(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
         """Return some of M, C, h, g, tau, K and V in LaTeX, for a page that loads amsmath.
@@ -220,11 +230,12 @@ class Lagrangian:
         RingError
             An entry is too long to be read.
         """
-        return equations.equations_latex(equations.readable(self, what))
+        return str(format_function("equations_latex")(format_function("readable")(self, what)))
 
-    def sympy(self, what: str | Sequence[str] = tuple(equations.QUANTITIES)) -> dict[str, Any]:
+    def sympy(self, what: str | Sequence[str] = tuple(QUANTITIES)) -> dict[str, Any]:
         """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
-        return equations.equations_sympy(equations.quantities(self, what))
+        matrices: dict[str, Any] = format_function("equations_sympy")(format_function("quantities")(self, what))
+        return matrices
 
     def __str__(self) -> str:
         size = sum(len(element) for element in self.M.flat)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.description import Array
 from dhkit.display import LONGEST_LINE, plain, repr_line
 from dhkit.errors import DhkitError
-from dhkit.expressions import exact
-from dhkit.symbolic.ring.polynomials import Monomial
-
-if TYPE_CHECKING:
-    from dhkit.symbolic.ring.ring import Ring
+from dhkit.expressions import Expression, exact
+from dhkit.formats import format_function
+from dhkit.symbolic.ring.polynomials import Monomial, Polynomials, Relation
 
 READABLE = 200
 """Terms that are shown unasked."""
@@ -33,11 +33,41 @@ class RingError(DhkitError):
     """An expression that the exact ring does not have, or one too long for it."""
 
 
+@dataclass(frozen=True)
+class Generator:
+    """A generator of the ring.
+
+    Attributes
+    ----------
+    kind
+        One of sine, cosine, position (of a sliding joint), rate, acceleration and constant.
+    text
+        What it is written as: s1, c23, q2, qd1, qdd1, or the constant's text.
+    joint
+        Which joint, from 0; -1 for constants.
+    joints
+        Of a sine or a cosine the joints whose variables its angle is the sum of: (1, 2) for c23.
+    meaning
+        The expression that a constant stands for; None where its text is its name.
+    """
+
+    kind: str
+    text: str
+    joint: int = -1
+    joints: tuple[int, ...] = ()
+    meaning: Expression | None = None
+
+    @property
+    def key(self) -> tuple[str, int | str]:
+        """What it is found by in any ring of the arm: its kind, and its joint or, where it has none, its text."""
+        return self.kind, self.text if self.joint < 0 else self.joint
+
+
 @dataclass(frozen=True, eq=False)
 class Element:
     """An element of a ring, in normal form."""
 
-    ring: Ring
+    ring: PolynomialRing
     polynomial: Any
 
     # Arithmetic
@@ -152,13 +182,11 @@ class Element:
     def __len__(self) -> int:
         return len(self.polynomial)
 
-    def __reduce__(self) -> tuple[Any, tuple[Ring, dict[Monomial, Fraction]]]:
+    def __reduce__(self) -> tuple[Any, tuple[PolynomialRing, dict[Monomial, Fraction]]]:
         return _from_terms, (self.ring, dict(self.terms))
 
     def __str__(self) -> str:
-        from dhkit.symbolic.equations import plain_text
-
-        return plain_text(self)
+        return str(format_function("plain_text")(self))
 
     def __repr__(self) -> str:
         if len(self) > READABLE:
@@ -166,9 +194,7 @@ class Element:
         return f"Element({plain(str(self), LONGEST_LINE - len('Element()'))})"
 
     def _repr_latex_(self) -> str | None:
-        from dhkit.symbolic.equations import latex_text
-
-        return f"${latex_text(self)}$" if len(self) <= READABLE else None
+        return f"${format_function('latex_text')(self)}$" if len(self) <= READABLE else None
 
     # Calculus
 
@@ -211,6 +237,124 @@ class Element:
         return total
 
 
+class PolynomialRing(ABC):
+    """What an element asks of its ring: its generators, the relations between them, and other elements."""
+
+    kinds: str
+    """One letter a joint, R or P."""
+    generators: tuple[Generator, ...]
+    polynomials: Polynomials
+    """Arithmetic of polynomials in as many generators."""
+    relations: tuple[Relation, ...]
+    """Polynomials that are zero, that of the greatest generator first."""
+    _places: dict[tuple[str, int | str], int]
+
+    @abstractmethod
+    def expanded(self, element: Element) -> Element:
+        """Return an element in the sines and cosines of the ring's own angles alone: its normal form."""
+
+    def _element(self, place: tuple[str, int | str]) -> Element:
+        return Element(self, self.polynomials.generator(self._places[place]))
+
+    def number(self, value: int | Fraction) -> Element:
+        """Return a rational number."""
+        return Element(self, self.polynomials.constant(value))
+
+    @cached_property
+    def zero(self) -> Element:
+        """The number 0."""
+        return self.number(0)
+
+    @cached_property
+    def one(self) -> Element:
+        """The number 1."""
+        return self.number(1)
+
+    def constant(self, text: str) -> Element:
+        """Return a constant by its text.
+
+        Raises
+        ------
+        RingError
+            The ring has none of that name.
+        """
+        if ("constant", text) not in self._places:
+            raise RingError(f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}")
+        return self._element(("constant", text))
+
+    def sine(self, i: int) -> Element:
+        """Return the sine of joint i's variable, from 0."""
+        return self._element(("sine", i))
+
+    def cosine(self, i: int) -> Element:
+        """Return the cosine of joint i's variable."""
+        return self._element(("cosine", i))
+
+    def position(self, i: int) -> Element:
+        """Return the variable of a sliding joint."""
+        return self._element(("position", i))
+
+    def rate(self, i: int) -> Element:
+        """Return joint i's rate."""
+        return self._element(("rate", i))
+
+    def acceleration(self, i: int) -> Element:
+        """Return joint i's acceleration."""
+        return self._element(("acceleration", i))
+
+    def sum(self, elements: Iterable[Element]) -> Element:
+        """Return the sum of elements."""
+        total = self.zero.polynomial
+        for element in elements:
+            total = total + element.polynomial
+        return Element(self, total)
+
+    def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
+        """Return the element of coefficients by monomial, in the order of :attr:`generators`."""
+        return Element(self, self.polynomials.from_terms(terms)).reduced()
+
+    @cached_property
+    def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
+        """Places of each angle's sine and cosine, and the joints that it is the sum of."""
+        cosines = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
+        return tuple((k, cosines[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.kinds)
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """The constants' texts."""
+        return tuple(g.text for g in self.generators if g.kind == "constant")
+
+    def place(self, kind: str, which: int | str) -> int:
+        """Return the place of a generator in a monomial, by its kind and its joint or, for a constant, its text."""
+        return self._places[kind, which]
+
+    def values(
+        self,
+        constants: Mapping[str, float],
+        q: Array,
+        qd: Array | None = None,
+        qdd: Array | None = None,
+    ) -> list[Any]:
+        """Return a number or an array (...) for each generator, for states (..., n)."""
+        zero = np.zeros_like(q)
+        states = {"rate": zero if qd is None else qd, "acceleration": zero if qdd is None else qdd, "position": q}
+        values: list[Any] = []
+        for g in self.generators:
+            if g.kind == "constant":
+                values.append(constants[g.text])
+            elif g.kind in ("sine", "cosine"):
+                angle = sum(q[..., joint] for joint in g.joints)
+                values.append(np.sin(angle) if g.kind == "sine" else np.cos(angle))
+            else:
+                values.append(states[g.kind][..., g.joint])
+        return values
+
+
 Elements: TypeAlias = NDArray[Any]
 """An array whose entries are elements of one ring."""
 
@@ -249,43 +393,5 @@ def _rational(number: Any) -> Fraction:
     return Fraction(0) if rational is None else rational
 
 
-def _from_terms(ring: Ring, terms: Mapping[Monomial, Fraction]) -> Element:
+def _from_terms(ring: PolynomialRing, terms: Mapping[Monomial, Fraction]) -> Element:
     return ring.from_terms(terms)
-
-
-def translated(element: Element, ring: Ring, replacements: Mapping[int, Element]) -> Element:
-    """Return an element in another ring.
-
-    Parameters
-    ----------
-    element
-        Of any ring.
-    ring
-        Where the result is.
-    replacements
-        What generators become, by their place in the element's ring; others become those of the same kind and name.
-    """
-    own = element.ring.generators
-    powers: dict[tuple[int, int], Element] = {}
-    kept = [k for k in range(len(own)) if k not in replacements]
-    targets: dict[int, int] = {}
-    parts: dict[Monomial, dict[Monomial, Fraction]] = {}
-    for monomial, coefficient in element.terms.items():
-        replaced = tuple(monomial[k] for k in replacements)
-        moved = [0] * len(ring.generators)
-        for k in kept:
-            if monomial[k]:
-                if k not in targets:
-                    targets[k] = ring.place(*own[k].key)
-                moved[targets[k]] = monomial[k]
-        parts.setdefault(replaced, {})[tuple(moved)] = coefficient
-    total = []
-    for exponents, group in parts.items():
-        product = ring.one
-        for k, exponent in zip(replacements, exponents, strict=True):
-            if exponent:
-                if (k, exponent) not in powers:
-                    powers[k, exponent] = replacements[k] ** exponent
-                product = product * powers[k, exponent]
-        total.append(ring.from_terms(group) * product)
-    return ring.sum(total)

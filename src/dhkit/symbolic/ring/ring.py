@@ -9,20 +9,17 @@ one are known to be related.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from dhkit.description import Array
 from dhkit.expressions import Expression
 from dhkit.expressions.exact import Monomial as TermMonomial
-from dhkit.symbolic.ring.elements import Element, RingError, translated
+from dhkit.symbolic.ring.elements import Element, Generator, PolynomialRing
 from dhkit.symbolic.ring.polynomials import Monomial, Relation, polynomials
-from dhkit.symbolic.ring.reading import read_angle, read_expression
+from dhkit.symbolic.ring.reading import Reader
 
 
 @dataclass(frozen=True)
@@ -52,37 +49,7 @@ class Constant:
         return frozenset({self.text}) if self.meaning is None else self.meaning.symbols
 
 
-@dataclass(frozen=True)
-class Generator:
-    """A generator of the ring.
-
-    Attributes
-    ----------
-    kind
-        One of sine, cosine, position (of a sliding joint), rate, acceleration and constant.
-    text
-        What it is written as: s1, c23, q2, qd1, qdd1, or the constant's text.
-    joint
-        Which joint, from 0; -1 for constants.
-    joints
-        Of a sine or a cosine the joints whose variables its angle is the sum of: (1, 2) for c23.
-    meaning
-        The expression that a constant stands for; None where its text is its name.
-    """
-
-    kind: str
-    text: str
-    joint: int = -1
-    joints: tuple[int, ...] = ()
-    meaning: Expression | None = None
-
-    @property
-    def key(self) -> tuple[str, int | str]:
-        """What it is found by in any ring of the arm: its kind, and its joint or, where it has none, its text."""
-        return self.kind, self.text if self.joint < 0 else self.joint
-
-
-class Ring:
+class Ring(PolynomialRing):
     """Q[constants, q, qd, qdd, s_i, c_i] / (s_i^2 + c_i^2 - 1, ...), for an arm's joints.
 
     Parameters
@@ -138,7 +105,6 @@ class Ring:
         self._places = {generator.key: k for k, generator in enumerate(self.generators)}
         self.polynomials = polynomials(len(self.generators))
         self.relations: tuple[Relation, ...] = ()
-        """What is zero, the greatest generator's first."""
         for i in self.angles:
             self._relate(("sine", i), 2, 1 - self.cosine(i) * self.cosine(i))
         for constant in constants:
@@ -171,37 +137,6 @@ class Ring:
     def __reduce__(self) -> tuple[type[Ring], tuple[Any, ...]]:
         return Ring, (self.kinds, self.given, self.angles, self.sums)
 
-    def _element(self, place: tuple[str, int | str]) -> Element:
-        return Element(self, self.polynomials.generator(self._places[place]))
-
-    # Elements
-
-    def number(self, value: int | Fraction) -> Element:
-        """Return a rational number."""
-        return Element(self, self.polynomials.constant(value))
-
-    @cached_property
-    def zero(self) -> Element:
-        """The number 0."""
-        return self.number(0)
-
-    @cached_property
-    def one(self) -> Element:
-        """The number 1."""
-        return self.number(1)
-
-    def constant(self, text: str) -> Element:
-        """Return a constant by its text.
-
-        Raises
-        ------
-        RingError
-            The ring has none of that name.
-        """
-        if ("constant", text) not in self._places:
-            raise RingError(f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}")
-        return self._element(("constant", text))
-
     def read(self, expression: Expression) -> Element:
         """Return an exact expression in the ring's constants.
 
@@ -210,7 +145,7 @@ class Ring:
         RingError
             It has a name or a function that the ring has not.
         """
-        return read_expression(self, expression)
+        return Reader(self, self.units).expression(expression)
 
     def direction(self, angle: Expression) -> tuple[Element, Element]:
         """Return cosine and sine of an angle that does not depend on the state.
@@ -220,44 +155,7 @@ class Ring:
         RingError
             As for :meth:`read`.
         """
-        return read_angle(self, angle)
-
-    def sine(self, i: int) -> Element:
-        """Return the sine of joint i's variable, from 0."""
-        return self._element(("sine", i))
-
-    def cosine(self, i: int) -> Element:
-        """Return the cosine of joint i's variable."""
-        return self._element(("cosine", i))
-
-    def position(self, i: int) -> Element:
-        """Return the variable of a sliding joint."""
-        return self._element(("position", i))
-
-    def rate(self, i: int) -> Element:
-        """Return joint i's rate."""
-        return self._element(("rate", i))
-
-    def acceleration(self, i: int) -> Element:
-        """Return joint i's acceleration."""
-        return self._element(("acceleration", i))
-
-    def sum(self, elements: Iterable[Element]) -> Element:
-        """Return the sum of elements."""
-        total = self.zero.polynomial
-        for element in elements:
-            total = total + element.polynomial
-        return Element(self, total)
-
-    def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
-        """Return the element of coefficients by monomial, in the order of :attr:`generators`."""
-        return Element(self, self.polynomials.from_terms(terms)).reduced()
-
-    @cached_property
-    def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
-        """Places of each angle's sine and cosine, and the joints that it is the sum of."""
-        cosines = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
-        return tuple((k, cosines[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
+        return Reader(self, self.units).angle(angle)
 
     @cached_property
     def _expansions(self) -> dict[int, Element]:
@@ -284,43 +182,6 @@ class Ring:
                 units.setdefault(monomial, []).append(unit)
         return units
 
-    @property
-    def n(self) -> int:
-        """The number of joints."""
-        return len(self.kinds)
-
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """The constants' texts."""
-        return tuple(g.text for g in self.generators if g.kind == "constant")
-
-    def place(self, kind: str, which: int | str) -> int:
-        """Return the place of a generator in a monomial, by its kind and its joint or, for a constant, its text."""
-        return self._places[kind, which]
-
-    # Values
-
-    def values(
-        self,
-        constants: Mapping[str, float],
-        q: Array,
-        qd: Array | None = None,
-        qdd: Array | None = None,
-    ) -> list[Any]:
-        """Return a number or an array (...) for each generator, for states (..., n)."""
-        zero = np.zeros_like(q)
-        states = {"rate": zero if qd is None else qd, "acceleration": zero if qdd is None else qdd, "position": q}
-        values: list[Any] = []
-        for g in self.generators:
-            if g.kind == "constant":
-                values.append(constants[g.text])
-            elif g.kind in ("sine", "cosine"):
-                angle = sum(q[..., joint] for joint in g.joints)
-                values.append(np.sin(angle) if g.kind == "sine" else np.cos(angle))
-            else:
-                values.append(states[g.kind][..., g.joint])
-        return values
-
 
 def _sum_of_angles(
     ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
@@ -335,6 +196,44 @@ def _sum_of_angles(
             s_own, c_own = s_own * c_less - c_own * s_less, c_own * c_less + s_own * s_less
         s, c = s * c_own + c * s_own, c * c_own - s * s_own
     return s, c
+
+
+def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int, Element]) -> Element:
+    """Return an element in another ring.
+
+    Parameters
+    ----------
+    element
+        Of any ring.
+    ring
+        Where the result is.
+    replacements
+        What generators become, by their place in the element's ring; others become those of the same kind and name.
+    """
+    own = element.ring.generators
+    powers: dict[tuple[int, int], Element] = {}
+    kept = [k for k in range(len(own)) if k not in replacements]
+    targets: dict[int, int] = {}
+    parts: dict[Monomial, dict[Monomial, Fraction]] = {}
+    for monomial, coefficient in element.terms.items():
+        replaced = tuple(monomial[k] for k in replacements)
+        moved = [0] * len(ring.generators)
+        for k in kept:
+            if monomial[k]:
+                if k not in targets:
+                    targets[k] = ring.place(*own[k].key)
+                moved[targets[k]] = monomial[k]
+        parts.setdefault(replaced, {})[tuple(moved)] = coefficient
+    total = []
+    for exponents, group in parts.items():
+        product = ring.one
+        for k, exponent in zip(replacements, exponents, strict=True):
+            if exponent:
+                if (k, exponent) not in powers:
+                    powers[k, exponent] = replacements[k] ** exponent
+                product = product * powers[k, exponent]
+        total.append(ring.from_terms(group) * product)
+    return ring.sum(total)
 
 
 def angle_name(joints: Sequence[int]) -> str:

@@ -1,0 +1,15 @@
+"""Exit statuses of the command."""
+
+from enum import IntEnum
+
+
+class ExitStatus(IntEnum):
+    """What the command returns to the shell."""
+
+    FINE = 0
+    NO = 1
+    """The answer is no: not verified, answer wrong, unreachable."""
+    UNUSABLE = 2
+    """Unusable input; one line on stderr says what and where."""
+    INTERRUPTED = 130
+    """Ctrl-C: 128 and the number of SIGINT, as shells have it."""

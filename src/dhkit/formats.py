@@ -1,0 +1,23 @@
+"""Printers, readers and writers of values by name: a value looks its own up here, and imports none of them.
+
+Packages register the functions when they are imported; a function's module is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+_MODULES: dict[str, str] = {}
+
+
+def register_formats(module: str, *functions: str) -> None:
+    """Make functions of a module known by their names."""
+    _MODULES.update(dict.fromkeys(functions, module))
+
+
+def format_function(name: str) -> Callable[..., Any]:
+    """Return the function registered by this name."""
+    function: Callable[..., Any] = getattr(importlib.import_module(_MODULES[name]), name)
+    return function
