@@ -57,10 +57,10 @@ $(ACCEPT_READY): $(TEST_READY)
 	@touch $@
 
 bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside peers; writes benchmarks/results/
-	$(BIN)/python benchmarks/kinematics.py $(ARGS)
-	$(BIN)/python benchmarks/dynamics.py $(ARGS)
-	$(BIN)/python benchmarks/planning.py
-	$(BIN)/python benchmarks/control.py
+	$(BIN)/python -m benchmarks.kinematics $(ARGS)
+	$(BIN)/python -m benchmarks.dynamics $(ARGS)
+	$(BIN)/python -m benchmarks.planning
+	$(BIN)/python -m benchmarks.control
 
 $(BENCH_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
@@ -68,7 +68,7 @@ $(BENCH_READY): $(READY)
 
 assets: $(READY)  ## generate urdf/, meshes/, the tables of docs/control.md and the pictures of docs/lab.md anew
 	$(BIN)/python -m dhkit.model.assets
-	$(BIN)/python benchmarks/controllers.py
+	$(BIN)/python -m benchmarks.controllers
 	$(BIN)/python docs/screenshots.py
 
 lowest:  ## the tests with the oldest versions that pyproject.toml allows

@@ -1,15 +1,183 @@
-"""Make the tables of all controllers in docs/control.md anew (`make assets`). Takes half a minute."""
+"""All controllers on one motion of three arms: makes the tables of docs/control.md anew (`make assets`), in 30 s."""
+
+from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
-from dhkit.bench.controllers import with_tables
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.control import CONTROLLERS, ComputedTorque, FrictionCompensation, Plant, SimulationResult, compare
 from dhkit.description import write_atomically
+from dhkit.dynamics import Friction
+from dhkit.errors import SimulationError
+from dhkit.trajectories import Trajectory
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "control.md"
+DURATION = 2.0
+"""s."""
+COMPENSATED = "computed-torque, friction compensated"
+BEGIN, END = "<!-- benchmarks/controllers.py writes from here -->", "<!-- to here -->"
+"""Lines of a Markdown file between which the tables stand."""
+
+Progress = Callable[[str], None]
 
 
-def main():
+@dataclass(frozen=True, eq=False)
+class Case:
+    """An arm, its motion, and what its controllers do not know of."""
+
+    arm: Arm
+    motion: Trajectory
+    """A quintic polynomial from rest to rest."""
+    payload: float
+    """kg, at the tool."""
+    text: str
+    """What stands above the table."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far an arm is from its motion under one controller; of the joint that errs most, or None if not simulated."""
+
+    peak: float | None
+    """Largest error with the right model, rad."""
+    rms: float | None
+    """Root of the mean square of the same error, rad."""
+    final: float | None
+    """Error at the end of the motion, rad."""
+    tool: float | None
+    """Largest distance of the tool from its reference, mm."""
+    payload: float | None
+    """Largest error with a payload that the controller does not know, rad."""
+    friction: float
+    """Largest error with the friction of the robot file, rad."""
+
+
+@cache
+def cases() -> tuple[Case, ...]:
+    """Return the PUMA 560, two rods, and the second and third link of the seed paper's PUMA 560."""
+    puma, rods = Arm.load("puma560"), Arm.load("planar2r")
+    links = Arm.load("puma560_cao").lock({0: 0.0, 3: 0.0, 4: 0.0, 5: 0.0})
+    return (
+        Case(
+            puma,
+            puma.quintic(puma.configurations["nominal"], puma.configurations["ready"], DURATION),
+            2.5,
+            "**`puma560`**, from `nominal` to `ready`; the payload is 2.5 kg.",
+        ),
+        Case(
+            rods,
+            rods.quintic(np.radians([0, 30]), np.radians([60, 120]), DURATION),
+            0.4,
+            "**`planar2r`**, two uniform rods, from (0°, 30°) to (60°, 120°); the payload is 0.4 kg.",
+        ),
+        Case(
+            links,
+            links.quintic(np.radians([135, 0]), np.radians([75, -60]), DURATION),
+            2.5,
+            "**`puma560_cao`** with joints 2 and 3 free and the others held at 0, from (135°, 0°) to (75°, -60°); the"
+            "\npayload is 2.5 kg.",
+        ),
+    )
+
+
+def errors_of(
+    case: Case, names: Sequence[str] = tuple(CONTROLLERS), progress: Progress | None = None
+) -> dict[str, Errors]:
+    """Return the errors of controllers by name, and those of computed torque with its friction compensated.
+
+    Parameters
+    ----------
+    case
+        The arm and its motion.
+    names
+        Of controllers, as ``CONTROLLERS`` has them.
+    progress
+        Called with a line before each plant.
+
+    Raises
+    ------
+    SimulationError
+        A controller does not reach the end.
+    """
+    arm = case.arm
+    plants = {
+        "right": Plant(arm.description),
+        "payload": Plant(arm.with_payload(case.payload).description),
+        "friction": Plant(arm.description, Friction()),
+    }
+    runs: dict[str, dict[str, SimulationResult]] = {}
+    for plant_name, plant in plants.items():
+        if progress is not None:
+            progress(f"{arm.name}: {len(names)} controllers, {plant_name}")
+        comparison = compare(arm.description, case.motion, names, plant=plant)
+        for name, why in comparison.failures.items():
+            raise SimulationError(f"{arm.name}, {plant_name}: {name}: {why}")
+        runs[plant_name] = dict(comparison.results)
+    found = {
+        name: Errors(
+            peak=_largest(run),
+            rms=float(run.rms_error.max()),
+            final=float(np.abs(run.final_error).max()),
+            tool=1e3 * run.tool_norms.peak,
+            payload=_largest(runs["payload"][name]),
+            friction=_largest(runs["friction"][name]),
+        )
+        for name, run in runs["right"].items()
+    }
+    compensated = FrictionCompensation(ComputedTorque.tuned(arm))
+    friction = _largest(arm.simulate(compensated, case.motion, friction=True))
+    return found | {COMPENSATED: Errors(None, None, None, None, None, friction)}
+
+
+def _largest(run: SimulationResult) -> float:
+    return float(run.peak_error.max())
+
+
+HEADINGS = {
+    "peak": "largest, rad",
+    "rms": "RMS, rad",
+    "final": "final, rad",
+    "tool": "tool, mm",
+    "payload": "payload, rad",
+    "friction": "friction, rad",
+}
+"""Of a table's columns, by the fields of ``Errors``."""
+
+
+def with_tables(text: str, progress: Progress | None = None) -> str:
+    """Return a Markdown text with its tables made anew.
+
+    Raises
+    ------
+    ValueError
+        The text has no place for them: ``BEGIN`` and after it ``END``, once each.
+    """
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end) or BEGIN in rest or END in after:
+        raise ValueError(f"expected one line {BEGIN!r} and after it one line {END!r}")
+    tables = [f"{case.text}\n\n{table(errors_of(case, progress=progress))}" for case in cases()]
+    return "\n\n".join([before + BEGIN, *tables, END + after])
+
+
+def table(errors: Mapping[str, Errors]) -> str:
+    """Return errors by their controllers' names as a Markdown table, numbers with two significant digits."""
+    rows = [["controller", *HEADINGS.values()], ["---"] * (len(HEADINGS) + 1)]
+    rows += [[name, *(_printed(getattr(row, field)) for field in HEADINGS)] for name, row in errors.items()]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _printed(value: float | None) -> str:
+    return "" if value is None else f"{value:#.2g}".rstrip(".")
+
+
+def main() -> None:
     """Simulate, and write the tables."""
     text = with_tables(PAGE.read_text("utf-8"), lambda line: print(line, file=sys.stderr, flush=True))
     write_atomically(PAGE, text)

@@ -1,14 +1,8 @@
-"""Time dynamics beside its peers (`make bench`): benchmarks/results/dynamics.md and .json.
+"""Time dynamics beside its peers, and hold it against our targets: benchmarks/results/dynamics.md, .json."""
 
-Arguments are those of `dhkit bench`, as in ``--robot ur5 --batch 10000``.
-"""
-
-import sys
 from pathlib import Path
 
-from dhkit.cli import main
-
-RESULT = Path(__file__).parent / "results" / "dynamics"
+from benchmarks.targets import main
 
 if __name__ == "__main__":
-    main(["bench", "inverse_dynamics", "mass_matrix", "forward_dynamics", "--output", str(RESULT), *sys.argv[1:]])
+    main(("inverse_dynamics", "mass_matrix", "forward_dynamics"), Path(__file__).parent / "results" / "dynamics")

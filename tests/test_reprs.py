@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.motion_report import MeshBuild, MotionReport, MotionRow
+from benchmarks.simulation_report import BatchRow, SimulationReport, Timing
 
 import dhkit
 from dhkit import bench, control, description, grading, kinematics, lab, model, planning, programs, symbolic
 from dhkit import trajectories as motions
-from dhkit.bench.motion_report import MeshBuild, MotionReport, MotionRow
-from dhkit.bench.simulation_report import BatchRow, SimulationReport, Timing
 from dhkit.control.batch_result import History
 from dhkit.display import LONGEST_LINE, MOST_ROWS, html_table, plain, repr_line
 from dhkit.dynamics import ParameterGrouping, dynamics_graph, parameter_grouping

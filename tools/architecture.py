@@ -1,6 +1,6 @@
 """Check the shape of the package: no import circles, no splinters, no oversized files, a test for each module.
 
-Imports inside functions and under ``TYPE_CHECKING`` count, and so do the names that a package registers for lazy import.
+Imports inside functions and under ``TYPE_CHECKING`` count, and so do modules that a package names for lazy import.
 
     python tools/architecture.py            # the checks; exit status 1 and one line a fault
     python tools/architecture.py --lines    # code lines a package, without blank lines, comments and docstrings
@@ -107,9 +107,9 @@ def code_lines(text: str) -> int:
     for node in ast.walk(ast.parse(text)):
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else []:
-            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
-                if isinstance(statement.value.value, str):
-                    lines.difference_update(range(statement.lineno, (statement.end_lineno or statement.lineno) + 1))
+            value = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                lines.difference_update(range(statement.lineno, (statement.end_lineno or statement.lineno) + 1))
     return len(lines)
 
 

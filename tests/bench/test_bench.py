@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from benchmarks.targets import targets
 
 from dhkit import Arm, pose, robots
 from dhkit.bench import (
+    BenchReport,
     Contender,
+    Machine,
     Missing,
     Mode,
     PeakMemory,
@@ -29,8 +33,7 @@ from dhkit.bench.agreement import judge
 from dhkit.bench.contenders import import_peer, one_by_one
 from dhkit.bench.geometry import OrthoParallel, bare, joint_axes
 from dhkit.bench.peers import all_contenders, dhkit_arm, pinocchio
-from dhkit.bench.report import duration
-from dhkit.bench.required import requirements
+from dhkit.bench.report import BATCH, duration
 from dhkit.bench.rounds import items_within
 from dhkit.cli import main
 
@@ -92,8 +95,9 @@ def test_a_report_is_complete(name):
     reference = next(row for row in report.rows if row.contender == dhkit_arm.BATCH)
     assert reference.times_batch == 1
     assert report.machine.python.endswith(sys.version.split()[0])
-    assert {line.quantity for line in report.requirements} == {"fk", "jacobian"}
-    assert all(line.met is None for line in report.requirements)  # asked at a larger batch
+    asked = targets(report)
+    assert {line.quantity for line in asked} == {"fk", "jacobian"}
+    assert all(line.met is None for line in asked)  # asked at a larger batch
 
 
 def test_a_report_is_json_and_markdown():
@@ -339,12 +343,12 @@ def test_a_process_that_fails_says_why():
 def test_requirements_are_judged_where_they_are_asked():
     scaling, memory = ThreadScaling("fk", 1.7, 1.9), PeakMemory("fk", "out=", 48, 128, 16)
     assert memory.share == pytest.approx((48 + 128 + 16) / (48 + 128))
-    asked = requirements([], ["fk"], [scaling], [memory], [], as_asked=True)
+    report = BenchReport("puma560", BATCH, 1, 0, (), (), (), (scaling,), (memory,), (), Machine.here())
+    asked = targets(report)
     met = {line.what: line.met for line in asked}
     assert met["scaling to two threads over a control loop's"] is True
     assert met["peak memory over inputs and outputs (out=)"] is True
-    assert met["times a loop over pin.forwardKinematics"] is None
-    unasked = requirements([], ["fk"], [scaling], [memory], [], as_asked=False)
+    unasked = targets(replace(report, batch=1000))
     assert {line.met for line in unasked} == {None}
 
 

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks import planning as motions
+from benchmarks.planning import compare_motions, holdable_pairs
 
 from acceptance import only_accepting
-from dhkit.bench import motions
 from dhkit.bench.contenders import UnavailableError
-from dhkit.bench.motions import compare_motions, holdable_pairs
 from dhkit.description import library_robot
 from dhkit.dynamics import gravity_torque
 

@@ -9,8 +9,8 @@ import pytest
 from dhkit import Arm
 from dhkit.bench import Contender, Ending, Missing, Mode, Row, Task, UnavailableError, Verdict, rounds, run, runner
 from dhkit.bench.contenders import one_by_one
-from dhkit.bench.outcomes import outcome_of
 from dhkit.bench.peers import dhkit_arm, pinocchio
+from dhkit.bench.runner import outcome_of
 from dhkit.cli import main
 
 OWN = Missing("fk", "dhkit", "failed: RuntimeError: x", failed=True, own=True)

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks import control as simulations
+from benchmarks.control import SimulationSizes, compare_simulations
+from benchmarks.peers.aba_loop import AbaLoop, default_swing
 
 from dhkit import Arm
-from dhkit.bench import rounds, simulations
+from dhkit.bench import rounds
 from dhkit.bench.contenders import UnavailableError
-from dhkit.bench.peers.aba_loop import AbaLoop, default_swing
-from dhkit.bench.simulations import SimulationSizes, compare_simulations
 from dhkit.control import PDGravity
 
 TINY = SimulationSizes(single=0.02, arms=3, batch=0.05, swing=0.1, controlled=0.1, repeats=2)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.controllers import BEGIN, COMPENSATED, END, HEADINGS, Errors, cases, errors_of, table, with_tables
 
 from acceptance import only_accepting
-from dhkit.bench.controllers import BEGIN, COMPENSATED, END, HEADINGS, Errors, cases, errors_of, table, with_tables
 from dhkit.control import CONTROLLERS, PID, Plant, compare, make_controller
 from dhkit.description import library_robot
 from dhkit.trajectories import quintic
@@ -140,7 +140,7 @@ def test_what_the_page_says_of_the_tables(name):
 
 def test_a_page_keeps_what_stands_around_its_tables(monkeypatch):
     some = Errors(0.012345, 1.7e-5, 1e-5, 97.0, 0.1, 7.0)
-    monkeypatch.setattr("dhkit.bench.controllers.errors_of", lambda case, progress: {"pid": some})
+    monkeypatch.setattr("benchmarks.controllers.errors_of", lambda case, progress: {"pid": some})
     text = with_tables(f"before\n{BEGIN}\nold\n{END}\nafter")
     assert text.startswith(f"before\n{BEGIN}\n\n**`puma560`**") and text.endswith(f"|\n\n{END}\nafter")
     assert text.count("| pid | 0.012 | 1.7e-05 | 1.0e-05 | 97 | 0.10 | 7.0 |") == 3

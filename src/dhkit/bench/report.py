@@ -212,14 +212,14 @@ class BenchReport:
         How the comparison of each quantity ended; an interrupted run has those that it finished.
     scaling, memory, starts
         Two threads against one, peak memory, time of a second process.
-    requirements
-        What is asked of dhkit, beside what was measured.
     machine
         Where it ran.
     interrupted
         Whether it was stopped before the end.
     derivations, operations
         How long equations take to derive, and how many operations they are.
+    requirements
+        Targets that the run was held against, beside what was measured; none unless asked for.
     """
 
     robot: str
@@ -232,11 +232,11 @@ class BenchReport:
     scaling: tuple[ThreadScaling, ...]
     memory: tuple[PeakMemory, ...]
     starts: tuple[FirstCall, ...]
-    requirements: tuple[Requirement, ...]
     machine: Machine
     interrupted: bool = False
     derivations: tuple[Derivation, ...] = ()
     operations: tuple[Operations, ...] = ()
+    requirements: tuple[Requirement, ...] = ()
 
     def json(self) -> dict[str, Any]:
         """Return everything as what JSON knows: no NaN, no tuples, no classes."""
@@ -262,14 +262,15 @@ class BenchReport:
 
     def _repr_html_(self) -> str:
         endings = {outcome.quantity: outcome.ending.value for outcome in self.outcomes}
-        rows = [(quantity, *self._fastest(quantity), endings.get(quantity, "")) for quantity in self._quantities]
+        rows = [(quantity, *self._fastest(quantity), endings.get(quantity, "")) for quantity in self.quantities]
         headings = ("quantity", "dhkit, an item", "the fastest peer", "an item", "ended")
         return report_html(
             self._title, self.machine.facts, html_table(headings, rows, align="lrlrl"), self.requirements
         )
 
     @property
-    def _quantities(self) -> tuple[str, ...]:
+    def quantities(self) -> tuple[str, ...]:
+        """The quantities that were timed."""
         return tuple(dict.fromkeys(row.quantity for row in self.rows))
 
     def _fastest(self, quantity: str) -> tuple[str, str, str]:
@@ -292,7 +293,7 @@ class BenchReport:
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
         tables: list[Table] = [
             (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
-            for quantity in self._quantities
+            for quantity in self.quantities
         ]
         tables += [
             ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,11 +12,9 @@ from dhkit.bench.agreement import Verdict, judge
 from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, UnavailableError, Workload
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
-from dhkit.bench.outcomes import outcome_of
 from dhkit.bench.peers import all_contenders, dhkit_arm
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
-from dhkit.bench.report import BATCH, BenchReport, Missing, Outcome, Row
-from dhkit.bench.required import requirements
+from dhkit.bench.report import BATCH, BenchReport, Ending, Missing, Outcome, Requirement, Row
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
@@ -65,6 +63,7 @@ def run(
     *,
     probes: bool = True,
     contenders: Sequence[Contender] | None = None,
+    targets: Callable[[BenchReport], tuple[Requirement, ...]] | None = None,
 ) -> BenchReport:
     """Time dhkit beside every peer that is installed, in one process and in interleaved rounds.
 
@@ -88,6 +87,8 @@ def run(
         Whether to measure threads, memory and new processes too, and with dynamics derivations.
     contenders
         Who takes part; everyone unless given.
+    targets
+        Returns the requirements that the report is held against; none unless given.
 
     Returns
     -------
@@ -125,17 +126,7 @@ def run(
                 _derive(arm, findings)
     except KeyboardInterrupt:
         interrupted = True
-    asked = requirements(
-        findings.rows,
-        quantities,
-        findings.scaling,
-        findings.memory,
-        findings.starts,
-        findings.derivations,
-        findings.operations,
-        as_asked=batch >= BATCH and threads == 1,
-    )
-    return BenchReport(
+    report = BenchReport(
         robot=arm.name,
         batch=batch,
         threads=threads,
@@ -148,10 +139,49 @@ def run(
         starts=tuple(findings.starts),
         derivations=tuple(findings.derivations),
         operations=tuple(findings.operations),
-        requirements=asked,
         machine=Machine.here(),
         interrupted=interrupted,
     )
+    return replace(report, requirements=targets(report)) if targets else report
+
+
+def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -> Outcome:
+    """Return how the comparison of a quantity ended.
+
+    A contender fails where it raises an error, and where its answers disagree with the reference. One that is not
+    installed, or not made for the arm, does not fail: it counts only where dhkit itself, or every contender, is so.
+
+    Parameters
+    ----------
+    quantity
+        What was compared.
+    rows
+        Figures of contenders; those of other quantities do not count.
+    missing
+        Contenders without figures, likewise.
+
+    Examples
+    --------
+    >>> print(outcome_of("fk", [], [Missing("fk", "peer", "failed: TypeError: 7 arguments", failed=True)]))
+    fk: every contender failed; peer: failed: TypeError: 7 arguments
+    """
+    rows = [row for row in rows if row.quantity == quantity]
+    missing = [gap for gap in missing if gap.quantity == quantity]
+    raised = [(gap.own, f"{gap.name}: {gap.reason}") for gap in missing if gap.failed]
+    disagreeing = [(row.own, f"{row.contender}: {row.verdict}") for row in rows if not row.verdict.ok]
+    own_failed = tuple(cause for own, cause in (*raised, *disagreeing) if own)
+    peers_failed = tuple(cause for own, cause in (*raised, *disagreeing) if not own)
+    own_unavailable = tuple(f"{gap.name}: {gap.reason}" for gap in missing if gap.own and not gap.failed)
+
+    if not any(row.verdict.ok for row in rows):
+        if own_failed or peers_failed:
+            return Outcome(quantity, Ending.ALL_FAILED, (*own_unavailable, *own_failed, *peers_failed))
+        return Outcome(quantity, Ending.NOTHING_TIMED, tuple(f"{gap.name}: {gap.reason}" for gap in missing))
+    if own_failed:
+        return Outcome(quantity, Ending.OWN_FAILED, own_failed)
+    if own_unavailable and not any(row.own for row in rows):
+        return Outcome(quantity, Ending.OWN_MISSING, own_unavailable)
+    return Outcome(quantity, Ending.PEERS_FAILED if peers_failed else Ending.COMPLETE, peers_failed)
 
 
 def _check(quantities: Sequence[str], **counts: int) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json as json_format
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol
 
 from dhkit.arm import Arm
-from dhkit.bench import BenchReport, Ending
+from dhkit.bench import BenchReport, Ending, Requirement
 from dhkit.bench import run as run_bench
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import print_json, say
@@ -27,6 +28,7 @@ def run(
     probes: bool,
     output: Path | None,
     json: bool,
+    targets: Callable[[BenchReport], tuple[Requirement, ...]] | None = None,
 ) -> int:
     """Run the benchmark, print its report, and say on stderr which quantities failed.
 
@@ -36,7 +38,7 @@ def run(
     if output is not None:
         check_place(output)
     progress = _Progress()
-    report = run_bench(arm, quantities, batch, threads, repeats, seed, progress.show, probes=probes)
+    report = run_bench(arm, quantities, batch, threads, repeats, seed, progress.show, probes=probes, targets=targets)
     progress.clear()
     for path in write(report, output) if output else ():
         sys.stderr.write(f"dhkit: wrote {path}\n")
@@ -52,7 +54,17 @@ def run(
     return 0 if all(outcome.ok for outcome in report.outcomes) else 1
 
 
-def write(report: BenchReport, path: Path) -> tuple[Path, Path]:
+class Report(Protocol):
+    """A report that can be written: of quantities, motions or simulations."""
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+
+    def json(self) -> dict[str, object]:
+        """Return the report as plain data."""
+
+
+def write(report: Report, path: Path) -> tuple[Path, Path]:
     """Write a report as Markdown and as JSON, whatever the path's ending; return the two files."""
     files = path.with_suffix(".md"), path.with_suffix(".json")
     write_atomically(files[0], report.markdown())

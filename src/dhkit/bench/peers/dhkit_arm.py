@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.bench.contenders import QUANTITIES, Contender, Mode, Task, UnavailableError, Workload, one_by_one
+from dhkit.bench.contenders import QUANTITIES, Call, Contender, Mode, Task, UnavailableError, Workload, one_by_one
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 
@@ -96,3 +96,29 @@ def _answers(quantity: str, result: Any) -> Sequence[Array]:
     if quantity != "ik":
         return list(result)
     return [q[valid] for q, valid in zip(result.q, result.valid, strict=True)]
+
+
+def casadi_contenders() -> tuple[Contender, ...]:
+    """Return CasADi's virtual machine mapped over a batch, for each quantity of dynamics."""
+    return tuple(
+        Contender("CasADi map", quantity, Mode.BATCH, _mapped(quantity))
+        for quantity in ("inverse_dynamics", "mass_matrix", "forward_dynamics")
+    )
+
+
+def _mapped(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        function, inputs, n = getattr(workload.arm.casadi, quantity), workload.inputs(quantity), workload.arm.n
+
+        def prepare(items: int) -> Call:
+            mapped = function.map(items)
+            columns = [np.asfortranarray(x[:items].T) for x in inputs]
+            return lambda: mapped(*columns)
+
+        def answers(k: int) -> list[Array]:
+            result = np.array(prepare(k)())
+            return list(result.T) if result.shape == (n, k) else list(result.reshape(n, k, n).swapaxes(0, 1))
+
+        return Task(prepare, answers)
+
+    return setup

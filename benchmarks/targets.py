@@ -1,22 +1,28 @@
-"""What dhkit must reach beside its peers, and whether it did."""
+"""Targets that dhkit sets itself beside its peers, and a run of `dhkit bench` that is held against them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PROOFS, Derivation, Operations
+from dhkit.arm import Arm
+from dhkit.bench import BenchReport, Requirement, Row
+from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PROOFS
 from dhkit.bench.peers import eaik, pinocchio
-from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
-from dhkit.bench.report import Requirement, Row
+from dhkit.bench.report import BATCH
+from dhkit.bench.runner import REPEATS
+from dhkit.cli.bench import run
 
 PIN_CALL = 0.25
-"""µs of a pin.forwardKinematics call on the machine that a single call's figure is asked on."""
+"""Time of a pin.forwardKinematics call, µs, on the machine that the target for a single call is stated for."""
 
 
 @dataclass(frozen=True)
 class _Comparison:
-    """A requirement on a peer's row."""
+    """A target for the ratio of a peer's time to dhkit's."""
 
     quantity: str
     what: str
@@ -28,7 +34,7 @@ class _Comparison:
 
 
 DERIVED = {CASADI: 0.5, PROOFS: 5.0}
-"""s that derivations may take."""
+"""Longest times of derivations, s, by name."""
 COMPARISONS = (
     _Comparison(
         "fk",
@@ -83,58 +89,38 @@ COMPARISONS = (
 )
 
 
-def requirements(
-    rows: Iterable[Row],
-    quantities: Iterable[str],
-    scaling: Iterable[ThreadScaling],
-    memory: Iterable[PeakMemory],
-    starts: Iterable[FirstCall],
-    derived: Iterable[Derivation] = (),
-    counted: Iterable[Operations] = (),
-    *,
-    as_asked: bool,
-) -> tuple[Requirement, ...]:
-    """Return what is asked of the quantities, beside what was measured.
-
-    Parameters
-    ----------
-    rows, scaling, memory, starts, derived, counted
-        What was measured.
-    quantities
-        What the run was about.
-    as_asked
-        Whether batch and threads are those that the figures are asked at.
-    """
-    by_name = {(row.quantity, row.contender): row for row in rows}
-    wanted = set(quantities)
+def targets(report: BenchReport) -> tuple[Requirement, ...]:
+    """Return the targets for the quantities of a report, beside what was measured."""
+    as_asked = report.batch >= BATCH and report.threads == 1
+    rows = {(row.quantity, row.contender): row for row in report.rows}
     return (
-        *(_compared(line, by_name, as_asked) for line in COMPARISONS if line.quantity in wanted),
+        *(_compared(line, rows, as_asked) for line in COMPARISONS if line.quantity in report.quantities),
         *(
             Requirement(
                 line.quantity, "scaling to two threads over a control loop's", 0.85, False, line.share, as_asked
             )
-            for line in scaling
+            for line in report.scaling
         ),
         *(
             Requirement(
                 line.quantity, f"peak memory over inputs and outputs ({line.called})", 3.0, True, line.share, as_asked
             )
-            for line in memory
+            for line in report.memory
         ),
         *(
             Requirement(
                 line.quantity, "s from the start of a second process to its first batch", 2.0, True, line.second
             )
-            for line in starts
+            for line in report.starts
         ),
         *(
             Requirement(line.robot, f"s: {line.what}", DERIVED[line.what], True, line.seconds)
-            for line in derived
+            for line in report.derivations
             if line.what in DERIVED
         ),
         *(
             Requirement("inverse_dynamics", "additions and multiplications", 400, True, line.total, target=305)
-            for line in counted
+            for line in report.operations
             if line.program == INVERSE_DYNAMICS
         ),
     )
@@ -144,3 +130,18 @@ def _compared(line: _Comparison, rows: Mapping[tuple[str, str], Row], as_asked: 
     row = rows.get((line.quantity, line.peer))
     measured = line.figure(row) if row else None
     return Requirement(line.quantity, line.what, line.required, line.at_most, measured, as_asked, line.target)
+
+
+def main(quantities: Sequence[str], result: Path, arguments: Sequence[str] | None = None) -> None:
+    """Run `dhkit bench` on some quantities, and write the report with the targets."""
+    parser = argparse.ArgumentParser(description=f"dhkit beside its peers: {', '.join(quantities)}.")
+    parser.add_argument("--robot", default="puma560", help="of the library, or a robot file (default: puma560)")
+    parser.add_argument("--batch", type=int, default=BATCH, help="items of a batch (default: %(default)s)")
+    parser.add_argument("--threads", type=int, default=1, help="that batch calls may use (default: 1)")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="rounds (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--no-probes", dest="probes", action="store_false", help="no threads, memory and processes")
+    parser.add_argument("--output", type=Path, default=result, help="path of the results, without ending")
+    chosen = vars(parser.parse_args(arguments))
+    arm = Arm.load(chosen.pop("robot"))
+    sys.exit(run(arm, quantities, **chosen, json=False, targets=targets))
