@@ -484,9 +484,9 @@ def cell(**variables):
 
 TRIANGLE = {"F1": [[1, 2, 3]], "V1": np.eye(3)}
 BAD_MATS = {
-    "no MAT file": (lambda path: path.write_bytes(b"x" * 500), "no MAT file of format 5"),
+    "no MAT file": (lambda path: path.write_bytes(b"x" * 500), "no .mat file of format 5"),
     "HDF5": (lambda path: path.write_bytes(b"MATLAB 7.3 MAT-file" + b" " * 493 + b"\x89HDF\r\n\x1a\n"), "format 7.3"),
-    "empty": (lambda path: path.write_bytes(b""), "no MAT file of format 5"),
+    "empty": (lambda path: path.write_bytes(b""), "no .mat file of format 5"),
     "no structs": (cell(x=np.eye(3)), "no struct with fields F, V"),
     "faces of nothing": (cell(s1=TRIANGLE | {"F1": [[1, 2, 4]]}), "a face with a vertex that is none of 1 to 3"),
     "index 0": (cell(s1=TRIANGLE | {"F1": [[0, 1, 2]]}), "none of 1 to 3"),

@@ -172,12 +172,16 @@ def test_what_is_wrong_with_a_table_is_named(text, complaint, tmp_path):
         ("    sec: 0\n", "    sec: &a 0\n", r"line 3: found 'sec: &a 0'; expected a number or a name"),
         ("    sec: 0\n", "   sec: 0\n", r"line 4: found 'nanosec: 0'; expected"),
         ("    sec: 0\n", "\tsec: 0\n", r"line 3: .*expected"),
-        ("  frame_id: ''", "  frame_id: '", r"line 5: .*expected text in one pair of quotes"),
+        (
+            "  frame_id: ''",
+            "  frame_id: '",
+            r"line 5: .*expected YAML \(while scanning a quoted scalar",
+        ),
         ("  frame_id: ''", "  stamp: 1", r"line 5: found 'stamp: 1'; expected 'stamp' once"),
         ("---\n", "---\nheader: 1\n", r"expected one message, not several"),
         ("- elbow\n", "- " * 40 + "elbow\n", r"line 7: .*expected"),
         ("header:\n", "".join(f"{' ' * k}a:\n" for k in range(20)), r"line \d+: .*expected"),
-        ("points:", "points: [[1]]", r"expected a list that ends with"),
+        ("points:", "points: [[1]]", r"line 10: found '- positions:'; expected YAML"),
     ],
 )
 def test_what_is_wrong_with_a_message_is_named(old, new, complaint, tmp_path):

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.lib import format as npy
 
+from dhkit.description import mat_files
 from dhkit.errors import DescriptionError
 from dhkit.trajectories.labels import TEXTS, FileKind
-from dhkit.trajectories.matlab import read_variables
 
 ARCHIVES = (".npz", ".mat")
-MOST_FORMAT = 1_000
-"""Bytes of the text ``format``."""
+MAX_FORMAT_BYTES = 1_000
+"""Largest size of the text ``format``, bytes."""
+SAVED = "expected one that dhkit saved"
 
 
 def archive_bytes(suffix: str, values: Mapping[str, Any]) -> bytes:
@@ -54,12 +55,13 @@ def archive_format(suffix: str, content: bytes, most: int) -> str:
         A damaged ``.mat`` file.
     """
     if suffix == ".mat":
-        variable = read_variables(content, most).get("format")
-        return variable.value if variable is not None and isinstance(variable.value, str) else ""
+        variable = mat_files.read_mat(content, most, advice=SAVED).get("format")
+        value = variable.value if variable is not None else None
+        return value if isinstance(value, str) else ""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             info = archive.getinfo("format.npy")
-            return str(_npy(archive.read(info), "format")) if info.file_size <= MOST_FORMAT else ""
+            return str(_npy(archive.read(info), "format")) if info.file_size <= MAX_FORMAT_BYTES else ""
     except (KeyError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError, DescriptionError):
         return ""
 
@@ -118,7 +120,7 @@ def _npy(data: bytes, key: str) -> Any:
 
 def read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
     """Return texts and arrays by name, as :func:`read_npz`."""
-    variables = read_variables(content, kind.most)
+    variables = mat_files.read_mat(content, kind.most, advice=SAVED)
     _require_keys(variables, kind)
     keys = (*TEXTS, *kind.arrays, *(key for key in kind.optional if key in variables))
     found = {key: variables[key].value for key in keys}

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.mat_files import MatVariable, read_mat
 from dhkit.errors import DescriptionError
-from dhkit.trajectories.matlab import ARRAY_EXPORT, Variable, read_variables
 from dhkit.trajectories.tables import PREFIXES, TIMES, Table, joint_columns, place_of_name
 
+ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
+"""How to save in MATLAB what is not read."""
 MATRICES = tuple(prefixes[0] for prefixes in PREFIXES)
 """Our names of matrices with a column for each joint: values, rates, accelerations."""
 
@@ -36,7 +38,7 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
     DescriptionError
         No such file, a variable that is no array of real numbers, or arrays that do not fit together; names it.
     """
-    variables = read_variables(content, most)
+    variables = read_mat(content, most, advice=ARRAY_EXPORT)
     names = _chosen(description, variables, columns)
     n = description.n
     found: dict[str, Array] = {}
@@ -63,8 +65,8 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
 
 
 def _chosen(
-    description: Description, variables: Mapping[str, Variable], columns: Mapping[str, str]
-) -> dict[str, Variable]:
+    description: Description, variables: Mapping[str, MatVariable], columns: Mapping[str, str]
+) -> dict[str, MatVariable]:
     """Return variables by our names: times first, then matrices, then the joints' vectors that no matrix has.
 
     Capitals count as small letters but in the names of matrices: beside q, Q is often a weight.
@@ -74,7 +76,7 @@ def _chosen(
     candidates |= {prefixes[0]: [name for name in prefixes if name in variables] for prefixes in PREFIXES}
     for order, ours in enumerate(MATRICES):
         candidates |= {f"{ours}{i}": names for i, names in enumerate(joint_columns(description, order), start=1)}
-    chosen: dict[str, Variable] = {}
+    chosen: dict[str, MatVariable] = {}
     for ours, known in candidates.items():
         if ours in columns:
             chosen[ours] = variables[place_of_name(columns[ours], variables, "variable")]
@@ -84,13 +86,13 @@ def _chosen(
     return chosen
 
 
-def _numbers(variable: Variable) -> Array:
-    if not variable.readable:
-        raise DescriptionError(f"{variable.name}: found a {variable.kind}; {ARRAY_EXPORT}")
-    value = variable.value
+def _numbers(variable: MatVariable) -> Array:
+    value = variable.value if variable.readable else None
     if isinstance(value, str):
         raise DescriptionError(f"{variable.name}: found text; expected numbers")
-    return np.asarray(value)
+    if not isinstance(value, np.ndarray):
+        raise DescriptionError(f"{variable.name}: found a {variable.kind}; {ARRAY_EXPORT}")
+    return value
 
 
 def _vector(name: str, array: Array) -> Array:
@@ -114,6 +116,6 @@ def _add_times(found: dict[str, Array], name: str, times: Array) -> None:
         raise DescriptionError(f"{name} has times in its first column that are not those of the other variables")
 
 
-def _listed(variables: Mapping[str, Variable]) -> str:
+def _listed(variables: Mapping[str, MatVariable]) -> str:
     kinds = [name if each.readable else f"{name} ({each.kind})" for name, each in variables.items()]
     return ", ".join(kinds)[:120] or "nothing"

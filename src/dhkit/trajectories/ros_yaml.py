@@ -1,10 +1,13 @@
-"""The YAML of ROS messages: a strict reader of what its tools print, and a writer of JointTrajectory."""
+"""The YAML of ROS messages: a reader of JointTrajectory as ROS prints it, within bounds, and a writer."""
 
 from __future__ import annotations
 
+import itertools
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
+
+import yaml
 
 from dhkit.description import Array
 from dhkit.errors import DescriptionError
@@ -18,146 +21,78 @@ POINT = (*ROWS, "effort", "time_from_start")
 TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
 """Keys of a duration, whole seconds and nanoseconds: of ROS 2, which is written, and of ROS 1."""
 
-DEEPEST = 12
-LONGEST_LIST = 10_000
-"""Entries of a list within one line."""
-KEY = re.compile(r"([A-Za-z_]\w*):(?:\s+(.*))?$")
+MAX_DEPTH = 12
+"""Lists and mappings inside one another."""
 PLAIN = re.compile(r"[A-Za-z][\w.-]*")
-WORDS = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
-"""Plain scalars that YAML does not take for text."""
-
-
-@dataclass(frozen=True)
-class _Line:
-    number: int
-    indent: int
-    text: str
+NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
+"""Plain scalars that YAML does not read as text."""
 
 
 def parse_message(text: str) -> dict[str, Any]:
     """Return a message of nested mappings and lists; scalars stay text.
 
-    Read are block mappings and lists, lists in brackets within a line, quoted and plain scalars, comments, and one
-    document, which ``---`` may begin and end. Anchors, tags, block scalars and other documents are refused.
+    The text is YAML of one document without anchors and tags.
 
     Raises
     ------
     DescriptionError
         Names the line, what was found and what was expected.
     """
-    lines = _lines(text)
-    if not lines:
-        raise DescriptionError("empty; expected a JointTrajectory")
-    value, end = _block(lines, 0, lines[0].indent, 0)
-    if end < len(lines):
-        raise _wrong(lines[end], "another indentation")
-    if not isinstance(value, dict):
-        raise _wrong(lines[0], "keys of a message")
-    return value
+    events = yaml.parse(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
+    try:
+        message: Any = None
+        for event in events:
+            if isinstance(event, yaml.DocumentStartEvent):
+                value = _value(next(events), events, 0)
+                if message is not None and value:  # ROS ends a message with ---, which begins an empty document
+                    raise _UnexpectedError(event, "one message, not several")
+                message = value if message is None else message
+    except _UnexpectedError as error:
+        raise _wrong(text, error.event.start_mark, error.expected) from None
+    except yaml.MarkedYAMLError as error:
+        problem = " ".join(filter(None, (error.context, error.problem)))
+        # A text in quotes that does not end is noticed at the end of the file: where it begins is more use.
+        begin = error.context_mark if isinstance(error, yaml.scanner.ScannerError) else None
+        raise _wrong(text, begin or error.problem_mark, f"YAML ({problem})") from None
+    except yaml.YAMLError as error:
+        raise DescriptionError(f"no YAML: {' '.join(str(error).split())[:100]}") from None
+    if not isinstance(message, dict):
+        raise DescriptionError("no keys of a message in it; expected a JointTrajectory")
+    return message
 
 
-def _lines(text: str) -> list[_Line]:
-    lines: list[_Line] = []
-    ended = False
-    for number, raw in enumerate(text.splitlines(), start=1):
-        stripped = raw.strip()
-        if not stripped or stripped.startswith("#"):
-            continue
-        if stripped == "---":
-            ended = bool(lines)
-            continue
-        line = _Line(number, len(raw) - len(raw.lstrip(" ")), stripped)
-        if ended:
-            raise _wrong(line, "one message, not several")
-        if raw.lstrip(" ").startswith("\t"):
-            raise _wrong(line, "spaces, not tabs")
-        lines.append(line)
-    return lines
+class _UnexpectedError(Exception):
+    """An event of the YAML reader that a message does not have."""
+
+    def __init__(self, event: yaml.Event, expected: str) -> None:
+        self.event, self.expected = event, expected
 
 
-def _block(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[Any, int]:
-    """Return the mapping or list that begins at a line, and the line behind it."""
-    if depth > DEEPEST:
-        raise _wrong(lines[at], f"at most {DEEPEST} levels")
-    return (_list if _is_entry(lines[at]) else _mapping)(lines, at, indent, depth)
+def _value(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
+    """Return the text, list or mapping that begins with an event."""
+    if depth > MAX_DEPTH:
+        raise _UnexpectedError(event, f"at most {MAX_DEPTH} levels")
+    if getattr(event, "anchor", None) or getattr(event, "tag", None):
+        raise _UnexpectedError(event, "a number or a name")
+    if isinstance(event, yaml.ScalarEvent):
+        return event.value
+    if isinstance(event, yaml.SequenceStartEvent):
+        entries = itertools.takewhile(lambda entry: not isinstance(entry, yaml.SequenceEndEvent), events)
+        return [_value(entry, events, depth + 1) for entry in entries]
+    mapping: dict[str, Any] = {}
+    while not isinstance(key := next(events), yaml.MappingEndEvent):
+        if not isinstance(key, yaml.ScalarEvent):
+            raise _UnexpectedError(key, "key: value")
+        if key.value in mapping:
+            raise _UnexpectedError(key, f"{key.value!r} once")
+        mapping[key.value] = _value(next(events), events, depth + 1)
+    return mapping
 
 
-def _mapping(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[dict[str, Any], int]:
-    found: dict[str, Any] = {}
-    while at < len(lines) and lines[at].indent == indent and not _is_entry(lines[at]):
-        line = lines[at]
-        match = KEY.match(line.text)
-        if match is None:
-            raise _wrong(line, "key: value")
-        key, rest = match[1], _without_comment(match[2] or "")
-        if key in found:
-            raise _wrong(line, f"{key!r} once")
-        at += 1
-        if rest:
-            found[key] = _scalar_or_list(line, rest)
-        elif at < len(lines) and (lines[at].indent > indent or (lines[at].indent == indent and _is_entry(lines[at]))):
-            found[key], at = _block(lines, at, lines[at].indent, depth + 1)
-        else:
-            found[key] = ""
-    return found, at
-
-
-def _list(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[list[Any], int]:
-    found: list[Any] = []
-    while at < len(lines) and lines[at].indent == indent and _is_entry(lines[at]):
-        line = lines[at]
-        rest = _without_comment(line.text[1:].strip())
-        inner = indent + len(line.text) - len(line.text[1:].lstrip())
-        if not rest:
-            at += 1
-            if at == len(lines) or lines[at].indent <= indent:
-                raise _wrong(line, "a value behind '-'")
-            value, at = _block(lines, at, lines[at].indent, depth + 1)
-        elif KEY.match(rest):
-            # An entry's first key stands behind its dash: as if it began a line of its own.
-            lines[at] = _Line(line.number, inner, rest)
-            value, at = _mapping(lines, at, inner, depth + 1)
-        else:
-            value, at = _scalar_or_list(line, rest), at + 1
-        found.append(value)
-    return found, at
-
-
-def _scalar_or_list(line: _Line, text: str) -> Any:
-    if not text.startswith("["):
-        return _scalar(line, text)
-    if not text.endswith("]") or "[" in text[1:]:
-        raise _wrong(line, "a list that ends with ']' in the same line")
-    inside = text[1:-1].strip()
-    entries = inside.split(",", LONGEST_LIST) if inside else []
-    if len(entries) > LONGEST_LIST:
-        raise _wrong(line, f"at most {LONGEST_LIST} entries")
-    return [_scalar(line, entry.strip()) for entry in entries]
-
-
-def _scalar(line: _Line, text: str) -> str:
-    quote = text[:1]
-    if quote and quote in "'\"":
-        if len(text) < 2 or text[-1] != quote or quote in text[1:-1].replace("''", "") or "\\" in text:
-            raise _wrong(line, "text in one pair of quotes")
-        return text[1:-1].replace("''", "'")
-    if not text or text[0] in "&*!|>%@`{}[],?" or text.startswith("- ") or ": " in text:
-        raise _wrong(line, "a number or a name")
-    return text
-
-
-def _is_entry(line: _Line) -> bool:
-    return line.text == "-" or line.text.startswith("- ")
-
-
-def _without_comment(text: str) -> str:
-    if text.startswith("#"):
-        return ""
-    return text if text[:1] in ("'", '"') else text.split(" #", 1)[0].rstrip()
-
-
-def _wrong(line: _Line, expected: str) -> DescriptionError:
-    return DescriptionError(f"line {line.number}: found {line.text[:60]!r}; expected {expected}")
+def _wrong(text: str, mark: yaml.Mark | None, expected: str) -> DescriptionError:
+    lines = text.splitlines() or [""]
+    number = min(0 if mark is None else mark.line, len(lines) - 1)
+    return DescriptionError(f"line {number + 1}: found {lines[number].strip()[:60]!r}; expected {expected}")
 
 
 def trajectory_text(
@@ -189,11 +124,11 @@ def trajectory_text(
 
 
 def _number(value: float) -> str:
-    # YAML 1.1 takes 1e-05 for text: a number has a point.
+    # YAML 1.1 reads 1e-05 as text: its numbers have a point.
     text = f"{value:.17g}"
     mantissa, _, exponent = text.partition("e")
     return (mantissa if "." in mantissa else f"{mantissa}.0") + (f"e{exponent}" if exponent else "")
 
 
 def _name(name: str) -> str:
-    return name if PLAIN.fullmatch(name) and name.lower() not in WORDS else f"'{name}'"
+    return name if PLAIN.fullmatch(name) and name.lower() not in NO_TEXT else f"'{name}'"
