@@ -44,8 +44,7 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.regressor import Regressor
     from dhkit.symbolic.kinematics import SymbolicKinematics, SymbolicMatrix, symbolic_kinematics
     from dhkit.symbolic.mistakes import MISTAKES, MadeAt, Mistake, Subject
-    from dhkit.symbolic.programs.graph import Graph, Node, Variable
-    from dhkit.symbolic.programs.operations import operation_count
+    from dhkit.symbolic.programs.graph import Graph, Node, Variable, operation_count
     from dhkit.symbolic.programs.printers import c_source, export_c
     from dhkit.symbolic.ring.elements import Element, Elements, RingError
     from dhkit.symbolic.textbook import TextbookDerivation, derive
@@ -152,8 +151,7 @@ __getattr__, __dir__ = lazy_names(
         "dhkit.symbolic.exact.regressor": ("Regressor",),
         "dhkit.symbolic.kinematics": ("SymbolicKinematics", "SymbolicMatrix", "symbolic_kinematics"),
         "dhkit.symbolic.mistakes": ("MISTAKES", "MadeAt", "Mistake", "Subject"),
-        "dhkit.symbolic.programs.graph": ("Graph", "Node", "Variable"),
-        "dhkit.symbolic.programs.operations": ("operation_count",),
+        "dhkit.symbolic.programs.graph": ("Graph", "Node", "Variable", "operation_count"),
         "dhkit.symbolic.programs.printers": ("c_source", "export_c"),
         "dhkit.symbolic.ring.elements": ("Element", "Elements", "RingError"),
         "dhkit.symbolic.textbook": ("TextbookDerivation", "derive"),

@@ -1,4 +1,4 @@
-"""An arm's kinematics as exact matrices that can be read: A_1 ... A_n, the tool's pose T and its Jacobian J."""
+"""Exact kinematics of an arm: link transforms A_1 ... A_n, the tool's pose T and its Jacobian J."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ LANGUAGES = ("python", "c", "matlab")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SymbolicMatrix:
-    """A matrix of exact functions of the joint values: one of A1 ... An, T and J.
+    """A matrix of exact functions of the joint positions: one of A1 ... An, T and J.
 
     Attributes
     ----------
     name
         A1 ... An, T or J.
     elements
-        Its entries in the exact ring, shape (4, 4), of J (6, n).
+        Its entries in the exact ring, shape (4, 4), or (6, n) for J.
     kinematics
-        What it is a part of.
+        The kinematics that it belongs to.
     """
 
     name: str
@@ -44,19 +44,19 @@ class SymbolicMatrix:
         return self.elements[place]
 
     def evaluate(self, q: ArrayLike) -> Array:
-        """Return its numbers at joint values (..., n), shape (..., 4, 4) or (..., 6, n)."""
+        """Return its values at joint positions (..., n), rad and m: shape (..., 4, 4) or (..., 6, n)."""
         return self.kinematics.arm.evaluate(self.elements, q)
 
     def text(self) -> str:
-        """Return it as text, entry by entry, in the angles that make each shortest."""
+        """Return the matrix as text, entry by entry, in the angles that make each entry shortest."""
         return self.kinematics.text(self.name)
 
     def latex(self) -> str:
-        """Return it in LaTeX, for a page that loads amsmath."""
+        """Return the matrix in LaTeX, for a page that loads amsmath."""
         return self.kinematics.latex(self.name)
 
     def sympy(self) -> Any:
-        """Return it as a ``sympy.Matrix`` in q1, q2 ... and the file's parameters."""
+        """Return the matrix as a ``sympy.Matrix`` in q1, q2 ... and the file's parameters."""
         return self.kinematics.sympy(self.name)[self.name]
 
     def code(self, language: str = "python") -> str:
@@ -98,7 +98,7 @@ class SymbolicKinematics:
     description: Description
     derivation: TextbookKinematics
     definitions = ()
-    """No symbols that stand for others."""
+    """Empty: kinematics have no symbols that stand for combinations of others."""
 
     @property
     def arm(self) -> ExactArm:
@@ -117,7 +117,7 @@ class SymbolicKinematics:
 
     @property
     def constants(self) -> dict[str, float]:
-        """The symbols as they are printed, and what they are worth, SI."""
+        """Values of the symbols, SI, by their printed names."""
         return notation(self.arm.ring).printed(self.arm.parameters)
 
     def A(self, i: int) -> SymbolicMatrix:
@@ -139,7 +139,7 @@ class SymbolicKinematics:
 
     @cached_property
     def J(self) -> SymbolicMatrix:
-        """The Jacobian: linear velocity of the tool's origin, then angular velocity, in the world's axes."""
+        """The Jacobian (6, n): linear velocity of the tool's origin, then angular velocity, in the world's axes."""
         return self.matrix("J")
 
     def matrix(self, name: str) -> SymbolicMatrix:

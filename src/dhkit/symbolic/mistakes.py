@@ -1,7 +1,7 @@
-"""Mistakes as values, and those that are made while deriving equations of motion as a textbook does.
+"""Mistakes as values, and the mistakes that :mod:`dhkit.symbolic.textbook` can make on purpose.
 
-A mistake has an identity that stays the same over versions, a subject, what is then the case, and where to look. Those
-of this module are places in :mod:`dhkit.symbolic.textbook`, made at every link, at one, or at one body of a link.
+A mistake has an identity that does not change between versions, a subject, a sentence that states it, and a hint. It is
+made at every link, at one link, or at one body of a link.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ HALF = Fraction(1, 2)
 
 
 class Subject(Enum):
-    """What a mistake is made in."""
+    """The part of an answer that contains a mistake."""
 
     TABLE = "table"
     TRANSFORM = "transform"
@@ -38,11 +38,11 @@ class Mistake:
     identity
         A stable name.
     subject
-        What it is made in.
+        The part of an answer that contains it.
     sentence
-        What is then the case, without the place: a clause that begins with its subject.
+        Statement of the mistake without its place: a clause that begins with its subject.
     hint
-        Where to look, without saying what is wrong.
+        Where to look, without stating the mistake.
     """
 
     identity: str
@@ -59,16 +59,16 @@ class Mistake:
 
 @dataclass(frozen=True)
 class MadeAt:
-    """A mistake where it is made.
+    """A mistake and the place where it is made.
 
     Attributes
     ----------
     identity
-        Of the mistake.
+        The mistake's identity.
     link
-        The link, from 1; None where it is made throughout.
+        The link, counted from 1; None if made at every link.
     body
-        The name of one of the link's bodies; None where it is made at all of them.
+        Name of one of the link's bodies; None if made at all of them.
     """
 
     identity: str
@@ -84,12 +84,12 @@ class MadeAt:
 
 
 def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:
-    """Return mistakes as values; an identity alone is made throughout.
+    """Return mistakes as values; an identity alone means every link.
 
     Raises
     ------
     TypeError
-        A text in place of a set of identities.
+        One text was given in place of a set of identities.
     """
     if isinstance(mistakes, str):
         raise TypeError(f"mistakes is {mistakes!r}; expected a set of identities, as in {{{mistakes!r}}}")
@@ -211,7 +211,7 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         velocity_torques_halved="all terms with products of rates count by half",
     ),
 )
-"""Places where a derivation goes wrong, by identity; the more frequent first."""
+"""Mistakes of a derivation by identity, frequent ones first."""
 
 VELOCITY_FACTORS = {
     "coriolis_missing": (False, Fraction(0)),
@@ -223,7 +223,7 @@ VELOCITY_FACTORS = {
     "centrifugal_halved": (True, HALF),
     "centrifugal_doubled": (True, Fraction(2)),
 }
-"""Whether squares of rates are meant, and their factor."""
+"""Whether the mistake changes squares of rates (else products of two rates), and the factor that it applies."""
 
 STEP_FACTORS = {
     "mass_rate_omitted": (Fraction(0), Fraction(1)),
@@ -234,16 +234,16 @@ STEP_FACTORS = {
     "velocity_torques_doubled": (Fraction(2), Fraction(2)),
     "velocity_torques_halved": (HALF, HALF),
 }
-"""Factors of dM/dt qd and of dK/dq in Euler and Lagrange's equation."""
+"""Factors of dM/dt qd and of dK/dq in the Euler-Lagrange equation."""
 
 ROTOR_MISTAKES = frozenset(("rotor_forgotten", "rotor_gear", "rotor_without_gear"))
 
 LINK_MISTAKES = frozenset(MISTAKES) - {*VELOCITY_FACTORS, *STEP_FACTORS, *ROTOR_MISTAKES, "potential_gradient_sign"}
-"""Those that change a link's own energies."""
+"""Mistakes that change a link's own energies."""
 
 
 def has(mistakes: Collection[MadeAt], identity: str, i: int | None = None, body: str | None = None) -> bool:
-    """Return whether a mistake is made throughout, at link i (from 0) if one is given, or at its body of that name."""
+    """Return whether a mistake is made at every link, at link i (counted from 0), or at its body of this name."""
     if MadeAt(identity) in mistakes:
         return True
     return i is not None and (MadeAt(identity, i + 1) in mistakes or MadeAt(identity, i + 1, body) in mistakes)
@@ -252,7 +252,7 @@ def has(mistakes: Collection[MadeAt], identity: str, i: int | None = None, body:
 def check_mistake(
     made: object, n: int, known: Mapping[str, Mistake] = MISTAKES, bodies: Sequence[Sequence[str]] = ()
 ) -> None:
-    """Refuse what is no mistake of a catalogue, or made at no link or body of an arm of n joints.
+    """Check that a mistake is in a catalogue and is made at a link and body of an arm of n joints.
 
     Parameters
     ----------

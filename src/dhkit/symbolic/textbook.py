@@ -1,9 +1,9 @@
-"""Lagrange's equations as a textbook derives them, every step kept, with the places where students go wrong.
+"""Equations of motion derived as in a textbook, step by step, with optional mistakes that students make.
 
 Positions of the centres of mass, their velocities by differentiation, angular velocities as sums over the joints'
 axes, kinetic and potential energy of each body of each link, the Lagrangian, and d/dt dL/dqd - dL/dq (Spong,
-Hutchinson & Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1). It
-shares the table and the bodies with :mod:`dhkit.symbolic.exact.composite`, and nothing else.
+Hutchinson & Vidyasagar, Robot Modeling and Control, 2006, chapter 7; Siciliano et al., Robotics, 2009, section 7.1).
+The derivation is independent of :mod:`dhkit.symbolic.exact.composite`: both share the table and the bodies only.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ HALF = Fraction(1, 2)
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """What the derivation finds of a body of a link; vectors of shape (3,).
+    """Motion and energies of a body of a link; vectors have shape (3,).
 
     Attributes
     ----------
     body
-        What moves.
+        The body.
     com
-        The centre of mass in frame 0.
+        Its centre of mass in frame 0, m.
     velocity, omega
-        Of the centre of mass, and angular, both in the link's own axes.
+        Velocity of the centre of mass, m/s, and angular velocity, rad/s, in the link's own axes.
     K, V
-        Kinetic and potential energy.
+        Kinetic and potential energy, J.
     """
 
     body: ExactBody
@@ -53,16 +53,16 @@ class BodyMotion:
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
-    """What the derivation finds of a link.
+    """Pose of a link, and motion of its bodies.
 
     Attributes
     ----------
     R
-        The link's DH frame in frame 0, shape (3, 3).
+        Rotation of the link's DH frame in frame 0, shape (3, 3).
     origin
-        The frame's origin in frame 0, shape (3,).
+        The frame's origin in frame 0, shape (3,), m.
     bodies
-        What it finds body by body.
+        Motion of each body.
     """
 
     R: Elements
@@ -89,9 +89,9 @@ class TextbookDerivation:
     arm
         The description in the ring.
     links
-        What it finds link by link.
+        Pose and motion of each link.
     mistakes
-        What was done wrong.
+        The mistakes that were made.
     """
 
     arm: ExactArm
@@ -104,7 +104,7 @@ class TextbookDerivation:
 
     @cached_property
     def rotors(self) -> Element:
-        """Kinetic energy of the rotors, which turn with the gear's ratio: Jm (G qd)^2 / 2 each."""
+        """Kinetic energy of the rotors, the sum of Jm (G qd)^2 / 2, J."""
         arm, energies = self.arm, []
         for i, (gear, rotor) in enumerate(zip(arm.gear, arm.rotor, strict=True)):
             if not self._has("rotor_forgotten", i):
@@ -131,12 +131,12 @@ class TextbookDerivation:
 
     @cached_property
     def momenta(self) -> Elements:
-        """Generalised momenta dL/dqd, shape (n,)."""
+        """Generalized momenta dL/dqd, shape (n,), kg m^2/s and kg m/s."""
         return np.array([self.K.by_rate(i) for i in range(self.arm.n)], dtype=object)
 
     @cached_property
     def M(self) -> Elements:
-        """Mass matrix: the derivatives of the momenta by the rates, shape (n, n)."""
+        """Mass matrix, the derivatives of the momenta by the rates, shape (n, n)."""
         return np.array([[p.by_rate(j) for j in range(self.arm.n)] for p in self.momenta], dtype=object)
 
     @cached_property
@@ -147,12 +147,12 @@ class TextbookDerivation:
 
     @cached_property
     def h(self) -> Elements:
-        """Coriolis and centrifugal torques, shape (n,): what is left of tau without accelerations and gravity."""
+        """Coriolis and centrifugal torques, shape (n,): tau minus the terms with accelerations and gravity."""
         return velocity_torques(self.arm.ring, self.K, self.momenta, self.mistakes)
 
     @cached_property
     def tau(self) -> Elements:
-        """Euler and Lagrange's equation: d/dt dL/dqd - dL/dq, shape (n,)."""
+        """The Euler-Lagrange equation d/dt dL/dqd - dL/dq, shape (n,), N m and N."""
         ring, n = self.arm.ring, self.arm.n
         inertial = [ring.sum(p.by_rate(j) * ring.acceleration(j) for j in range(n)) for p in self.momenta]
         return np.array(inertial, dtype=object) + self.h + self.g
@@ -167,13 +167,13 @@ def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozen
     Parameters
     ----------
     ring
-        Of the elements.
+        The ring of the elements.
     K
-        Kinetic energy.
+        Kinetic energy, J.
     momenta
-        Its derivatives by the rates, shape (n,).
+        Derivatives of K by the rates, shape (n,).
     mistakes
-        Those that concern this step are made.
+        Mistakes to make; those of other steps have no effect.
     """
     of_rate, of_gradient = Fraction(1), Fraction(1)
     for name, (rate, gradient) in STEP_FACTORS.items():

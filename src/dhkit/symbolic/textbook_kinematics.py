@@ -128,7 +128,7 @@ class TextbookKinematics:
     arm
         The description in the ring.
     mistakes
-        What was done wrong.
+        The mistakes that were made.
     """
 
     arm: ExactArm
@@ -196,17 +196,17 @@ class TextbookKinematics:
 
     @property
     def _standard(self) -> bool:
-        """Whether the table is read as a distal one."""
+        """Whether the table is read as one of the standard convention."""
         return self.arm.is_standard != self._has("convention_exchanged")
 
     def _has(self, mistake: str, i: int | None = None) -> bool:
         return has(self.mistakes, mistake, i)
 
     def _link(self, i: int) -> Elements:
-        """Return A_i, i from 0: the four elementary motions in their order."""
+        """Return A_i, i counted from 0, as the product of its four elementary motions."""
         ring, row = self.arm.ring, self._lengths(i, self._angles(i, self.arm.rows[i]))
-        Rz, Rx = _turn(ring, 0, 1, row.theta), _turn(ring, 1, 2, row.alpha)
-        Tz, Tx = _shift(ring, 2, row.d), _shift(ring, 0, row.a)
+        Rz, Rx = _rotation(ring, 0, 1, row.theta), _rotation(ring, 1, 2, row.alpha)
+        Tz, Tx = _translation(ring, 2, row.d), _translation(ring, 0, row.a)
         turned = Rz @ Rx if self._standard else Rx @ Rz
         if self._has("rotations_first", i):
             A = turned @ Tx @ Tz
@@ -219,7 +219,7 @@ class TextbookKinematics:
         return A
 
     def _lengths(self, i: int, row: ExactRow) -> ExactRow:
-        """Put the mistakes in that concern a and d."""
+        """Return the row with the mistakes in a and d."""
         ring, (a, d) = self.arm.ring, (row.a, row.d)
         if ring.kinds[i] != "R" and self._has("variable_forgotten", i):
             d = d - ring.position(i)
@@ -230,7 +230,7 @@ class TextbookKinematics:
         return replace(row, a=d, d=a) if self._has("a_d_exchanged", i) else replace(row, a=a, d=d)
 
     def _angles(self, i: int, row: ExactRow) -> ExactRow:
-        """Put the mistakes in that concern theta and alpha."""
+        """Return the row with the mistakes in theta and alpha."""
         ring = self.arm.ring
         (ca, sa), theta = row.alpha, row.theta
         if self._has("alpha_forgotten", i):
@@ -258,7 +258,7 @@ class TextbookKinematics:
         return replace(row, alpha=(ca, sa), theta=theta)
 
     def _column(self, i: int) -> tuple[Elements, Elements]:
-        """Return the linear and the angular half of column i, from 0."""
+        """Return the linear and the angular half of column i, counted from 0, shape (3,) each."""
         ring, axis = self.arm.ring, self._axis(i)
         nothing = np.array([ring.zero] * 3, dtype=object)
         turning = _cross(axis, self._lever(i))
@@ -279,7 +279,7 @@ class TextbookKinematics:
         return self.frames[neighbour if self._has("axis_neighbour") else own][:3, 2]
 
     def _lever(self, i: int) -> Elements:
-        """Return the vector from joint i to the point whose velocity is meant, in world axes, shape (3,)."""
+        """Return the vector from joint i to the tool's origin, in world axes, shape (3,), m."""
         places = [frame[:3, 3] for frame in self.frames]
         own, neighbour = (i, i + 1) if self._standard else (i + 1, i)
         if self._has("lever_own"):
@@ -317,9 +317,9 @@ def derive_kinematics(
     Raises
     ------
     ValueError
-        No such mistake, no such link, or a mistake that is made at no single link.
+        No such mistake, no such link, or a link given for a mistake that concerns the whole arm.
     TypeError
-        Mistakes that are no names.
+        A mistake is neither a name nor a :class:`~dhkit.symbolic.mistakes.MadeAt`.
 
     Examples
     --------
@@ -337,9 +337,9 @@ def derive_kinematics(
 
 
 def with_massless_links(description: Description) -> Description:
-    """Return a description whose links all have bodies: massless ones where there were none; itself where none was.
+    """Return a description with massless bodies on links that have none; the same one if no link needs one.
 
-    Kinematics need no bodies, and the exact arm, which is the dynamics' as well, needs all of them.
+    The exact arm, which dynamics use too, needs a body on every link; kinematics do not.
     """
     if all(joint.bodies for joint in description.joints):
         return description
@@ -349,7 +349,7 @@ def with_massless_links(description: Description) -> Description:
 
 
 def check_kinematic_mistake(made: object, n: int) -> None:
-    """Refuse what is no mistake of :data:`KINEMATIC_MISTAKES`, or made at no link of an arm of n joints.
+    """Check that a mistake is in :data:`KINEMATIC_MISTAKES` and is made at a link of an arm of n joints.
 
     Raises
     ------
@@ -364,7 +364,7 @@ def check_kinematic_mistake(made: object, n: int) -> None:
 
 
 def _arm_with_tool(description: Description, symbols: Symbols) -> ExactArm:
-    """Return the exact arm, its ring with the constants of the tool's angles where it lacks them."""
+    """Return the exact arm; its ring contains the constants of the tool's angles too."""
     arm = exact_arm(description, symbols)
     try:
         _placement(arm, description.tool.placement)
@@ -384,13 +384,13 @@ def _placement(arm: ExactArm, placement: Placement) -> Elements:
     """Return a placement's matrix, shape (4, 4): Rz(yaw) Ry(pitch) Rx(roll), then the origin."""
     ring, naming = arm.ring, Naming(arm.description, arm.symbols)
     roll, pitch, yaw = (ring.direction(angle) for angle in _known_angles(arm, placement))
-    T: Elements = _turn(ring, 0, 1, yaw) @ _turn(ring, 2, 0, pitch) @ _turn(ring, 1, 2, roll)
+    T: Elements = _rotation(ring, 0, 1, yaw) @ _rotation(ring, 2, 0, pitch) @ _rotation(ring, 1, 2, roll)
     T[:3, 3] = [ring.read(naming.known(x)) for x in placement.xyz]
     return T
 
 
 def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
-    """Return the product of two transforms, or that with the second's translation left unturned."""
+    """Return the product of two transforms; ``unrotated`` is the mistake of not rotating the second's origin."""
     product: Elements = first @ second
     if unrotated:
         product[:3, 3] = first[:3, 3] + second[:3, 3]
@@ -409,14 +409,14 @@ def _identity(ring: Ring) -> Elements:
     return np.array([[ring.one if i == j else ring.zero for j in range(4)] for i in range(4)], dtype=object)
 
 
-def _turn(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
+def _rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
     """Return the rotation by an angle from one axis to another, shape (4, 4)."""
     T, (c, s) = _identity(ring), direction
     T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
     return T
 
 
-def _shift(ring: Ring, axis: int, length: Element) -> Elements:
+def _translation(ring: Ring, axis: int, length: Element) -> Elements:
     """Return the translation along an axis, shape (4, 4)."""
     T = _identity(ring)
     T[axis, 3] = length

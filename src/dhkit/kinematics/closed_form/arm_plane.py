@@ -21,16 +21,16 @@ from dhkit.kinematics.closed_form.formulas import (
     SINGULAR,
     SX,
     Pair,
-    absolute,
-    both,
-    chosen,
+    fabs,
+    logic_and,
+    select_pair,
     hypot,
-    no,
+    logic_not,
     sign,
     sqrt,
-    times,
-    unit,
-    where,
+    add_angles,
+    unit_pair,
+    if_else,
 )
 
 FLIPS = ("no-flip", "flip")
@@ -109,20 +109,20 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tu
     """
     x, _, v = point
     r = hypot(x, v)
-    short = absolute(offset) - r
+    short = fabs(offset) - r
     beyond = short > ROUNDING * scale
-    square = (r - absolute(offset)) * (r + absolute(offset))
-    front = sqrt(where(square > 0, square, 0.0))
+    square = (r - fabs(offset)) * (r + fabs(offset))
+    front = sqrt(if_else(square > 0, square, 0.0))
 
     def side(along: SX) -> Shoulder:
         # The plane's point (along, offset) seen in the fixed frame is (x, v): their angle is that of joint 1.
         return Shoulder(
-            q1=times(unit(along, offset, scale), unit(x, v, scale, (free[0], -free[1])), -1.0),
+            q1=add_angles(unit_pair(along, offset, scale), unit_pair(x, v, scale, (free[0], -free[1])), -1.0),
             x=along,
-            miss=where(beyond, short, 0.0),
+            miss=if_else(beyond, short, 0.0),
             r=r,
             singular=front < SINGULAR * reach,
-            clamped=both(square < 0, no(beyond)),
+            clamped=logic_and(square < 0, logic_not(beyond)),
         )
 
     return side(front), side(-front)
@@ -137,7 +137,7 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
     swap = sign(p["up"][1]) * p["offset"] > 0
 
     def either(a: Shoulder, b: Shoulder) -> Shoulder:
-        return replace(a, q1=chosen(swap, a.q1, b.q1), x=where(swap, a.x, b.x))
+        return replace(a, q1=select_pair(swap, a.q1, b.q1), x=if_else(swap, a.x, b.x))
 
     return either(back, front), either(front, back)
 

@@ -50,22 +50,22 @@ def sqrt(x: SX) -> SX:
     return _casadi().sqrt(x)
 
 
-def absolute(x: SX) -> SX:
+def fabs(x: SX) -> SX:
     """Return the absolute value."""
     return _casadi().fabs(x)
 
 
-def larger(a: SX, b: SX) -> SX:
+def fmax(a: SX, b: SX) -> SX:
     """Return the greater of two numbers."""
     return _casadi().fmax(a, b)
 
 
-def clamped_between(x: SX, low: SX, high: SX) -> SX:
+def clamp(x: SX, low: SX, high: SX) -> SX:
     """Return x, or the bound that it is beyond."""
-    return where(x > high, high, larger(x, low))
+    return if_else(x > high, high, fmax(x, low))
 
 
-def both(a: SX, b: SX) -> SX:
+def logic_and(a: SX, b: SX) -> SX:
     """Return whether both conditions hold."""
     return _casadi().logic_and(a, b)
 
@@ -75,22 +75,22 @@ def either(a: SX, b: SX) -> SX:
     return _casadi().logic_or(a, b)
 
 
-def where(condition: SX, true: SX, false: SX) -> SX:
+def if_else(condition: SX, true: SX, false: SX) -> SX:
     """Return one of two values."""
     return _casadi().if_else(condition, true, false)
 
 
-def positive(x: SX) -> SX:
+def positive_part(x: SX) -> SX:
     """Return x where it is above 0, else 0."""
-    return where(x > 0, x, 0.0)
+    return if_else(x > 0, x, 0.0)
 
 
 def sign(x: SX) -> SX:
     """Return -1 where x is below 0, else 1."""
-    return where(x < 0, -1.0, 1.0)
+    return if_else(x < 0, -1.0, 1.0)
 
 
-def no(condition: SX) -> SX:
+def logic_not(condition: SX) -> SX:
     """Return the opposite of a condition."""
     return _casadi().logic_not(condition)
 
@@ -100,27 +100,27 @@ def hypot(a: SX, b: SX) -> SX:
     return sqrt(a * a + b * b)
 
 
-def rotated(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
+def rotate(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
     """Return a vector times a 3 x 3 matrix."""
     x, y, z = (sum(R[i, k] * vector[k] for k in range(3)) for i in range(3))
     return x, y, z
 
 
-def combined(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
+def weighted_sum(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
     """Return a sum of vectors, each times its weight."""
     x, y, z = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
     return x, y, z
 
 
-def unit(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
+def unit_pair(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
     """Return the direction of (x, y) as a pair; where both are noise at ``scale``, the pair given."""
     size = hypot(x, y)
     sure = size > NOTHING * scale
-    inverse = 1.0 / where(sure, size, 1.0)
-    return where(sure, x * inverse, otherwise[0]), where(sure, y * inverse, otherwise[1])
+    inverse = 1.0 / if_else(sure, size, 1.0)
+    return if_else(sure, x * inverse, otherwise[0]), if_else(sure, y * inverse, otherwise[1])
 
 
-def times(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
+def add_angles(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
     """Return the pair of the sum of two angles, or of their difference for sense -1; b of any length is turned by a."""
     sine = sense * b[1]
     return a[0] * b[0] - a[1] * sine, a[1] * b[0] + a[0] * sine
@@ -131,20 +131,20 @@ def angle(pair: Pair) -> SX:
     return _casadi().atan2(pair[1], pair[0])
 
 
-def half_turn(x: SX) -> SX:
+def turn_by_pi(x: SX) -> SX:
     """Return an angle in (-pi, pi] turned by pi, in (-pi, pi]."""
-    return where(x > 0, x - math.pi, x + math.pi)
+    return if_else(x > 0, x - math.pi, x + math.pi)
 
 
-def wrapped(x: SX) -> SX:
+def wrap_angle(x: SX) -> SX:
     """Return an angle in [-3 pi, 3 pi] in (-pi, pi]."""
-    x = where(x > math.pi, x - 2 * math.pi, x)
-    return where(x <= -math.pi, x + 2 * math.pi, x)
+    x = if_else(x > math.pi, x - 2 * math.pi, x)
+    return if_else(x <= -math.pi, x + 2 * math.pi, x)
 
 
-def chosen(condition: SX, a: Pair, b: Pair) -> Pair:
+def select_pair(condition: SX, a: Pair, b: Pair) -> Pair:
     """Return one of two pairs."""
-    return where(condition, a[0], b[0]), where(condition, a[1], b[1])
+    return if_else(condition, a[0], b[0]), if_else(condition, a[1], b[1])
 
 
 @dataclass(frozen=True)
@@ -176,22 +176,22 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
         The size of the numbers that x and y were computed from, m: what rounding is measured by.
     """
     R = hypot(x, y)
-    reach, gap = L1 + L2, absolute(L1 - L2)
-    excess = larger(R - reach, gap - R)
+    reach, gap = L1 + L2, fabs(L1 - L2)
+    excess = fmax(R - reach, gap - R)
     beyond = excess > ROUNDING * scale
     # 1 + cos b and 1 - cos b as products: nothing cancels near the stretched and the folded arm.
     folded = (R - gap) * (R + gap) / (2 * L1 * L2)
     stretched = (reach - R) * (reach + R) / (2 * L1 * L2)
     near_folded = folded < 1.0
     square = folded * stretched
-    c, s = unit(where(near_folded, folded - 1.0, 1.0 - stretched), sqrt(positive(square)))
+    c, s = unit_pair(if_else(near_folded, folded - 1.0, 1.0 - stretched), sqrt(positive_part(square)))
     # Both elbows mirror each other at the line to the point: a = arg(point) -+ arg(L1 + L2 e^(i b)).
-    forward = unit(x, y, scale)
-    inside = unit(where(near_folded, L1 - L2 + L2 * folded, L1 + L2 * c), L2 * s, L1)
+    forward = unit_pair(x, y, scale)
+    inside = unit_pair(if_else(near_folded, L1 - L2 + L2 * folded, L1 + L2 * c), L2 * s, L1)
     return TwoLink(
-        first=(times(forward, inside), times(forward, inside, -1.0)),
+        first=(add_angles(forward, inside), add_angles(forward, inside, -1.0)),
         between=((c, -s), (c, s)),
-        miss=where(beyond, excess, 0.0),
+        miss=if_else(beyond, excess, 0.0),
         straight=s < SINGULAR,
-        clamped=both(square < 0, no(beyond)),
+        clamped=logic_and(square < 0, logic_not(beyond)),
     )

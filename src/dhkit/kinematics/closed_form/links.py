@@ -14,15 +14,15 @@ from dhkit.kinematics.closed_form.family import Parameter
 from dhkit.kinematics.closed_form.formulas import (
     SX,
     Pair,
-    absolute,
+    fabs,
     angle,
-    chosen,
-    clamped_between,
+    select_pair,
+    clamp,
     hypot,
     sign,
-    times,
+    add_angles,
     two_link,
-    where,
+    if_else,
 )
 
 ELBOWS = ("up", "down")
@@ -41,7 +41,7 @@ def link_parameters(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parame
         "L2": np.linalg.norm(upper),
         "L3": np.linalg.norm(fore),
         "upper": upper_pair,
-        "bend": times(as_pair(*fore), upper_pair, -1.0),
+        "bend": add_angles(as_pair(*fore), upper_pair, -1.0),
         "sense3": axes.sense(2, 3),
     }
 
@@ -68,7 +68,7 @@ class Elbow:
     @property
     def turned(self) -> Pair:
         """How far link 3 has turned about v since zero joint values."""
-        return times(self.q2, self.bent)
+        return add_angles(self.q2, self.bent)
 
 
 def elbows(p: Mapping[str, SX], x: SX, u: SX, q1: Pair, scale: SX) -> tuple[Elbow, Elbow]:
@@ -81,11 +81,11 @@ def elbows(p: Mapping[str, SX], x: SX, u: SX, q1: Pair, scale: SX) -> tuple[Elbo
     vertical = turned_back(p["up"], q1)
     left_is_up = sign(vertical[1] * x - vertical[0] * u)
     R = hypot(x, u)
-    share = clamped_between(R, absolute(p["L2"] - p["L3"]), p["L2"] + p["L3"]) / where(R > 0, R, 1.0)
+    share = clamp(R, fabs(p["L2"] - p["L3"]), p["L2"] + p["L3"]) / if_else(R > 0, R, 1.0)
 
     def elbow(raised: SX) -> Elbow:
-        q2 = times(chosen(raised > 0, *arm.first), p["upper"], -1.0)
-        bent = times(chosen(raised > 0, *arm.between), p["bend"], -1.0)
+        q2 = add_angles(select_pair(raised > 0, *arm.first), p["upper"], -1.0)
+        bent = add_angles(select_pair(raised > 0, *arm.between), p["bend"], -1.0)
         return Elbow(
             q2=q2,
             bent=bent,

@@ -22,19 +22,19 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
-    absolute,
+    fabs,
     angle,
-    both,
-    chosen,
-    combined,
+    logic_and,
+    select_pair,
+    weighted_sum,
     hypot,
-    no,
-    positive,
+    logic_not,
+    positive_part,
     sqrt,
-    times,
+    add_angles,
     two_link,
-    unit,
-    where,
+    unit_pair,
+    if_else,
 )
 
 FLAT = 1e-9
@@ -68,7 +68,7 @@ def chain_fit(axes: Axes) -> Fit | None:
             "upper": as_pair(*upper),
             "L2": np.linalg.norm(upper),
             "L3": np.linalg.norm(fore),
-            "bend": times(as_pair(*fore), as_pair(*upper), -1.0),
+            "bend": add_angles(as_pair(*fore), as_pair(*upper), -1.0),
             "lever": tool[:2] - end[:2],
             "height": tool[2],
             "axis": np.eye(3)[column],
@@ -88,12 +88,12 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], IDENTITY)
     kinds = pose.structure
     turning = kinds.count("R") == 3
-    wanted = combined(p["axis"], T.rotation)
-    rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
+    wanted = weighted_sum(p["axis"], T.rotation)
+    rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
     lever = p["lever"]
     x, u, v = T.position
     if turning:
-        reached = times(rho, lever)
+        reached = add_angles(rho, lever)
         x, u = x - reached[0], u - reached[1]
     arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
     rise = v - p["height"]
@@ -102,9 +102,9 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     for side in (0, 1):
         # Seen from above, left is left where v points up.
         upright, other = p["up"] > 0, 1 - side
-        qa = times(chosen(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
-        qb = times(chosen(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
-        turns = iter((qa, qb, times(times(rho, qa, -1.0), qb, -1.0)))
+        qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
+        qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
+        turns = iter((qa, qb, add_angles(add_angles(rho, qa, -1.0), qb, -1.0)))
         joints = [
             sense * rise if kind == "P" else _sensed(next(turns), sense)
             for kind, sense in zip(kinds, p["senses"], strict=True)
@@ -137,20 +137,20 @@ def polar_fit(axes: Axes) -> Fit | None:
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool out along the slide's positive direction, then in."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
-    R, lift = hypot(x, u), absolute(p["lift"])
+    R, lift = hypot(x, u), fabs(p["lift"])
     beyond = lift - R > ROUNDING * pose.scale
     square = (R - lift) * (R + lift)
-    length = sqrt(positive(square))
-    miss = hypot(where(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
+    length = sqrt(positive_part(square))
+    miss = hypot(if_else(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
     return [
         Branch(
             (
-                angle(times(unit(x, u, pose.scale), times(p["boom"], unit(along, p["lift"], pose.scale)), -1.0)),
+                angle(add_angles(unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0)),
                 along - p["start"],
             ),
             miss=miss,
             elbow=length < SINGULAR * p["reach"],
-            clamped=both(square < 0, no(beyond)),
+            clamped=logic_and(square < 0, logic_not(beyond)),
         )
         for along in (length, -length)
     ]
@@ -184,16 +184,16 @@ def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool ahead of the revolute axis along the slide, then behind it."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     L = p["L"]
-    beyond = absolute(u) - L > ROUNDING * pose.scale
+    beyond = fabs(u) - L > ROUNDING * pose.scale
     square = (L - u) * (L + u)
-    ahead = sqrt(positive(square))
-    miss = hypot(where(beyond, absolute(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
+    ahead = sqrt(positive_part(square))
+    miss = hypot(if_else(beyond, fabs(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
     return [
         Branch(
-            (x - along, angle(times(unit(along, u), p["pointing"], -1.0))),
+            (x - along, angle(add_angles(unit_pair(along, u), p["pointing"], -1.0))),
             miss=miss,
             elbow=ahead < SINGULAR * p["reach"],
-            clamped=both(square < 0, no(beyond)),
+            clamped=logic_and(square < 0, logic_not(beyond)),
         )
         for along in (ahead, -ahead)
     ]
@@ -217,4 +217,4 @@ def _sensed(pair: Pair, sense: SX) -> SX:
 
 
 def _off_plane(rise: SX, scale: SX) -> SX:
-    return where(absolute(rise) > FLAT * scale, absolute(rise), 0.0)
+    return if_else(fabs(rise) > FLAT * scale, fabs(rise), 0.0)

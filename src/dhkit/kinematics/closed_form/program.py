@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.closed_form.family import TURN, Family, Fit, PoseSymbols
-from dhkit.kinematics.closed_form.formulas import SX, Branch, where
+from dhkit.kinematics.closed_form.formulas import SX, Branch, if_else
 from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.symbolic import Graph
 
@@ -56,22 +56,22 @@ def _graph(
         raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
 
     valid = [ca.logic_and(is_pose, ca.logic_and(branch.miss == 0, _is_finite(branch))) for branch in branches]
-    q = [[where(ok, x, np.nan) for x in branch.q] for ok, branch in zip(valid, branches, strict=True)]
-    flags = [where(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
+    q = [[if_else(ok, x, np.nan) for x in branch.q] for ok, branch in zip(valid, branches, strict=True)]
+    flags = [if_else(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
     some = reduce(ca.logic_or, valid)
     special = reduce(ca.logic_or, (ca.logic_and(ok, _singular(b)) for ok, b in zip(valid, branches, strict=True)))
     miss = reduce(ca.fmin, (b.miss if b.distance is None else b.distance for b in branches))
-    reached = where(special, float(IKStatus.singular), float(IKStatus.ok))
-    found = where(some, reached, float(IKStatus.out_of_reach))
+    reached = if_else(special, float(IKStatus.singular), float(IKStatus.ok))
+    found = if_else(some, reached, float(IKStatus.out_of_reach))
     return Graph.of(
         "inverse_kinematics",
         {**parameters, "T": T, "free": free},
         {
             "q": ca.vertcat(*(ca.horzcat(*row) for row in q)),
-            "distance": where(is_pose, where(some, 0.0, miss), np.nan),
-            "valid": ca.vertcat(*(where(ok, 1.0, 0.0) for ok in valid)),
+            "distance": if_else(is_pose, if_else(some, 0.0, miss), np.nan),
+            "valid": ca.vertcat(*(if_else(ok, 1.0, 0.0) for ok in valid)),
             "flags": ca.vertcat(*flags),
-            "status": where(is_pose, found, float(IKStatus.not_a_pose)),
+            "status": if_else(is_pose, found, float(IKStatus.not_a_pose)),
         },
     )
 
@@ -112,7 +112,7 @@ def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
         IKFlag.clamped: branch.clamped,
         IKFlag.out_of_limits: ca.logic_not(inside),
     }
-    return sum(where(condition, float(flag), 0.0) for flag, condition in conditions.items())
+    return sum(if_else(condition, float(flag), 0.0) for flag, condition in conditions.items())
 
 
 def _inside(x: Any, begin: Any, width: Any, slides: bool) -> Any:

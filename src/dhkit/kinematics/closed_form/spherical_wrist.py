@@ -29,18 +29,18 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
-    absolute,
+    fabs,
     angle,
-    both,
+    logic_and,
     either,
-    half_turn,
+    turn_by_pi,
     hypot,
-    no,
-    positive,
+    logic_not,
+    positive_part,
     sqrt,
-    times,
-    unit,
-    where,
+    add_angles,
+    unit_pair,
+    if_else,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, turned, wrist_parameters
@@ -132,21 +132,21 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
         x, u = shoulder.x - p["a1"], T.position[1]
-        R, lift = hypot(x, u), absolute(p["lift"])
+        R, lift = hypot(x, u), fabs(p["lift"])
         short = lift - R
         beyond = short > ROUNDING * pose.scale
         square = (R - lift) * (R + lift)
-        length = sqrt(positive(square))
+        length = sqrt(positive_part(square))
         for along in (length, -length):
             # The wrist is at e^(i q2) boom (along + i lift) from axis 2.
-            q2 = times(unit(x, u, pose.scale), times(p["boom"], unit(along, p["lift"], pose.scale)), -1.0)
+            q2 = add_angles(unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0)
             region = Region(
                 q=(angle(shoulder.q1), angle(q2), along - p["start"]),
                 rho=q2,
                 shoulder=shoulder,
-                miss=hypot(shoulder.miss, where(beyond, short, 0.0)),
+                miss=hypot(shoulder.miss, if_else(beyond, short, 0.0)),
                 elbow=length < SINGULAR * p["reach"],
-                clamped=either(shoulder.clamped, both(square < 0, no(beyond))),
+                clamped=either(shoulder.clamped, logic_and(square < 0, logic_not(beyond))),
             )
             branches += _with_wrist(p, T.rotation, region, pose)
     return branches
@@ -169,7 +169,7 @@ def _with_wrist(
     """
     q1, rho = region.shoulder.q1, region.rho
     wrist = turned(p, (turned_back(axis, q1, rho) for axis in rotation))
-    q4 = unit(wrist.a[0], wrist.a[1], ill_determined(pose), pose.free)
+    q4 = unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), pose.free)
     roll = angle(q4)
     unflipped, flipped = joints_5_and_6(p, wrist, q4)
     flags = {
@@ -182,5 +182,5 @@ def _with_wrist(
     }
     return [
         Branch((*region.q, roll, *unflipped), **flags),
-        Branch((*region.q, half_turn(roll), *flipped), **flags),
+        Branch((*region.q, turn_by_pi(roll), *flipped), **flags),
     ]

@@ -25,19 +25,19 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
-    absolute,
+    fabs,
     angle,
-    both,
-    chosen,
+    logic_and,
+    select_pair,
     either,
     hypot,
-    larger,
-    positive,
+    fmax,
+    positive_part,
     sign,
     sqrt,
-    times,
-    unit,
-    where,
+    add_angles,
+    unit_pair,
+    if_else,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, Elbow, elbows, link_parameters
 from dhkit.kinematics.closed_form.wrist import UNSEEN, ill_determined, joints_5_and_6, turned, wrist_parameters
@@ -94,8 +94,8 @@ def _wrists(
     # are determined: joint 6 is then free, and rho is read off axis 5 with joint 6 undone.
     c6, s6 = pose.free
     swing = hypot(wrist.a[0], wrist.a[1])
-    free = unit(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
-    rho = _within_reach(p, position, unit(wrist.a[0], wrist.a[1], ill_determined(pose), free), swing, pose.noise)
+    free = unit_pair(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
+    rho = _within_reach(p, position, unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), free), swing, pose.noise)
     unflipped, flipped = joints_5_and_6(p, wrist, rho)
     singular = swing < SINGULAR
     return (
@@ -112,19 +112,19 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, n
     lever = p["lever"]
     x, u = position[0] - p["a1"], position[1]
     far, arm = hypot(x, u), hypot(lever[0], lever[1])
-    reached = times(rho, lever)
+    reached = add_angles(rho, lever)
     distance = hypot(x - reached[0], u - reached[1])
-    reach, gap = p["L2"] + p["L3"], absolute(p["L2"] - p["L3"])
-    wanted = where(distance > reach, reach, larger(distance, gap))
+    reach, gap = p["L2"] + p["L3"], fabs(p["L2"] - p["L3"])
+    wanted = if_else(distance > reach, reach, fmax(distance, gap))
     # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
     area = 2.0 * far * arm
-    cosine = (far * far + arm * arm - wanted * wanted) / where(area > 0, area, 1.0)
-    to_end, to_lever = unit(x, u), unit(lever[0], lever[1])
-    side = sign(times(times(rho, to_lever), to_end, -1.0)[1])
-    corner = unit(cosine, side * sqrt(positive(1.0 - cosine * cosine)))
-    turned = times(times(to_end, corner), to_lever, -1.0)
+    cosine = (far * far + arm * arm - wanted * wanted) / if_else(area > 0, area, 1.0)
+    to_end, to_lever = unit_pair(x, u), unit_pair(lever[0], lever[1])
+    side = sign(add_angles(add_angles(rho, to_lever), to_end, -1.0)[1])
+    corner = unit_pair(cosine, side * sqrt(positive_part(1.0 - cosine * cosine)))
+    turned = add_angles(add_angles(to_end, corner), to_lever, -1.0)
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
-    return chosen(both(wanted != distance, cost < FREE + UNSEEN * noise), turned, rho)
+    return select_pair(logic_and(wanted != distance, cost < FREE + UNSEEN * noise), turned, rho)
 
 
 def _elbows(
@@ -136,11 +136,11 @@ def _elbows(
     singular: SX,
     scale: SX,
 ) -> tuple[Branch, Branch]:
-    reached = times(rho, p["lever"])
+    reached = add_angles(rho, p["lever"])
     x, u = position[0] - p["a1"] - reached[0], position[1] - reached[1]
 
     def branch(elbow: Elbow) -> Branch:
-        rest = times(rho, elbow.turned, -1.0)
+        rest = add_angles(rho, elbow.turned, -1.0)
         q4 = angle((rest[0], p["sense4"] * rest[1]))
         return Branch(
             (angle(shoulder.q1), *elbow.joints, q4, *wrist),

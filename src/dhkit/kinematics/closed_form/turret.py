@@ -22,11 +22,11 @@ from dhkit.kinematics.closed_form.formulas import (
     Branch,
     Pair,
     angle,
-    combined,
+    weighted_sum,
     either,
     hypot,
-    times,
-    unit,
+    add_angles,
+    unit_pair,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
@@ -56,7 +56,7 @@ def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
         x, u = shoulder.x - p["a1"], position[1]
-        tilt = times(unit(x, u, pose.scale), p["lever"], -1.0)
+        tilt = add_angles(unit_pair(x, u, pose.scale), p["lever"], -1.0)
         branches.append(
             Branch(
                 (angle(shoulder.q1), angle(tilt)),
@@ -126,9 +126,9 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], IDENTITY)
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
-        wanted = turned_back(combined(p["axis"], T.rotation), shoulder.q1)
-        rho = times(unit(wanted[0], wanted[1]), p["pointing"], -1.0)
-        reached = times(rho, p["lever"])
+        wanted = turned_back(weighted_sum(p["axis"], T.rotation), shoulder.q1)
+        rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
+        reached = add_angles(rho, p["lever"])
         x, u = shoulder.x - p["a1"] - reached[0], T.position[1] - reached[1]
         sideways = hypot(wanted[0], wanted[1]) < SINGULAR
         branches += _branches(p, shoulder, x, u, pose.scale, rho, sideways)
@@ -142,7 +142,7 @@ def _branches(
     for elbow in elbows(p, x, u, shoulder.q1, scale):
         joints = [angle(shoulder.q1), *elbow.joints]
         if rho is not None:
-            rest = times(rho, elbow.turned, -1.0)
+            rest = add_angles(rho, elbow.turned, -1.0)
             joints.append(angle((rest[0], p["sense4"] * rest[1])))
         branches.append(
             Branch(

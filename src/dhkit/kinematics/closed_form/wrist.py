@@ -11,7 +11,7 @@ from dhkit.description import Array
 from dhkit.kinematics.axes import Axes, inverse_pose
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Vector, as_pair
 from dhkit.kinematics.closed_form.family import Parameter, PoseSymbols
-from dhkit.kinematics.closed_form.formulas import NOTHING, SX, Pair, angle, half_turn, rotated, times, unit, wrapped
+from dhkit.kinematics.closed_form.formulas import NOTHING, SX, Pair, angle, turn_by_pi, rotate, add_angles, unit_pair, wrap_angle
 
 
 def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -> dict[str, Parameter]:
@@ -56,7 +56,7 @@ class Wrist:
 
 def turned(p: Mapping[str, SX], axes: Iterable[Vector]) -> Wrist:
     """Return the tool's axes as the wrist sees them, from those that the arm sees."""
-    a, n, m = (rotated(p["F"], axis) for axis in axes)
+    a, n, m = (rotate(p["F"], axis) for axis in axes)
     return Wrist(a, n, m)
 
 
@@ -71,7 +71,7 @@ def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple
     Everything is taken from the rotation that the roll about the first axis leaves over: it closes whatever it is.
     """
     a, n, m = wrist.a, wrist.n, wrist.m
-    bend = unit(roll[0] * a[0] + roll[1] * a[1], a[2])
-    q5 = angle(times((bend[1], bend[0]), p["wrist"], -1.0))
-    q6 = angle(unit(roll[0] * n[1] - roll[1] * n[0], roll[1] * m[0] - roll[0] * m[1]))
-    return (q5, q6), (wrapped(-q5 - p["straight"]), half_turn(q6))
+    bend = unit_pair(roll[0] * a[0] + roll[1] * a[1], a[2])
+    q5 = angle(add_angles((bend[1], bend[0]), p["wrist"], -1.0))
+    q6 = angle(unit_pair(roll[0] * n[1] - roll[1] * n[0], roll[1] * m[0] - roll[0] * m[1]))
+    return (q5, q6), (wrap_angle(-q5 - p["straight"]), turn_by_pi(q6))

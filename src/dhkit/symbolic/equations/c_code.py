@@ -1,16 +1,14 @@
-"""Equations as C99 that needs the standard mathematical functions alone."""
+"""Equations as C99; the code needs only the standard mathematical functions."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
-from dhkit.symbolic.equations.programs import Entry, Function, Language, Program, program, wrapped
+from dhkit.symbolic.equations.programs import Entry, Function, Program, program, wrapped
 from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
-
-C = Language(item="{array}[{k}]", offset=0, pi=repr(math.pi), functions={"abs": "fabs"})
+from dhkit.symbolic.syntax import C
 
 
 def equations_c(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
@@ -34,7 +32,7 @@ def _head(text: Program) -> Iterator[str]:
             yield f"    double {parameter.identifier};{own}"
         yield "} p = {"
         for parameter in text.parameters:
-            yield f"    .{parameter.identifier} = {_number(parameter.value)},"
+            yield f"    .{parameter.identifier} = {C.number(parameter.value)},"
         yield "};"
 
 
@@ -74,15 +72,3 @@ def _places(quantity: Quantity) -> list[tuple[int, ...]]:
     import numpy as np
 
     return list(np.ndindex(quantity.elements.shape))
-
-
-def _number(value: float) -> str:
-    return (
-        repr(value)
-        if math.isfinite(value)
-        else "NAN"
-        if math.isnan(value)
-        else "INFINITY"
-        if value > 0
-        else "-INFINITY"
-    )

@@ -1,7 +1,6 @@
-"""An element of the ring as people write it: collected by accelerations and products of rates, then by constants.
+"""Elements of the ring collected for reading: by accelerations and products of rates, then by constants.
 
-This is the form that every printer prints. It holds the element's terms and no others: multiplied out, it is the
-element again.
+All printers print this form. Multiplied out, it has the element's terms and no others.
 """
 
 from __future__ import annotations
@@ -17,10 +16,10 @@ from typing import TypeAlias
 from dhkit.symbolic.ring import Element, Generator, Ring
 
 Powers: TypeAlias = tuple[tuple[int, int], ...]
-"""Generators, by their place in the ring, with exponents, in the order in which they are read."""
+"""Indices of generators in the ring, with exponents, in the order in which a product is written."""
 
 INERTIAL = re.compile(r"[mIJ]|(XX|YY|ZZ|XY|YZ|XZ|MX|MY|MZ|r[xyz])\d")
-"""Names that lead a product: masses, inertias and first moments. It decides upon the order alone."""
+"""Names that are written first in a product: masses, inertias and first moments. They decide only about the order."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +29,11 @@ class Product:
     Attributes
     ----------
     coefficient
-        A rational, not zero.
+        A rational number other than zero.
     powers
-        What stands in front: constants, then sines and cosines.
+        Factors written first: constants, then sines and cosines.
     factor
-        A sum in brackets, or nothing.
+        A sum in brackets; empty if there is none.
     motion
         Rates and accelerations: one product of them, or a sum in brackets.
     """
@@ -52,12 +51,12 @@ _Term: TypeAlias = tuple[Powers, Fraction]
 
 @dataclass(frozen=True)
 class _Order:
-    """How a ring's generators are read: constants, then variables and their sines and cosines, then the motion."""
+    """The order in which a ring's generators are written: constants, then positions, sines and cosines, then rates."""
 
     places: tuple[int, ...]
-    """Which generator is read first, second, ..."""
+    """Index of the generator that is written first, second, ..."""
     positions: tuple[int, ...]
-    """Where each generator is read: the inverse of ``places``."""
+    """Position in the written order of each generator: the inverse of ``places``."""
     constants: int
     """Positions before this one are constants."""
     inertial: int
@@ -69,12 +68,12 @@ class _Order:
 
 
 def reading_order(ring: Ring) -> tuple[int, ...]:
-    """Return the places of a ring's generators in the order in which they are read."""
+    """Return the indices of a ring's generators in the order in which they are written."""
     return _order(ring).places
 
 
 def is_reciprocal(generator: Generator) -> bool:
-    """Whether a constant stands below a fraction bar."""
+    """Whether a constant is written in a denominator."""
     if generator.meaning is None or len(generator.meaning.terms) != 1:
         return False
     ((monomial, coefficient),) = generator.meaning.terms
@@ -82,7 +81,7 @@ def is_reciprocal(generator: Generator) -> bool:
 
 
 def collected(element: Element) -> Sum:
-    """Return an element's terms collected: by accelerations, products of rates, what is left; then by constants."""
+    """Return an element's terms collected by accelerations, by products of rates, and then by constants."""
     order = _order(element.ring)
     groups: dict[Powers, list[_Term]] = {}
     for monomial, coefficient in element.terms.items():
@@ -99,7 +98,7 @@ def collected(element: Element) -> Sum:
 
 
 def _motions(order: _Order, groups: Mapping[Powers, list[_Term]]) -> list[Sum]:
-    """Return what terms are collected by, in order; single rates of the same factor stand together: s2*(qd1 + qd2)."""
+    """Return the products of rates and accelerations to collect by, in order; rates of equal factors are summed."""
     motions: list[Sum] = []
     alike: dict[frozenset[_Term], tuple[int, Fraction]] = {}
     for powers in sorted(groups, key=_motion_key):
@@ -139,12 +138,12 @@ def _order(ring: Ring) -> _Order:
 
 
 def _motion_key(motion: Powers) -> tuple[bool, Sequence[int]]:
-    """Sort accelerations before rates, qd1^2 before qd1*qd2 before qd2^2, and nothing last."""
+    """Sort accelerations before rates, qd1^2 before qd1*qd2 before qd2^2, and terms without either last."""
     return not motion, [position for position, exponent in motion for _ in range(exponent)]
 
 
 def _factored(order: _Order, terms: Sequence[_Term], motion: Sum = ()) -> Product:
-    """Return terms as a common factor times a sum that has none."""
+    """Return terms as a common factor times a sum without common factor."""
     common = dict(terms[0][0])
     for powers, _ in terms[1:]:
         held = dict(powers)
@@ -162,7 +161,7 @@ def _factored(order: _Order, terms: Sequence[_Term], motion: Sum = ()) -> Produc
 
 
 def _sum(order: _Order, terms: Sequence[_Term]) -> Sum:
-    """Return terms without a common factor, grouped by constants that exclude each other, then by equal constants."""
+    """Return a sum of terms without common factor, grouped by constants that never occur together."""
     products, rest = [], list(terms)
     for position in _family(order, terms):
         group = [term for term in rest if _has(term, position)]
@@ -180,23 +179,23 @@ def _sum(order: _Order, terms: Sequence[_Term]) -> Sum:
 
 
 def _content(sizes: Sequence[Fraction]) -> Fraction:
-    """Return the number that is taken out of a sum: one that all terms share, or what divides whole numbers."""
+    """Return the number that is factored out of a sum: one that all coefficients share, or their greatest divisor."""
     if all(size == sizes[0] for size in sizes):
         return sizes[0]
     return Fraction(gcd(*(int(size) for size in sizes)) if all(size.denominator == 1 for size in sizes) else 1)
 
 
 def _without_brackets(product: Product) -> Sum:
-    """Return the terms of a sum that stands in brackets for no reason."""
+    """Return the terms of a product whose brackets are not needed."""
     if not product.factor or product.powers or abs(product.coefficient) != 1:
         return (product,)
     return product.factor if product.coefficient > 0 else tuple(_negative(inner) for inner in product.factor)
 
 
 def _family(order: _Order, terms: Sequence[_Term]) -> list[int]:
-    """Return constants of which no term holds two, nor one of them squared, each in several terms.
+    """Return constants that occur in several terms each, linearly and never two in one term.
 
-    Masses and inertias come first: equations of motion are linear in them.
+    Masses and inertias are tried first: equations of motion are linear in them.
     """
     counts: dict[int, int] = {}
     squared: set[int] = set()
@@ -232,7 +231,7 @@ def _negative(product: Product) -> Product:
 
 
 def _key(order: _Order, product: Product) -> tuple[int, int, list[int], list[int]]:
-    """Sort by the mass or inertia that leads, by the degree in sines and cosines, by those, by the other constants."""
+    """Sort by the leading mass or inertia, the degree in sines and cosines, these themselves, then other constants."""
     powers: list[int] = []
     leading: Product | None = product
     while leading is not None:
@@ -245,7 +244,7 @@ def _key(order: _Order, product: Product) -> tuple[int, int, list[int], list[int
 
 
 def _in_places(order: _Order, product: Product) -> Product:
-    """Return a product with places in the ring for positions in the order of reading."""
+    """Return a product with indices in the ring in place of positions in the written order."""
 
     def placed(powers: Powers) -> Powers:
         return tuple((order.places[position], exponent) for position, exponent in powers)

@@ -1,4 +1,4 @@
-"""Equations in LaTeX (amsmath), which also converts to MathML without loss."""
+"""Equations in LaTeX (amsmath) that latex2mathml converts to MathML without loss."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from dhkit.symbolic.ring.notation import (
 )
 
 LINE = 29.5
-"""What a line of an article's text holds, in em, of which some is kept for what the estimate of widths misses."""
+"""Width of a line of an article, em, minus a margin for errors of the estimated widths."""
 INDENT = r"\qquad "
 BREAK = "\n"
-"""Where a line may be broken, in front of a sign; outer ones are doubled."""
+"""Marks a place in front of a sign where a line may be broken; doubled outside of brackets."""
 FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2": r"\mathrm{atan2}"}
 ZEROS = 6
-"""Entries in a line that says that they are zero."""
+"""Names per line in the list of entries that are zero."""
 HEADS = {"tau": r"\tau"}
 WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
-"""Matrices and vectors with what they depend on, which also tells the vector g from the constant."""
+"""Matrices and vectors with their arguments, which also distinguish the vector g from the constant."""
 
 
 class LatexWriter:
-    """LaTeX; places where lines may be broken are marked."""
+    """Writes LaTeX, with marks where lines may be broken."""
 
     def __init__(self, names: Mapping[str, str], written: Notation) -> None:
         self._names = names
@@ -72,12 +72,12 @@ class LatexWriter:
     def brackets(self, inner: str) -> str:  # noqa: D102
         return _bracketed(inner)
 
-    def product(self, coefficient: Fraction, above: Sequence[str], below: Sequence[str]) -> str:  # noqa: D102
+    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
         decimal = decimal_text(coefficient)
         number = _number(coefficient) if decimal is None else _scientific(decimal)
-        factors = list(above)
-        if below:
-            divisor = _without_brackets(below[0]) if len(below) == 1 else " ".join(below)
+        factors = list(numerator)
+        if denominator:
+            divisor = _without_brackets(denominator[0]) if len(denominator) == 1 else " ".join(denominator)
             dividend = factors.pop(0) if factors else number
             number = "" if dividend == number else number
             factors[:0] = [rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}".replace(BREAK, "")]
@@ -111,12 +111,12 @@ def latex_text(element: Element) -> str:
 
 
 def latex_lines(element: Element, room: float) -> list[str]:
-    """Return an element in LaTeX, in lines of some width, em, that are broken in front of terms."""
+    """Return an element in LaTeX as lines of at most ``room`` em, broken in front of terms."""
     return _lines(_marked(element), room)
 
 
 def displays(quantities: Sequence[Quantity]) -> list[str]:
-    """Return displayed equations: a matrix where it fits a line, else entry by entry; then what c_{23} means.
+    """Return displayed equations: matrices that fit a line as such, others entry by entry; then the angles of c_{23}.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def _writer(ring: Ring) -> LatexWriter:
 
 
 def _matrix(quantity: Quantity) -> str:
-    """Return a matrix or a column in brackets, nothing where it is wider than a line or a mere number."""
+    """Return a matrix or a column in brackets; empty if it is wider than a line, or a scalar."""
     if not quantity.elements.ndim or quantity.labels:
         return ""
     table = quantity.elements.reshape(len(quantity.elements), -1)
@@ -172,7 +172,7 @@ def _matrix(quantity: Quantity) -> str:
 
 
 def _entries(quantity: Quantity) -> str:
-    """Return entry by entry, broken over lines."""
+    """Return the entries one after another, broken over lines."""
     lines: list[str] = []
     entries = [(" = ".join(_head(name) for name in names), element) for names, element in quantity.entries]
     room = LINE - max((latex_width(head) for head, _ in entries), default=0.0) - 1.5
@@ -218,7 +218,7 @@ def _lines(marked: str, room: float) -> list[str]:
 
 
 def _terms(marked: str) -> list[str]:
-    """Split a sum in front of the signs that stand in no brackets; other breaks stay marked."""
+    """Split a sum in front of the signs outside of brackets; breaks inside stay marked."""
     terms, depth = [], 0
     for piece in marked.split(BREAK):
         if depth == 0:
@@ -230,7 +230,7 @@ def _terms(marked: str) -> list[str]:
 
 
 def _where(angles: Sequence[Angle]) -> str:
-    """Return what the sines and cosines are of."""
+    """Return the angles of the sines and cosines."""
     own = [r"s_{i} = \sin(q_{i})", r"c_{i} = \cos(q_{i})"] if any(len(angle.joints) == 1 for angle in angles) else []
     sums = [
         f"{variable_latex(angle.name)} = \\{angle.function}({' + '.join(f'q_{{{j + 1}}}' for j in angle.joints)})"
@@ -247,7 +247,7 @@ def _where(angles: Sequence[Angle]) -> str:
 
 
 def _spaced(factors: Sequence[str]) -> str:
-    """Return factors side by side, names of several letters a little apart."""
+    """Return factors one after another, with a thin space around names of several letters."""
     text = factors[0]
     for before, factor in pairwise(factors):
         is_word = any(name.startswith((r"\mathrm", r"\mathit")) for name in (before, factor))
@@ -267,14 +267,14 @@ def _scientific(decimal: str) -> str:
 
 
 def _bracketed(inner: str) -> str:
-    """Return brackets as large as what they hold, which lines may be broken in."""
+    """Return a text in brackets of its height, inside which lines may be broken."""
     if "\\bigl(" in inner:
         return rf"\Bigl({inner}\Bigr)"
     return rf"\bigl({inner}\bigr)" if "(" in inner or "frac" in inner else f"({inner})"
 
 
 def _without_brackets(text: str) -> str:
-    """Return what stands in brackets, if they are around all of a text."""
+    """Return a text without the brackets around all of it, if it has any."""
     match = re.fullmatch(r"(?:\\[bB]igl)?\((.*?)(?:\\[bB]igr)?\)", text, re.DOTALL)
     if match is None:
         return text

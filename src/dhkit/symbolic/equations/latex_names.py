@@ -18,15 +18,15 @@ LETTER = re.compile(r"([A-Za-z])([a-z]?)(\d*)")
 
 
 def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
-    """Return for each name what it is in LaTeX.
+    """Return the LaTeX of each name.
 
     Parameters
     ----------
     names
         Names of constants.
     taken
-        LaTeX that already means something: a name that would come out as it, or as another name does, is spelled
-        letter by letter.
+        LaTeX that has another meaning: a name that would get the same LaTeX, or that of another name, is spelled letter
+        by letter.
     """
     listed = list(names)
     used, written = set(taken), {}
@@ -40,7 +40,7 @@ def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
 
 
 def nice(name: str) -> str:
-    """Return a name as it is typeset in books."""
+    """Return a name as textbooks typeset it."""
     if match := AXES.fullmatch(name):
         letter, axes, number = match.groups()
         return f"{letter}_{{{axes}{',' + number if number else ''}}}"
@@ -54,14 +54,14 @@ def nice(name: str) -> str:
     letters, number = HEAD.fullmatch(head).groups() if HEAD.fullmatch(head) else ("", "")  # type: ignore[union-attr]
     if not letters:
         return literal(name)
-    base, below = _base(letters)
-    scripts = [below + number] if below + number else []
+    base, subscript = _base(letters)
+    scripts = [subscript + number] if subscript + number else []
     scripts += [_word(part) for part in subscripts]
     return base + (f"_{{{','.join(scripts)}}}" if scripts else "")
 
 
 def greek(name: str) -> str | None:
-    """Return a Greek letter's command, or nothing."""
+    """Return the command of a Greek letter; None if the name is none."""
     return f"\\{name}" if name in GREEK else None
 
 
@@ -71,7 +71,7 @@ def literal(name: str) -> str:
 
 
 def _base(letters: str) -> tuple[str, str]:
-    """Split letters into a symbol and what stands below it: l and c of lc."""
+    """Split letters into a symbol and its subscript: l and c for lc."""
     if command := greek(letters):
         return command, ""
     if len(letters) == 1:

@@ -1,16 +1,16 @@
-"""How wide LaTeX mathematics come out, roughly: enough to know where to break a line."""
+"""Estimated widths of LaTeX mathematics, to decide where lines are broken."""
 
 from __future__ import annotations
 
 import re
 
 SCRIPT = 0.38
-"""Of a letter in a sub- or superscript, em."""
+"""Width of a letter in a sub- or superscript, em."""
 LETTER = 0.56
 DIGIT = 0.5
 NARROW = 0.4
 BINARY = 1.25
-"""A sign with the space around it."""
+"""Width of a binary operator with the space around it, em."""
 ACCENT = re.compile(r"\\d?dot\{(\w)\}")
 FRACTION = re.compile(r"\\t?frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}")
 SCRIPTS = re.compile(r"(?:_\{([^{}]*)\})?\^\{([^{}]*)\}|_\{([^{}]*)\}")
@@ -20,7 +20,7 @@ NOTHING = frozenset(("bigl", "bigr", "Bigl", "Bigr", "left", "right", "mathrm", 
 
 
 def latex_width(latex: str) -> float:
-    """Return an estimate of the width in em, rather too large."""
+    """Return an estimate of the width, em; errors are on the large side."""
     width = 0.0
 
     def measure_fraction(match: re.Match[str]) -> str:

@@ -1,6 +1,6 @@
-"""Equations as functions of a programming language, apart from its syntax: locals, then entry by entry.
+"""Equations as functions with local variables and one sum for each entry, before a language's printer writes them.
 
-Parameters are members of one record, ``p.m2``, which no name of the language or of its library can clash with.
+Parameters are members of one record, ``p.m2``: no name of a language or its library can clash with them.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import angles_of, constants_of, generators_of, symbols_of
+from dhkit.symbolic.syntax import Syntax
 
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
-"""What each quantity is a function of; those of kinematics of q alone."""
+"""Arguments of each quantity; quantities of kinematics depend on q alone."""
 STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}
-WORDS = """
+RESERVED_WORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long
     register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
     bool true false nullptr constexpr typeof alignas alignof thread_local static_assert asm linux unix i386
@@ -33,40 +34,18 @@ WORDS = """
     end function elseif otherwise catch global parfor persistent spmd try classdef endfunction endif endfor
     endwhile end_try_catch unwind_protect until
 """
-RESERVED = frozenset(WORDS.split()) | frozenset(keyword.kwlist)
-"""Words that C, Python, MATLAB or Octave keep for themselves, even as a member's name."""
-LONGEST = 48
-"""Letters of an identifier: MATLAB reads 63, of which the quantity's name takes some."""
-CHUNK = 40
-"""Terms of one statement: compilers nest long sums as deep as they are long."""
+RESERVED = frozenset(RESERVED_WORDS.split()) | frozenset(keyword.kwlist)
+"""Words that C, Python, MATLAB or Octave reserve, as names of members too."""
+MAX_IDENTIFIER_LENGTH = 48
+"""Longest identifier: MATLAB reads 63 letters, of which the quantity's name takes some."""
+MAX_TERMS = 40
+"""Largest number of terms of one statement: compilers recurse once for each term of a sum."""
 WIDTH = 112
 
 
 @dataclass(frozen=True)
-class Language:
-    """How a programming language writes what its expressions are made of.
-
-    Attributes
-    ----------
-    item
-        An array's entry, from its name and a number from 0: ``{array}[{k}]``.
-    offset
-        The number of the first entry.
-    pi
-        The number pi.
-    functions
-        Names of functions that it calls otherwise.
-    """
-
-    item: str
-    offset: int
-    pi: str
-    functions: Mapping[str, str]
-
-
-@dataclass(frozen=True)
 class Parameter:
-    """A number that may be changed: its name in code, its own name and its value, SI."""
+    """A parameter of the generated code: identifier, name in the robot file, and value, SI."""
 
     identifier: str
     name: str
@@ -75,7 +54,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Entry:
-    """Parts whose sum is an entry, and where it goes: places from 0, two for mirrored entries of the mass matrix."""
+    """An entry as parts to be added up, and its indices from 0; two for mirrored entries of the mass matrix."""
 
     places: tuple[tuple[int, ...], ...]
     parts: tuple[str, ...]
@@ -88,15 +67,15 @@ class Function:
     Attributes
     ----------
     quantity
-        What it computes.
+        The quantity that it computes.
     inputs
         Its arguments.
     used
-        Those that it reads.
+        The arguments that its expressions contain.
     locals
-        Names with the expressions that they stand for, and perhaps a remark.
+        Local variables: name, expression and a remark, which may be empty.
     entries
-        Those that are not zero.
+        The entries that are not zero.
     """
 
     quantity: Quantity
@@ -107,7 +86,7 @@ class Function:
 
     @property
     def title(self) -> str:
-        """What it computes, in words."""
+        """The quantity in words."""
         return self.quantity.title
 
 
@@ -118,7 +97,7 @@ class Program:
     Attributes
     ----------
     robot
-        The robot's name, harmless in any comment.
+        The robot's name, safe in comments of any language.
     identifier
         The robot's name as an identifier.
     n
@@ -126,7 +105,7 @@ class Program:
     parameters, functions
         See their classes.
     notes
-        What is written otherwise than in the robot's file.
+        One sentence for each name that differs from the robot file's.
     """
 
     robot: str
@@ -138,12 +117,12 @@ class Program:
 
     @property
     def subject(self) -> str:
-        """What the functions are, in words."""
+        """The functions together, in words."""
         moving = any(function.quantity.name in INPUTS for function in self.functions)
         return "Equations of motion" if moving else "Kinematics"
 
 
-def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Language) -> Program:
+def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax) -> Program:
     """Return quantities as functions in a language."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     values = dict(lag.description.numbers.values) | lag.arm.parameters
@@ -163,13 +142,13 @@ def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
 
 
 def harmless(text: str) -> str:
-    """Return text that ends no comment and no string: ASCII letters, digits and a few signs."""
+    """Return text with ASCII letters, digits and a few signs only, which cannot end a comment or a string."""
     return re.sub(r"[^A-Za-z0-9 _.,:=()+^-]", "?", text)
 
 
 def identifier(name: str) -> str:
     """Return a name as an identifier of ASCII letters, digits and underscores that begins with a letter."""
-    cleaned = re.sub(r"\W", "_", name, flags=re.ASCII)[:LONGEST]
+    cleaned = re.sub(r"\W", "_", name, flags=re.ASCII)[:MAX_IDENTIFIER_LENGTH]
     return cleaned if re.match(r"[A-Za-z]", cleaned) else f"x{cleaned}"
 
 
@@ -181,11 +160,11 @@ def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
     text
         The expression.
     first
-        What stands before it.
+        Text in front of the expression.
     following
-        What later lines begin with.
+        Beginning of the following lines.
     ending
-        What all lines but the last end with.
+        Ending of all lines but the last.
     """
     lines, line = [], first
     for piece in re.split(r"(?= [+-] )", text):
@@ -198,13 +177,11 @@ def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
 
 
 class _Code:
-    """Writes expressions, and remembers nothing between functions."""
+    """Writes expressions in a language's syntax; see :class:`dhkit.symbolic.equations.writing.Writer`."""
 
-    def __init__(self, language: Language, identifiers: Mapping[str, str]) -> None:
+    def __init__(self, language: Syntax, identifiers: Mapping[str, str]) -> None:
         self.language = language
         self.identifiers = identifiers
-
-    # A writer, see Writer
 
     def symbol(self, name: str) -> str:
         return f"p.{self.identifiers[name]}"
@@ -216,7 +193,7 @@ class _Code:
         return self.language.pi
 
     def call(self, function: str, arguments: Sequence[str]) -> str:
-        return f"{self.language.functions.get(function, function)}({', '.join(arguments)})"
+        return self.language.call(function, arguments)
 
     def power(self, base: str, exponent: int) -> str:
         return "*".join([base] * exponent)
@@ -224,10 +201,10 @@ class _Code:
     def brackets(self, inner: str) -> str:
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, above: Sequence[str], below: Sequence[str]) -> str:
+    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
         number = repr(float(coefficient))
-        factors = [number, *above] if coefficient != 1 or not above else above
-        return "*".join(factors) + "".join(f"/({x})" if "*" in x else f"/{x}" for x in below)
+        factors = [number, *numerator] if coefficient != 1 or not numerator else numerator
+        return "*".join(factors) + "".join(f"/({x})" if "*" in x else f"/{x}" for x in denominator)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:
         signed = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
@@ -244,9 +221,9 @@ class _Code:
         states = sorted(
             (g for g in generators if g.kind in STATES), key=lambda g: (list(STATES).index(g.kind), g.joint)
         )
-        listed += [(g.text, self._item(STATES[g.kind], g.joint), "") for g in states]
+        listed += [(g.text, self.language.entry(STATES[g.kind], g.joint), "") for g in states]
         for angle in angles_of(generators):
-            total = " + ".join(self._item("q", joint) for joint in angle.joints)
+            total = " + ".join(self.language.entry("q", joint) for joint in angle.joints)
             listed.append((angle.name, f"{angle.function}({total})", ""))
         entries = tuple(
             Entry(places, tuple(self._parts(element, short))) for places, element in _upper(quantity) if element
@@ -263,24 +240,21 @@ class _Code:
     def _parts(self, element: Element, short: Mapping[str, str]) -> Iterator[str]:
         printer = Printer(element.ring.generators, self, lambda generator: short[generator.text])
         products = [piece for product in collected(element) for piece in _split(product)]
-        for k in range(0, len(products), CHUNK):
-            yield printer.sum(products[k : k + CHUNK])
+        for k in range(0, len(products), MAX_TERMS):
+            yield printer.sum(products[k : k + MAX_TERMS])
 
     def _meaning(self, generator: Generator) -> str:
         assert generator.meaning is not None  # noqa: S101 - derived constants have one
         return Printer((), self).expression(generator.meaning)
 
-    def _item(self, array: str, k: int) -> str:
-        return self.language.item.format(array=array, k=k + self.language.offset)
-
 
 def _split(product: Product) -> Iterator[Product]:
-    """Split a product whose brackets hold a very long sum."""
-    if len(product.factor) <= CHUNK * 4:
+    """Split a product with a very long sum in brackets into several products."""
+    if len(product.factor) <= MAX_TERMS * 4:
         yield product
         return
-    for k in range(0, len(product.factor), CHUNK):
-        yield replace(product, factor=product.factor[k : k + CHUNK])
+    for k in range(0, len(product.factor), MAX_TERMS):
+        yield replace(product, factor=product.factor[k : k + MAX_TERMS])
 
 
 def _upper(quantity: Quantity) -> Iterator[tuple[tuple[tuple[int, ...], ...], Element]]:

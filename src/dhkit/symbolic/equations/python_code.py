@@ -1,14 +1,14 @@
-"""Equations as a Python module that needs NumPy alone."""
+"""Equations as a Python module; the code needs only NumPy."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
-from dhkit.symbolic.equations.programs import Entry, Function, Language, Program, program, wrapped
+from dhkit.symbolic.equations.programs import Entry, Function, Program, program, wrapped
 from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
+from dhkit.symbolic.syntax import PYTHON
 
 FUNCTION_NAMES = {
     "M": "mass_matrix",
@@ -21,23 +21,6 @@ FUNCTION_NAMES = {
     "T": "tool_pose",
     "J": "jacobian",
 }
-PYTHON = Language(
-    item="{array}[..., {k}]",
-    offset=0,
-    pi="np.pi",
-    functions={
-        name: f"np.{numpy}"
-        for name, numpy in (
-            ("tan", "tan"),
-            ("asin", "arcsin"),
-            ("acos", "arccos"),
-            ("atan", "arctan"),
-            ("atan2", "arctan2"),
-            ("sqrt", "sqrt"),
-            ("abs", "abs"),
-        )
-    },
-)
 
 
 def equations_python(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
@@ -60,7 +43,7 @@ def _head(text: Program) -> Iterator[str]:
         yield '\n\n@dataclass(frozen=True)\nclass Parameters:\n    """What the equations depend on, SI."""\n'
         for parameter in text.parameters:
             own = f"  # {parameter.name}" if parameter.name != parameter.identifier else ""
-            yield f"    {parameter.identifier}: float = {_number(parameter.value)}{own}"
+            yield f"    {parameter.identifier}: float = {PYTHON.number(parameter.value)}{own}"
         yield "\n\nPARAMETERS = Parameters()"
 
 
@@ -90,15 +73,3 @@ def _entry(name: str, entry: Entry) -> Iterator[str]:
         yield one if "\n" not in one else wrapped(part, head + "(", " " * 8) + ")"
     for target in targets[1:]:
         yield f"    {target} = {targets[0]}"
-
-
-def _number(value: float) -> str:
-    return (
-        repr(value)
-        if math.isfinite(value)
-        else "1e999 - 1e999"
-        if math.isnan(value)
-        else "1e999"
-        if value > 0
-        else "-1e999"
-    )

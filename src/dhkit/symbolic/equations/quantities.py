@@ -1,4 +1,4 @@
-"""What is printed, entry by entry: M, C, h, g, tau, K and V of a Lagrangian; A1 ... An, T and J of kinematics."""
+"""Quantities to print: M, C, h, g, tau, K and V of a Lagrangian; A1 ... An, T and J of kinematics."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ KINEMATIC_QUANTITIES = {
 }
 """The quantities of kinematics that can be printed, with their names in words; A stands for A1 ... An."""
 LINK = re.compile(r"A([1-9][0-9]*)")
-MOST_TERMS = 2_000
-"""Terms of an entry that people are asked to read."""
+MAX_PRINTED_TERMS = 2_000
+"""Largest number of terms of an entry that text and LaTeX print."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """A matrix, a vector or a number, to be printed.
+    """A matrix, vector or scalar to print.
 
     Attributes
     ----------
     name
         One of :data:`QUANTITIES`, ``definitions``, A1 ... An, T or J.
     elements
-        Shape (n, n), (n,) or (); of kinematics (4, 4) or (6, n).
+        Shape (n, n), (n,) or (); for kinematics (4, 4) or (6, n).
     labels
-        What the entries of definitions are called.
+        Names of the entries, for definitions.
     """
 
     name: str
@@ -52,12 +52,12 @@ class Quantity:
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether entries stand for each other: those of the mass matrix do."""
+        """Whether the matrix is symmetric, so that one triangle is printed: the mass matrix is."""
         return self.name == "M"
 
     @property
     def entries(self) -> Iterator[tuple[tuple[str, ...], Element]]:
-        """Entries that are not zero, each with its names, counted from 1: M12 and M21."""
+        """Entries that are not zero, each with its names, which count from 1: M12 and M21."""
         for place, element in np.ndenumerate(self.elements):
             if element and not (self.is_symmetric and place[0] > place[1]):
                 mirrored = [place] if not self.is_symmetric or place[0] == place[1] else [place, place[::-1]]
@@ -79,7 +79,7 @@ class Quantity:
 def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     """Return quantities of a Lagrangian by name, in the angles that make each entry shortest.
 
-    Several names in one text stand apart by commas or spaces.
+    Names in one text are separated by commas or spaces.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def is_kinematic(what: str | Sequence[str]) -> bool:
 
 
 def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
-    """Return :func:`quantities`, and what the base parameters in them stand for.
+    """Return :func:`quantities`, followed by the definitions of the base parameters in them.
 
     Raises
     ------
@@ -138,17 +138,18 @@ def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
 
 
 def check_length(quantities: Sequence[Quantity]) -> None:
-    """Refuse what nobody could read.
+    """Check that all entries are short enough to be read.
 
     Raises
     ------
     RingError
-        An entry has more than :data:`MOST_TERMS` terms.
+        An entry has more than :data:`MAX_PRINTED_TERMS` terms.
     """
     for quantity in quantities:
         for place, element in np.ndenumerate(quantity.elements):
-            if len(element) > MOST_TERMS:
+            if len(element) > MAX_PRINTED_TERMS:
                 raise RingError(
-                    f"{quantity.head(place)} has {len(element)} terms, more than the {MOST_TERMS} that text and LaTeX "
-                    "print; code (python, c, matlab) has no limit, and symbols='none' or base parameters are shorter"
+                    f"{quantity.head(place)} has {len(element)} terms, more than the {MAX_PRINTED_TERMS} that text and "
+                    "LaTeX print; code (python, c, matlab) has no limit, and symbols='none' or base parameters are "
+                    "shorter"
                 )

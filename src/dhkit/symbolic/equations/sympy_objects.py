@@ -1,4 +1,4 @@
-"""Equations as sympy objects in symbols q1, qd1, m2; nothing is simplified, which would take minutes."""
+"""Equations as sympy objects in symbols q1, qd1, m2; not simplified, because that would take minutes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FUNCTIONS = {"abs": "Abs"}
 
 
 class SympyWriter:
-    """Sympy expressions."""
+    """Builds sympy expressions."""
 
     def __init__(self, names: Notation) -> None:
         import sympy
@@ -47,9 +47,9 @@ class SympyWriter:
     def brackets(self, inner: Any) -> Any:  # noqa: D102
         return inner
 
-    def product(self, coefficient: Fraction, above: Sequence[Any], below: Sequence[Any]) -> Any:  # noqa: D102
+    def product(self, coefficient: Fraction, numerator: Sequence[Any], denominator: Sequence[Any]) -> Any:  # noqa: D102
         number = self._sympy.Rational(coefficient.numerator, coefficient.denominator)
-        return self._sympy.Mul(number, *above, *(divisor**-1 for divisor in below))
+        return self._sympy.Mul(number, *numerator, *(divisor**-1 for divisor in denominator))
 
     def total(self, terms: Sequence[tuple[bool, Any]]) -> Any:  # noqa: D102
         return self._sympy.Add(*(-term if negative else term for negative, term in terms))

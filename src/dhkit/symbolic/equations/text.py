@@ -1,4 +1,4 @@
-"""Equations as plain text, which people read and :func:`dhkit.expressions.parse` reads back."""
+"""Equations as plain text, which :func:`dhkit.expressions.parse` can read back."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from dhkit.symbolic.ring.notation import Notation, angles_of, generators_of, not
 WIDTH = 100
 """Columns of a line."""
 INDENT = "      "
-SHOWN = 12
-"""Terms that are shown of an element too long to read."""
+SHOWN_TERMS = 12
+"""Number of terms printed of an element that is too long to read."""
 READABLE = 2_000
-"""Terms of the longest element that is collected for a message."""
+"""Largest number of terms of an element that is collected for a message."""
 
 
 class TextWriter:
-    """Text with ``*``, ``/`` and ``^``."""
+    """Writes text with ``*``, ``/`` and ``^``."""
 
     def __init__(self, names: Notation) -> None:
         self._names = names
@@ -45,13 +45,14 @@ class TextWriter:
     def brackets(self, inner: str) -> str:  # noqa: D102
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, above: Sequence[str], below: Sequence[str]) -> str:  # noqa: D102
+    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
         decimal = decimal_text(coefficient)
         if decimal is not None:
-            factors, divisors = [decimal, *above], list(below)
+            factors, divisors = [decimal, *numerator], list(denominator)
         else:
-            factors = [str(coefficient.numerator), *above] if coefficient.numerator != 1 or not above else list(above)
-            divisors = [str(coefficient.denominator), *below] if coefficient.denominator != 1 else list(below)
+            over, under = coefficient.numerator, coefficient.denominator
+            factors = [*([str(over)] if over != 1 or not numerator else []), *numerator]
+            divisors = [*([str(under)] if under != 1 else []), *denominator]
         return "*".join(factors) + "".join(f"/{divisor}" for divisor in divisors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
@@ -60,7 +61,7 @@ class TextWriter:
 
 
 def plain_text(element: Element) -> str:
-    """Return an element as text; of one too long to be read the first terms and how many there are.
+    """Return an element as text; if it is too long to read, its first terms and their number.
 
     Examples
     --------
@@ -73,12 +74,12 @@ def plain_text(element: Element) -> str:
     printer = Printer(ring.generators, TextWriter(notation(ring)))
     if len(element) <= READABLE:
         return printer.sum(collected(element))
-    first = dict(list(element.terms.items())[:SHOWN])
+    first = dict(list(element.terms.items())[:SHOWN_TERMS])
     return f"{printer.sum(collected(ring.from_terms(first)))} + ... ({len(element)} terms)"
 
 
 def equations_text(quantities: Sequence[Quantity]) -> str:
-    """Return quantities as text, an entry after the other, and what the sines and cosines in them are of.
+    """Return quantities as text, entry by entry, followed by the angles of their sines and cosines.
 
     Raises
     ------
@@ -126,7 +127,7 @@ def _broken(head: str, text: str) -> list[str]:
 
 
 def _terms(text: str) -> list[str]:
-    """Split a sum in front of the signs that stand in no brackets."""
+    """Split a sum in front of the signs outside of brackets."""
     terms, depth = [""], 0
     for piece in re.split(r"(?= [+-] )", text):
         if depth == 0:

@@ -1,4 +1,4 @@
-"""One walk over collected equations and over the expressions of constants, for every kind of output."""
+"""The traversal of collected equations and of constants' expressions that all output formats share."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from dhkit.symbolic.ring import Generator
 
 T = TypeVar("T")
 
-SHORT = 16
-"""Fractions of numbers up to this are printed as such (1/12), others as decimals where they end (0.4318)."""
-DIGITS = 1000
+MAX_FRACTION_PART = 16
+"""Fractions with numerator and denominator up to this are printed as fractions (1/12), others as decimals (0.4318)."""
+DECIMAL_DIGITS = 1000
+"""Precision with which decimals that end are written; robot files have far fewer digits."""
 
 
 class Writer(Protocol[T]):
-    """What a kind of output makes of each piece of an equation."""
+    """Writes the parts of an equation in one output format."""
 
     def symbol(self, name: str) -> T:
         """Return a constant by its name."""
@@ -39,24 +40,24 @@ class Writer(Protocol[T]):
     def brackets(self, inner: T) -> T:
         """Return a sum as a factor."""
 
-    def product(self, coefficient: Fraction, above: Sequence[T], below: Sequence[T]) -> T:
-        """Return a number above 0 times factors, divided by others."""
+    def product(self, coefficient: Fraction, numerator: Sequence[T], denominator: Sequence[T]) -> T:
+        """Return a positive number times the numerator's factors, divided by the denominator's."""
 
     def total(self, terms: Sequence[tuple[bool, T]]) -> T:
         """Return the sum of terms, each with whether it is subtracted."""
 
 
 class Printer(Generic[T]):
-    """Writes collected sums of one ring.
+    """Writes collected sums of one ring in an output format.
 
     Parameters
     ----------
     generators
-        Those of the ring.
+        The ring's generators.
     writer
-        The kind of output.
+        The output format.
     constant
-        What a constant that is neither a name nor a reciprocal is written as, where that is not its meaning in full.
+        Writes a constant that is neither a name nor a reciprocal; its whole expression if not given.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class Printer(Generic[T]):
     ) -> None:
         self.writer = writer
         self._constant = constant or (lambda generator: self._atom_like(generator))
-        self._is_below = [is_reciprocal(generator) for generator in generators]
+        self._is_reciprocal = [is_reciprocal(generator) for generator in generators]
         self._generators = generators
         self._written: dict[int, T] = {}
 
@@ -76,22 +77,22 @@ class Printer(Generic[T]):
     def product(self, product: Product) -> T:
         """Return a product without its sign."""
         writer = self.writer
-        above = self._powers(product.powers, below=False)
+        numerator = self._powers(product.powers, reciprocals=False)
         if product.factor:
-            above.append(writer.brackets(self.sum(product.factor)))
+            numerator.append(writer.brackets(self.sum(product.factor)))
         if len(product.motion) > 1:
-            above.append(writer.brackets(self.sum(product.motion)))
+            numerator.append(writer.brackets(self.sum(product.motion)))
         elif product.motion:
-            above += self._powers(product.motion[0].powers, below=False)
-        return writer.product(abs(product.coefficient), above, self._powers(product.powers, below=True))
+            numerator += self._powers(product.motion[0].powers, reciprocals=False)
+        return writer.product(abs(product.coefficient), numerator, self._powers(product.powers, reciprocals=True))
 
     def expression(self, expression: Expression) -> T:
         """Return an expression of constants."""
         writer, terms = self.writer, []
         for monomial, coefficient in expression.terms:
-            above = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
-            below = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
-            terms.append((coefficient < 0, writer.product(abs(coefficient), above, below)))
+            numerator = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
+            denominator = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
+            terms.append((coefficient < 0, writer.product(abs(coefficient), numerator, denominator)))
         return writer.total(terms or [(False, writer.product(Fraction(0), [], []))])
 
     def atom(self, atom: Atom) -> T:
@@ -102,19 +103,19 @@ class Printer(Generic[T]):
             return self.writer.call(atom.name, [self.expression(argument) for argument in atom.arguments])
         return self.writer.pi() if atom.name == "pi" else self.writer.symbol(atom.name)
 
-    def _powers(self, powers: Powers, *, below: bool) -> list[T]:
-        return [self._power(self._generator(k), e) for k, e in powers if self._is_below[k] == below]
+    def _powers(self, powers: Powers, *, reciprocals: bool) -> list[T]:
+        return [self._power(self._generator(k), e) for k, e in powers if self._is_reciprocal[k] == reciprocals]
 
     def _power(self, base: T, exponent: int) -> T:
         return base if exponent == 1 else self.writer.power(base, exponent)
 
     def _generator(self, place: int) -> T:
-        """Return a generator; of a reciprocal what it is the reciprocal of."""
+        """Return a generator; a reciprocal's denominator in place of the reciprocal."""
         if place not in self._written:
             generator = self._generators[place]
             if generator.kind != "constant":
                 self._written[place] = self.writer.variable(generator)
-            elif self._is_below[place] or is_name(generator):
+            elif self._is_reciprocal[place] or is_name(generator):
                 self._written[place] = self._atom_like(generator)
             else:
                 self._written[place] = self._constant(generator)
@@ -130,16 +131,16 @@ class Printer(Generic[T]):
 
 
 def decimal_text(value: Fraction) -> str | None:
-    """Return a rational's decimal, exactly; None of a short fraction, or where the decimal does not end."""
+    """Return a rational as an exact decimal; None for a short fraction, or where the decimal does not end."""
     denominator = value.denominator
     for prime in (2, 5):
         while denominator % prime == 0:
             denominator //= prime
-    if denominator != 1 or max(value.numerator, value.denominator) <= SHORT:
+    if denominator != 1 or max(value.numerator, value.denominator) <= MAX_FRACTION_PART:
         return None
-    return str(Context(prec=DIGITS).divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
+    return str(Context(prec=DECIMAL_DIGITS).divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
 
 
 def is_name(generator: Generator) -> bool:
-    """Whether a constant is written by its name."""
+    """Whether a constant is written as its name."""
     return generator.meaning is None or generator.meaning.text in generator.meaning.symbols

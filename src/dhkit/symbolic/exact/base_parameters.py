@@ -1,10 +1,10 @@
 """Base parameters: the fewest combinations of inertial parameters that the torques depend on.
 
-What part of a link is symmetric about its joint's axis might as well belong to the link before, and a sliding link
-turns with the one before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
-robots"). That is done exactly, with symbols. What depends on others still, or has no effect, is found in the columns
-of the regressor, lengths and angles being in general position, and grouped exactly. That the grouped equations are the
-full ones can be proved by substitution.
+First, moments that are symmetric about a revolute joint's axis, and all second moments of a prismatic joint's link, are
+added to the link before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
+robots"), exactly, with symbols. Then parameters that have no effect, or that depend on others, are found as zero or
+linearly dependent columns of the regressor at random lengths and angles, and are grouped exactly. Substitution proves
+that the grouped equations equal the full ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dhkit.description import Description, Named, takes_robot
 from dhkit.display import MOST_ROWS, counted, html_table, repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic.exact import composite
-from dhkit.symbolic.exact.composite import RigidBody, Step
+from dhkit.symbolic.exact.composite import JointTransform, RigidBody
 from dhkit.symbolic.exact.dependencies import MissingReciprocalError, independent
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
@@ -29,25 +29,25 @@ from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, tr
 SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
 READABLE, LONGEST_DEFINITION = 30, 200
-"""Terms and characters of a definition that a notebook shows."""
+"""Number of definitions, and characters of a definition, that a notebook shows."""
 MAX_TERMS = 60_000
-"""Terms of M in all inertial parameters: three times a Jaco's, a minute on sympy's rings."""
+"""Largest number of terms of M in all inertial parameters: three times the Jaco's, a minute in sympy's rings."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BaseParameters:
-    """The fewest combinations of inertial parameters that decide an arm's torques.
+    """The fewest combinations of inertial parameters that determine an arm's torques.
 
-    They are Khalil's, in each joint's own frame (its z along the joint, moving with the link; the DH frame itself in
-    the modified convention): moments ``XX2`` ... ``ZZ2`` about its origin, first moments ``MX2 MY2 MZ2``, mass ``M2``,
-    and ``Ia2`` for the rotor's inertia as the joint sees it.
+    Names follow Khalil: inertia ``XX2`` ... ``ZZ2`` about the origin of link 2's joint frame, first moments
+    ``MX2 MY2 MZ2``, mass ``M2``, and rotor inertia at the joint side ``Ia2``. The joint frame moves with the link and
+    has its z axis along the joint; in the modified convention it is the DH frame.
 
     Attributes
     ----------
     definitions
-        What each stands for, by name: an element of ``full``'s ring.
+        The combination that each name stands for, an element of ``full``'s ring.
     lagrangian
-        The equations of motion in them.
+        The equations of motion in base parameters.
     full
         The equations of motion in all inertial parameters.
     """
@@ -77,9 +77,9 @@ class BaseParameters:
         return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=LONGEST_DEFINITION)
 
     def prove(self) -> Proof:
-        """Decide whether the equations in base parameters are the full ones, by putting the definitions in.
+        """Decide whether the equations in base parameters equal the full ones, by substituting the definitions.
 
-        M and g decide everything else: C is made of M's derivatives.
+        M and g are compared; C consists of derivatives of M.
         """
         short, ring = self.lagrangian, self.full.arm.ring
         places = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
@@ -91,14 +91,14 @@ class BaseParameters:
 @takes_robot
 @lru_cache(maxsize=32)
 def base_parameters(description: Description) -> BaseParameters:
-    """Return an arm's base parameters, with what each stands for, and its equations of motion in them.
+    """Return an arm's base parameters with their definitions, and its equations of motion in them.
 
     Raises
     ------
     DescriptionError
         A link has no body.
     RingError
-        The equations are too long, or a parameter depends on others by no polynomial.
+        The equations are too long, or a dependency between parameters is no polynomial.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def base_parameters(description: Description) -> BaseParameters:
             raise RingError(
                 f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}"
             )
-        definitions = _regrouped(full.arm)
+        definitions = _regroup(full.arm)
         try:
             definitions = independent(_equations(full.arm, definitions), definitions)
         except MissingReciprocalError as missing:
@@ -126,8 +126,8 @@ def base_parameters(description: Description) -> BaseParameters:
     raise RingError(f"{description.name}: base parameters were not found")
 
 
-def _regrouped(arm: ExactArm) -> dict[str, Element]:
-    """Move to the link before what may as well be its own, and name what is left."""
+def _regroup(arm: ExactArm) -> dict[str, Element]:
+    """Return the parameters that remain after moving shared moments to the links before, by name."""
     bodies, steps = composite.joint_bodies(arm), composite.joint_steps(arm)
     for j in range(arm.n - 1, 0, -1):
         moving, bodies[j] = _split(arm.ring, arm.ring.kinds[j], bodies[j])
@@ -142,13 +142,13 @@ def _regrouped(arm: ExactArm) -> dict[str, Element]:
 
 
 def _ending(arm: ExactArm) -> str:
-    """Return what our names end in: an underscore where a parameter of the file has one of them."""
+    """Return the ending of base parameters' names: an underscore where a parameter of the file has such a name."""
     names = {f"{key}{j}" for key in (*SECOND, *MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
     return "" if names.isdisjoint(arm.ring.constants) else "_"
 
 
 def _split(ring: Ring, kind: str, body: RigidBody) -> tuple[RigidBody, RigidBody]:
-    """Return what of a link may belong to the link before, and what is left of it."""
+    """Return the part of a link that the link before may hold as well, and the rest."""
     zero = ring.zero
     moment, second = np.array([zero] * 3, dtype=object), np.full((3, 3), zero, dtype=object)
     if kind != "R":
@@ -159,14 +159,14 @@ def _split(ring: Ring, kind: str, body: RigidBody) -> tuple[RigidBody, RigidBody
     return moving, RigidBody(zero, body.moment - moment, body.second - second)
 
 
-def _at_rest(arm: ExactArm, j: int, step: Step) -> Step:
-    """Return a joint's step with its variable at zero: what is moved does not feel it."""
+def _at_rest(arm: ExactArm, j: int, step: JointTransform) -> JointTransform:
+    """Return a joint's step with its variable at zero, on which moved moments do not depend."""
     ring = arm.ring
     if ring.kinds[j] == "R":
         places = {ring.place("sine", j): ring.zero, ring.place("cosine", j): ring.one}
     else:
         places = {ring.place("position", j): ring.zero}
-    return Step(_mapped(step.R, ring, places), _mapped(step.p, ring, places))
+    return JointTransform(_mapped(step.R, ring, places), _mapped(step.p, ring, places))
 
 
 def _mapped(elements: Elements, ring: Ring, places: Mapping[int, Element]) -> Elements:
@@ -217,7 +217,7 @@ def _row(row: ExactRow, ring: Ring) -> ExactRow:
 
 
 def _kept(arm: ExactArm) -> list[Constant]:
-    """Return the constants of table and gravity: those that are not, or hold, an inertial parameter."""
+    """Return the constants that do not depend on an inertial parameter: those of table and gravity."""
     geometry = [*arm.gravity, *arm.origin, *arm.tool]
     for row in arm.rows:
         geometry += [row.a, row.d, *row.alpha, *row.theta]

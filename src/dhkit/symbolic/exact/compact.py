@@ -1,7 +1,7 @@
-"""The shortest way to write equations: sines and cosines of sums of joint angles where axes are parallel.
+"""Equations written with sums of joint angles, c23 for c2*c3 - s2*s3, where parallel axes make that shorter.
 
-Frames of parallel axes turn by sums of joint values: c2*c3 - s2*s3 is c23. The ring's normal form is kept for
-proofs; for reading, each entry is written in whichever angles make it shortest.
+Proofs use the ring's normal form in single angles; for reading, each entry is written in the angles that give it the
+fewest terms.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-WAYS = 24
-"""Choices of angles that are tried."""
+MAX_CHOICES = 24
+"""Largest number of choices of angles that are tried for an entry."""
 
 
 def parallel_runs(arm: ExactArm) -> list[tuple[int, ...]]:
-    """Return the turning joints, from 0, whose axes are parallel and point the same way, run by run.
+    """Return runs of revolute joints, counted from 0, whose axes are parallel and point the same way.
 
-    A sliding joint between them leaves them parallel.
+    Prismatic joints between them are skipped: they leave the axes parallel.
     """
     runs: list[list[int]] = [[]]
     for i, row in enumerate(arm.rows):
@@ -37,55 +37,55 @@ def parallel_runs(arm: ExactArm) -> list[tuple[int, ...]]:
 
 
 def shortened(arm: ExactArm, elements: Elements) -> Elements:
-    """Return elements, each in the angles that make it shortest; they are equal, and stay elements of a ring.
+    """Return equal elements, each in the angles that give it the fewest terms.
 
     Parameters
     ----------
     arm
-        Whose ring they are of.
+        The arm of whose ring they are.
     elements
         An array of elements.
     """
     runs = parallel_runs(arm)
     if not runs:
         return elements
-    writings = _writings(arm.ring, tuple(runs))
+    writings = _rings_in_other_angles(arm.ring, tuple(runs))
     shortest = np.empty(elements.shape, dtype=object)
     for place, element in np.ndenumerate(elements):
-        written = (_merged(translated(element, ring, turns)) for ring, turns in writings)
+        written = (_merge_angles(translated(element, ring, turns)) for ring, turns in writings)
         shortest[place] = min([element, *written], key=len)
     return shortest
 
 
 def shortened_alike(arm: ExactArm, elements: Sequence[Element]) -> list[Element]:
-    """Return elements in the one choice of angles that makes all of them together shortest, to be held side by side."""
+    """Return elements in one choice of angles for all, the one with the fewest terms together, to compare them."""
     runs = parallel_runs(arm)
     ways = [list(elements)]
-    for ring, turns in _writings(arm.ring, tuple(runs)) if runs else []:
-        ways.append([_merged(translated(element, ring, turns)) for element in elements])
+    for ring, turns in _rings_in_other_angles(arm.ring, tuple(runs)) if runs else []:
+        ways.append([_merge_angles(translated(element, ring, turns)) for element in elements])
     return min(ways, key=lambda written: sum(map(len, written)))
 
 
 @lru_cache(maxsize=64)
-def _writings(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
-    """Return rings in other angles, each with what the sines and cosines of the own ring's joints are in it."""
+def _rings_in_other_angles(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
+    """Return rings in other angles, each with the sines and cosines of the given ring's joints in its own."""
     sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
-    rings = [Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_ways(runs), WAYS)]
-    return [(other, _turns(ring, other)) for other in rings]
+    rings = [Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_choices_of_angles(runs), MAX_CHOICES)]
+    return [(other, _sines_and_cosines(ring, other)) for other in rings]
 
 
-def _ways(runs: Sequence[tuple[int, ...]]) -> Iterator[dict[int, tuple[int, ...]]]:
-    """Yield which joints each angle is the sum of: in every run from some joint on, or none."""
+def _choices_of_angles(runs: Sequence[tuple[int, ...]]) -> Iterator[dict[int, tuple[int, ...]]]:
+    """Yield choices of angles, as the joints that each angle sums: in each run, sums begin at some joint or nowhere."""
     for starts in product(*(range(len(run)) for run in runs)):
         angles: dict[int, tuple[int, ...]] = {}
         for run, start in zip(runs, starts, strict=True):
-            summed = len(run) - 1 - start  # none first: joint angles themselves
+            summed = len(run) - 1 - start  # the first choice has no sums
             angles |= {run[k]: run[summed : k + 1] for k in range(summed + 1, len(run))}
         yield angles
 
 
-def _turns(old: Ring, new: Ring) -> dict[int, Element]:
-    """Return what the sines and cosines of the old ring's joints are in the new one's angles."""
+def _sines_and_cosines(old: Ring, new: Ring) -> dict[int, Element]:
+    """Return the sines and cosines of the old ring's joints in the new ring's angles, by index in the old ring."""
     turns: dict[int, Element] = {}
     for i, joints in new.angles.items():
         s, c = new.sine(i), new.cosine(i)
@@ -97,8 +97,8 @@ def _turns(old: Ring, new: Ring) -> dict[int, Element]:
     return turns
 
 
-def _merged(element: Element) -> Element:
-    """Put the addition theorem to use, backwards, as often as it makes the element shorter."""
+def _merge_angles(element: Element) -> Element:
+    """Return the element with products merged into sums of angles (addition theorem) wherever that shortens it."""
     ring = element.ring
     terms = dict(element.terms)
     angles = {joints: (sine, cosine) for sine, cosine, joints in ring.turning}
@@ -114,7 +114,7 @@ def _merged(element: Element) -> Element:
 
 
 Places = tuple[int, int]
-"""Of an angle's sine and cosine in a monomial."""
+"""Indices of an angle's sine and cosine in a monomial."""
 
 
 def _add(terms: dict[Monomial, Fraction], a: Places, b: Places, total: Places) -> bool:
@@ -132,7 +132,7 @@ def _subtract(terms: dict[Monomial, Fraction], a: Places, b: Places, difference:
 
 
 def _paired(terms: dict[Monomial, Fraction], first: Places, second: Places, merged: int, sign: int) -> bool:
-    """Replace x first + sign x second by x merged, wherever both are there."""
+    """Replace x first + sign x second by x merged for every monomial x; return whether any was replaced."""
     found = False
     for monomial in [m for m in terms if m[first[0]] and m[first[1]]]:
         coefficient = terms.get(monomial)

@@ -1,8 +1,8 @@
 """Mass matrix and potential energy in the exact ring, by composite bodies.
 
-What lies beyond a joint is one rigid body; a unit acceleration of the joint gives it a momentum, and that momentum's
-parts along the joints before are the entries of a column of M (Walker & Orin, 1982, method 3). Linear in the inertial
-parameters from the first line on, so that expressions stay as short as they can be.
+All links that a joint carries are one rigid body. A unit rate of the joint gives it a momentum, whose components along
+the joints before are a column of M (Walker & Orin, 1982, method 3). Every step is linear in the inertial parameters,
+which keeps expressions short.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from dhkit.symbolic.ring import Element, Elements, Ring
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """Where a joint's frame, its z along the joint's axis, stands in that of the joint before."""
+class JointTransform:
+    """A joint's frame, with its z axis along the joint, in the frame of the joint before; p in m."""
 
     R: Elements
     """Shape (3, 3)."""
@@ -28,7 +28,7 @@ class Step:
     """Shape (3,)."""
 
     @classmethod
-    def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> Step:
+    def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> JointTransform:
         """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
         (ca, sa), (c, s) = alpha, row.theta
         R = np.array([[c, -s, ring.zero], [s * ca, c * ca, -sa], [s * sa, c * sa, ca]], dtype=object)
@@ -37,7 +37,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """A rigid body in a joint's frame: mass, first moments, tensor about the origin."""
+    """A rigid body in a joint's frame: mass, kg, first moments, kg m, and inertia about the origin, kg m^2."""
 
     mass: Element
     moment: Elements
@@ -48,8 +48,8 @@ class RigidBody:
     def __add__(self, other: RigidBody) -> RigidBody:
         return RigidBody(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
 
-    def moved(self, step: Step) -> RigidBody:
-        """Return the body in the frame before: Steiner's theorem in first moments."""
+    def moved(self, step: JointTransform) -> RigidBody:
+        """Return the body in the frame before, by Steiner's theorem in first moments."""
         p, m = step.p, self.mass
         h = step.R @ self.moment
         square = 2 * (p @ h) + m * (p @ p)
@@ -63,7 +63,7 @@ class RigidBody:
 
 
 def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Elements:
-    """Return M, shape (n, n), reflected rotor inertia included; ``bodies`` stand in for the arm's own."""
+    """Return M, shape (n, n), with reflected rotor inertia; ``bodies`` in joint frames replace the arm's own."""
     n, ring = arm.n, arm.ring
     steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
     M = np.empty((n, n), dtype=object)
@@ -82,7 +82,7 @@ def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Ele
 
 
 def potential_energy(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Element:
-    """Return V = -sum m g.c, zero where the world's origin is; ``bodies`` stand in for the arm's own."""
+    """Return V = -sum m g.c, J, zero at the world's origin; ``bodies`` in joint frames replace the arm's own."""
     steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
     beyond = bodies[-1]
     for j in reversed(range(arm.n - 1)):
@@ -103,18 +103,18 @@ def _momentum(ring: Ring, kind: str, body: RigidBody) -> tuple[Elements, Element
     return np.array([ring.zero, ring.zero, body.mass], dtype=object), np.array([y, -x, ring.zero], dtype=object)
 
 
-def joint_steps(arm: ExactArm) -> list[Step]:
-    """Return each joint's frame in the one before, of which frame 0 is the first."""
+def joint_steps(arm: ExactArm) -> list[JointTransform]:
+    """Return the transform of each joint's frame from the one before; the first is from frame 0."""
     ring = arm.ring
     if not arm.is_standard:
-        return [Step.of(ring, row.a, row.alpha, row) for row in arm.rows]
-    # A standard row's a and alpha lie behind its joint: they are the next one's.
+        return [JointTransform.of(ring, row.a, row.alpha, row) for row in arm.rows]
+    # In a standard row a and alpha follow the joint: they belong to the next joint's transform.
     before = [(ring.zero, (ring.one, ring.zero)), *((row.a, row.alpha) for row in arm.rows[:-1])]
-    return [Step.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
+    return [JointTransform.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
 
 
 def joint_bodies(arm: ExactArm) -> list[RigidBody]:
-    """Return each link in its joint's frame."""
+    """Return each link's bodies as one, in the frame of its joint."""
     masses = [
         reduce(operator.add, (RigidBody(body.mass, body.moment, body.second) for body in bodies))
         for bodies in arm.bodies
@@ -124,11 +124,11 @@ def joint_bodies(arm: ExactArm) -> list[RigidBody]:
     return [body.moved(_behind(arm.ring, row)) for body, row in zip(masses, arm.rows, strict=True)]
 
 
-def _behind(ring: Ring, row: ExactRow) -> Step:
-    """Return Tx(a) Rx(alpha): the DH frame in the joint's frame, of a standard row."""
+def _behind(ring: Ring, row: ExactRow) -> JointTransform:
+    """Return Tx(a) Rx(alpha): DH frame i in joint i's frame, for a standard row."""
     (ca, sa), zero, one = row.alpha, ring.zero, ring.one
     R = np.array([[one, zero, zero], [zero, ca, -sa], [zero, sa, ca]], dtype=object)
-    return Step(R, np.array([row.a, zero, zero], dtype=object))
+    return JointTransform(R, np.array([row.a, zero, zero], dtype=object))
 
 
 def _cross(a: Elements, b: Elements) -> Elements:

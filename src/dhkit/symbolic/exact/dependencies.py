@@ -1,4 +1,4 @@
-"""Which parameters of equations of motion depend on others, found in the regressor's columns and grouped exactly."""
+"""Linearly dependent parameters of equations of motion: found as columns of the regressor, grouped exactly."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.ring import Element, Ring, RingError, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-MOST = 3
-"""Parameters that one may depend on: a sliding joint's moment on two of the link that it slides in, and a mass."""
+MAX_SUPPORT = 3
+"""Largest number of parameters that one depends on: a prismatic link's moment, on two moments of the link before and
+a mass."""
 TRIES = 200
 DEPENDENT = 1e-9
-"""What is left of a column of unit length, others taken off, where it depends on them; roundings leave 1e-14."""
+"""A column of unit length depends on others where less than this remains of it; rounding leaves 1e-14."""
 
 
 class MissingReciprocalError(Exception):
-    """A parameter depends on another by a fraction whose reciprocal the ring has not."""
+    """A parameter depends on another by a fraction whose reciprocal is not in the ring."""
 
     def __init__(self, reciprocal: Expression) -> None:
         super().__init__(str(reciprocal))
@@ -34,7 +35,7 @@ class MissingReciprocalError(Exception):
 
 
 def independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[str, Element]:
-    """Drop what has no effect, and group what depends on parameters before it."""
+    """Return the independent parameters: without those of no effect, dependent ones grouped with those before them."""
     regressor = _Regressor.of(trial, list(definitions))
     merged: dict[str, Element] = {}
     basis = np.zeros((len(regressor.rows), 0))
@@ -43,7 +44,7 @@ def independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[s
         if not column.any():
             continue
         rest = column / np.linalg.norm(column)
-        for _ in range(2):  # once more, so that roundings go as well
+        for _ in range(2):  # the second pass removes what rounding left
             rest = rest - basis @ (basis.T @ rest)
         if np.linalg.norm(rest) > DEPENDENT:
             merged[name] = definitions[name]
@@ -56,16 +57,16 @@ def independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[s
 
 @dataclass(frozen=True, eq=False)
 class _Regressor:
-    """Coefficients of the parameters in M and g, which decide the torques: a row for every entry and monomial of state.
+    """Coefficients of the parameters in M and g, one row for each entry and each monomial in the state.
 
     Attributes
     ----------
     ring, names
-        Of the parameters.
+        The ring of the coefficients, and the parameters.
     rows
-        The coefficient of each parameter: terms without the state.
+        The coefficient of each parameter, an element without the state.
     numbers
-        What the rows are worth where lengths and angles are anything, shape (rows, parameters).
+        The rows' values at random lengths and angles, shape (rows, parameters).
     """
 
     ring: Ring
@@ -87,32 +88,34 @@ class _Regressor:
                     rest[k] = 0
                 row = terms.setdefault((i, tuple(monomial[k] for k in of_state)), {})
                 row.setdefault(places[place], {})[tuple(rest)] = coefficient
-        anywhere = _somewhere(ring)
+        anywhere = _random_values(ring)
         numbers = np.zeros((len(terms), len(names)))
         for k, row in enumerate(terms.values()):
             for name, entry in row.items():
-                numbers[k, names.index(name)] = sum(_worth(m, c, anywhere) for m, c in entry.items())
+                numbers[k, names.index(name)] = sum(_term_value(m, c, anywhere) for m, c in entry.items())
         return cls(ring, names, list(terms.values()), numbers)
 
     def column(self, name: str) -> Array:
-        """Return a parameter's column of numbers."""
+        """Return a parameter's column of :attr:`numbers`, shape (rows,)."""
         column: Array = self.numbers[:, self.names.index(name)]
         return column
 
     def grouping(self, name: str, kept: Sequence[str]) -> dict[str, Element]:
-        """Return by which factors a dependent parameter enters those before it, exactly.
+        """Return the exact factors with which a dependent parameter is added to earlier ones.
 
-        The fewest columns that it depends on are found in numbers; the factors are quotients of determinants (Cramer's
-        rule) of exact entries, of the rows where those are shortest.
+        The smallest set of columns that it depends on is found in numbers; the factors are quotients of determinants of
+        exact entries (Cramer's rule), taken from the rows with the shortest entries.
         """
         column = self.column(name)
-        for size in range(1, MOST + 1):
+        for size in range(1, MAX_SUPPORT + 1):
             for support in combinations(kept, size):
                 A = np.column_stack([self.column(other) for other in support])
                 factors, *_ = np.linalg.lstsq(A, column, rcond=None)
                 if np.linalg.norm(A @ factors - column) <= DEPENDENT * np.linalg.norm(column):
                     return self._factors(name, support)
-        raise RingError(f"{name} depends on more than {MOST} parameters before it; base parameters were not found")
+        raise RingError(
+            f"{name} depends on more than {MAX_SUPPORT} parameters before it; base parameters were not found"
+        )
 
     def _factors(self, name: str, support: Sequence[str]) -> dict[str, Element]:
         ring, polynomials = self.ring, self.ring.polynomials
@@ -153,8 +156,8 @@ def _expression(element: Element) -> Expression:
     )
 
 
-def _somewhere(ring: Ring) -> list[float]:
-    """Return a number for each generator, lengths and angles in general position: what their relations allow."""
+def _random_values(ring: Ring) -> list[float]:
+    """Return a random value for each generator that satisfies the ring's relations."""
     rng = np.random.default_rng(0)
     known: dict[str, float] = {}
     symbols = frozenset[str]().union(*(constant.symbols for constant in ring.given))
@@ -173,7 +176,7 @@ def _somewhere(ring: Ring) -> list[float]:
     return [known.get(generator.text, 1.0) for generator in ring.generators]
 
 
-def _worth(monomial: Monomial, coefficient: Fraction, values: Sequence[float]) -> float:
+def _term_value(monomial: Monomial, coefficient: Fraction, values: Sequence[float]) -> float:
     number = float(coefficient)
     for value, exponent in zip(values, monomial, strict=True):
         if exponent:

@@ -28,7 +28,7 @@ from dhkit.symbolic.ring.reading import Direction
 
 @dataclass(frozen=True, eq=False)
 class ExactRow:
-    """A row of the table at the joint's variable: lengths, and cosine and sine of the angles."""
+    """A row of the table with the joint variable: lengths, and cosine and sine of the angles."""
 
     a: Element
     d: Element
@@ -41,50 +41,50 @@ class ExactBody:
     """A body of a link in the axes of the link's DH frame."""
 
     name: str
-    """As in the description; empty where it is its link's only one, and may be then."""
+    """Name as in the description; may be empty for a link's only body."""
     mass: Element
     com: Elements
-    """Shape (3,)."""
+    """Centre of mass, shape (3,), m."""
     inertia: Elements
-    """Shape (3, 3), about the centre of mass."""
+    """Inertia about the centre of mass, shape (3, 3), kg m^2."""
     moment: Elements
-    """Shape (3,): mass times centre of mass."""
+    """Mass times centre of mass, shape (3,), kg m."""
     second: Elements
-    """Shape (3, 3): the tensor about the frame's origin."""
+    """Inertia about the frame's origin, shape (3, 3), kg m^2."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExactArm:
-    """A description in a ring.
+    """A description whose numbers are elements of a ring.
 
     Attributes
     ----------
     description, symbols
-        What it was made from.
+        The robot, and which of its numbers are symbols.
     ring
-        Where its elements are.
+        The ring of all elements.
     rows
-        One a joint.
+        Rows of the table, one a joint.
     bodies
-        Those of each link; one that stands for all where every inertial parameter is a symbol.
+        Bodies of each link; with ``symbols="inertial"`` a single one that stands for all of them.
     gear, rotor, viscous
-        Gear ratio, rotor inertia and motor-side viscous friction of each joint's drive; 1, 0 and 0 without one.
+        Gear ratio, rotor inertia, kg m^2, and motor-side viscous friction, N m s, of each drive; 1, 0, 0 without one.
     base
         Rotation of frame 0 in the world, shape (3, 3).
     gravity
-        Free-fall acceleration in frame 0, shape (3,).
+        Free-fall acceleration in the axes of frame 0, shape (3,), m/s^2.
     origin
-        Frame 0's origin in the axes of frame 0, seen from the world's origin, shape (3,).
+        Position of frame 0's origin from the world's, in the axes of frame 0, shape (3,), m.
     tool
-        The tool's origin in frame n, shape (3,).
+        The tool's origin in frame n, shape (3,), m.
     values
         Value of every constant of the ring.
     parameters
-        Value of every symbol that the constants are made of.
+        Value of every symbol that the constants depend on, SI.
     notes
-        What is a symbol though it is a number.
+        One sentence for each number that is a symbol because it has no exact form.
     inertial
-        The symbols that torques are linear in, link by link; none unless every inertial parameter is one.
+        With ``symbols="inertial"`` the symbols that torques are linear in, link by link; empty otherwise.
     """
 
     description: Description
@@ -111,12 +111,12 @@ class ExactArm:
 
     @property
     def armature(self) -> tuple[Element, ...]:
-        """Rotor inertia as the joints see it: gear^2 rotor inertia."""
+        """Rotor inertias at the joint side, gear^2 times rotor inertia, kg m^2 or kg."""
         return tuple(gear * gear * rotor for gear, rotor in zip(self.gear, self.rotor, strict=True))
 
     @property
     def is_standard(self) -> bool:
-        """Whether the table is the distal one."""
+        """Whether the table is of the standard (distal) convention."""
         return self.description.convention is Convention.STANDARD
 
     def evaluate(
@@ -126,12 +126,12 @@ class ExactArm:
         qd: ArrayLike | None = None,
         qdd: ArrayLike | None = None,
     ) -> Array:
-        """Return the numbers of elements, also of those written in sums of angles, at states.
+        """Return the values of elements at states; elements may be written in sums of angles.
 
         Parameters
         ----------
         elements
-            One, or an array of them.
+            One element, or an array of them.
         q, qd, qdd
             Joint values, rates and accelerations, shapes (..., n), rad, m and seconds; batch axes broadcast. Rates and
             accelerations are 0 unless given.
@@ -144,7 +144,7 @@ class ExactArm:
         Raises
         ------
         ValueError, TypeError
-            A joint vector of another shape, or not numeric.
+            A joint vector has another shape, or is not numeric.
         """
         named = (
             ("q", q),
@@ -168,7 +168,7 @@ class ExactArm:
 
 @lru_cache(maxsize=32)
 def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> ExactArm:
-    """Return a description in a ring of its own; the same one each time, so that results can be compared.
+    """Return a description in a ring; equal arguments give equal rings, so that results can be compared.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         each link's mass ``m2``, first moments ``rx2 ry2 rz2`` and second moments about its frame's origin ``Ixx2`` ...
         ``Ixz2``, its drive's ``Jm2`` and ``G2``, lengths ``a2 d2`` where they are not zero, and gravity ``g``.
     needed
-        Expressions whose constants the ring shall have too.
+        Further expressions whose constants the ring contains.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
 
 
 def _symbols(constants: Constants) -> list[str]:
-    """Return the names that constants are made of, in their order."""
+    """Return the names of the parameters that constants depend on, in their order."""
     names: dict[str, None] = {}
     for constant in constants.found.values():
         names |= dict.fromkeys(sorted(constant.symbols))
@@ -241,7 +241,7 @@ def _symbols(constants: Constants) -> list[str]:
 
 
 def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
-    """Return row i, from 0, with the joint's variable added to theta or d."""
+    """Return row i, counted from 0, with the joint variable added to theta or d."""
     a, d = ring.read(link.row[0]), ring.read(link.row[1])
     alpha, theta = ring.direction(link.row[2]), ring.direction(link.row[3])
     if ring.kinds[i] != "R":
@@ -255,19 +255,19 @@ def _body(ring: Ring, body: BodyNumbers) -> ExactBody:
     com = np.array([ring.read(x) for x in body.com], dtype=object)
     moment = np.array([mass * x for x in com], dtype=object)
     steiner = point_inertia(com, moment)
-    tensor = _symmetric([ring.read(x) for x in (body.inertia or body.second or ())])
+    tensor = _symmetric_matrix([ring.read(x) for x in (body.inertia or body.second or ())])
     if body.second is None:
         return ExactBody(body.name, mass, com, tensor, moment, tensor + steiner)
     return ExactBody(body.name, mass, com, tensor - steiner, moment, tensor)
 
 
 def point_inertia(lever: Elements, moment: Elements) -> Elements:
-    """Return m (c^2 1 - c c^T) of a lever c and a moment m c, shape (3, 3)."""
+    """Return m (c^2 1 - c c^T), shape (3, 3), from a position c and the first moment m c, both shape (3,)."""
     square = lever @ moment
     return np.array([[(square if i == j else 0 * square) - lever[i] * moment[j] for j in range(3)] for i in range(3)])
 
 
-def _symmetric(entries: Sequence[Element]) -> Elements:
+def _symmetric_matrix(entries: Sequence[Element]) -> Elements:
     tensor = np.empty((3, 3), dtype=object)
     for (i, j), entry in zip(INERTIA_PLACES.values(), entries, strict=True):
         tensor[i, j] = tensor[j, i] = entry

@@ -1,4 +1,4 @@
-"""Lagrange's equations of an arm, exactly: M qdd + C qd + g = tau, and proofs about them."""
+"""Exact equations of motion M qdd + C qd + g = tau of an arm, and proofs about them."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ QUANTITIES = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof:
-    """A statement, decided in the exact ring: true if the difference of its two sides is zero, which is kept.
+    """A statement decided in the exact ring: it is true if the difference of its two sides is zero.
 
     Attributes
     ----------
     statement
-        What was to be proved.
+        The statement in words.
     difference
-        Left side less right side: an array of elements, all zero where the statement is true.
+        Left side minus right side, an array of elements; all zero if the statement is true.
     """
 
     statement: str
@@ -59,7 +59,7 @@ class Proof:
 
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """Indices of the entries, from 0, in which the two sides differ."""
+        """Indices, from 0, of the entries in which the two sides differ."""
         return tuple(place for place, element in np.ndenumerate(self.difference) if not element.is_zero)
 
     def __str__(self) -> str:
@@ -72,21 +72,21 @@ class Proof:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lagrangian:
-    """An arm's equations of motion in the exact ring, made by composite bodies and Christoffel symbols.
+    """An arm's equations of motion in the exact ring, derived by composite bodies and Christoffel symbols.
 
-    Arrays are of elements: exact functions of the state, in a normal form. ``str(lag.M[0, 0])`` is readable;
-    :meth:`evaluate` gives numbers.
+    Entries of arrays are elements, exact functions of the state; ``str(lag.M[0, 0])`` prints one, :meth:`evaluate`
+    gives numbers.
 
     Attributes
     ----------
     arm
         The description in the ring.
     M
-        Mass matrix, shape (n, n), kg m^2; reflected rotor inertia is part of it.
+        Mass matrix with reflected rotor inertia, shape (n, n), kg m^2, kg m and kg.
     V
         Potential energy, J; zero at the world's origin.
     definitions
-        What the symbols stand for where they are base parameters, by name.
+        For equations in base parameters, the combination that each symbol stands for, by name.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Lagrangian:
 
     @property
     def constants(self) -> dict[str, float]:
-        """The symbols as they are printed, and what they are worth, SI."""
+        """Values of the symbols, SI, by their printed names."""
         return notation(self.arm.ring).printed(self.arm.parameters)
 
     # Quantities
@@ -151,12 +151,12 @@ class Lagrangian:
 
     @cached_property
     def h(self) -> Elements:
-        """Coriolis and centrifugal torques C qd, shape (n,)."""
+        """Coriolis and centrifugal torques C qd, shape (n,), N m or N."""
         return self.C @ self._rates
 
     @cached_property
     def g(self) -> Elements:
-        """Gravity torques dV/dq, shape (n,)."""
+        """Gravity torques dV/dq, shape (n,), N m or N."""
         return np.array([self.V.by_position(i) for i in range(self.n)], dtype=object)
 
     @cached_property
@@ -166,7 +166,7 @@ class Lagrangian:
 
     @cached_property
     def tau(self) -> Elements:
-        """Joint torques M qdd + C qd + g, shape (n,)."""
+        """Joint torques M qdd + C qd + g, shape (n,), N m or N."""
         ring = self.arm.ring
         accelerations = np.array([ring.acceleration(i) for i in range(self.n)], dtype=object)
         return self.M @ accelerations + self.h + self.g  # type: ignore[no-any-return]
@@ -176,17 +176,17 @@ class Lagrangian:
         return np.array([self.arm.ring.rate(i) for i in range(self.n)], dtype=object)
 
     def replaced(self, **quantities: Any) -> Lagrangian:
-        """Return equations in which some quantities are others, to be held against the truth.
+        """Return equations in which some quantities are replaced, to compare them with the right ones.
 
         Parameters
         ----------
         **quantities
-            Any of M, V, C, h, g, K, tau: elements of this one's ring. What is made of a replaced quantity follows it.
+            Any of M, V, C, h, g, K, tau, as elements of this ring. Quantities derived from a replaced one follow it.
 
         Raises
         ------
         ValueError
-            No such quantity, another shape, or entries that are no elements of this ring.
+            No such quantity, a wrong shape, or entries that are not elements of this ring.
         """
         for name, given in quantities.items():
             if name not in QUANTITIES:
@@ -207,7 +207,7 @@ class Lagrangian:
         qd: ArrayLike | None = None,
         qdd: ArrayLike | None = None,
     ) -> Array:
-        """Return the numbers of elements, shape (..., *elements.shape); see :meth:`ExactArm.evaluate`."""
+        """Return values of elements at states (..., n), shape (..., *elements.shape); see :meth:`ExactArm.evaluate`."""
         return self.arm.evaluate(elements, q, qd, qdd)
 
     # Reading
@@ -258,15 +258,15 @@ class Lagrangian:
         return Proof("dM/dt - 2 C is skew-symmetric", N + N.T)
 
     def prove_euler_lagrange(self, other: TextbookDerivation | None = None) -> Proof:
-        """Decide whether M qdd + C qd + g is what Euler and Lagrange's equation gives by the textbook's route.
+        """Decide whether M qdd + C qd + g equals the Euler-Lagrange equation of the textbook's derivation.
 
-        The other route starts at the positions of the centres of mass, differentiates them, and applies
-        d/dt dL/dqd - dL/dq to the Lagrangian; it shares the table with this one, and nothing else.
+        The textbook's derivation differentiates the positions of the centres of mass and applies d/dt dL/dqd - dL/dq to
+        the Lagrangian; both derivations share the table in the ring and nothing else.
 
         Parameters
         ----------
         other
-            A derivation of the same description with the same symbols, perhaps with mistakes; the right one unless
+            A derivation of the same description with the same symbols, possibly with mistakes; the right one if not
             given.
         """
         if self.arm.inertial and not self.arm.bodies:

@@ -1,4 +1,4 @@
-"""Which of a description's numbers become symbols, and what these are called."""
+"""Which of a description's numbers become symbols, and the symbols' names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ONE = exact(1)
 
 @dataclass(frozen=True)
 class BodyNumbers:
-    """What is read of a body, as expressions."""
+    """The numbers of a body as expressions."""
 
     name: str
     mass: Expression
@@ -30,18 +30,18 @@ class BodyNumbers:
 
 @dataclass(frozen=True)
 class LinkNumbers:
-    """What is read of a link, as expressions."""
+    """The numbers of a link as expressions."""
 
     row: tuple[Expression, Expression, Expression, Expression]
     """a, d, alpha, theta."""
     bodies: tuple[BodyNumbers, ...]
-    """One that stands for all where every inertial parameter is a symbol."""
+    """With ``symbols="inertial"`` a single body that stands for all of them."""
     gear: Expression
     rotor: Expression
 
 
 class Naming:
-    """Decides which numbers become symbols, and remembers the symbols' values."""
+    """Decides which numbers become symbols, and keeps the symbols' values."""
 
     def __init__(self, description: Description, symbols: Symbols) -> None:
         self.description = description
@@ -50,7 +50,9 @@ class Naming:
         self.values = resolved(description.parameters)
         own = {name for name, value in description.parameters.items() if not value.symbols}
         self._fixed = {
-            name: _through(description.parameters, name) for name in description.parameters if name not in own
+            name: _in_independent_parameters(description.parameters, name)
+            for name in description.parameters
+            if name not in own
         }
         if symbols == "none":
             self._fixed = self.values
@@ -60,7 +62,7 @@ class Naming:
         return substitute(expression, self._fixed)
 
     def symbol(self, name: str, value: Expression) -> Expression:
-        """Return a new symbol of that value; zero needs none."""
+        """Return a new symbol of this value; zero stays a number."""
         while name in self.values and self.values[name] != value:
             name += "_"
         self.values[name] = value
@@ -73,7 +75,7 @@ class Naming:
         return symbol
 
     def length(self, name: str, expression: Expression) -> Expression:
-        """Return a length of the table, by a name of its own where all numbers are symbols."""
+        """Return a length of the table, as a symbol of this name where all numbers are symbols."""
         known = self.known(expression)
         if self.symbols != "inertial" or known.symbols or known.is_zero:
             return known
@@ -92,7 +94,7 @@ class Naming:
         return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
 
     def link(self, i: int, bodies: Sequence[Body]) -> LinkNumbers:
-        """Return what link i, from 0, is read from."""
+        """Return the numbers of link i, counted from 0."""
         joint, number = self.description.joints[i], i + 1
         row = (
             self.length(f"a{number}", joint.a),
@@ -121,8 +123,8 @@ class Naming:
         return BodyNumbers(body.name, self.known(body.mass), tuple(self.known(x) for x in body.com), inertia, None)
 
 
-def _through(parameters: Mapping[str, Expression], name: str) -> Expression:
-    """Return a parameter in those that are not made of others."""
+def _in_independent_parameters(parameters: Mapping[str, Expression], name: str) -> Expression:
+    """Return a parameter in terms of the parameters that do not depend on others."""
     expression = parameters[name]
     while made := {x for x in expression.symbols if parameters[x].symbols}:
         expression = substitute(expression, {x: parameters[x] for x in made})

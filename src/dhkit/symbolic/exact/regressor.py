@@ -23,7 +23,7 @@ class Regressor:
         The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame
         ``Ixx2`` ..., and its drive's rotor inertia ``Jm2``; or base parameters.
     Y
-        Shape (n, parameters): elements without any of them.
+        Shape (n, parameters); elements that do not contain the parameters.
     """
 
     lagrangian: Lagrangian
@@ -50,7 +50,7 @@ def regressor(equations: Lagrangian) -> Regressor:
     Raises
     ------
     RingError
-        The equations have no inertial parameters: masses and moments are numbers, or made of others.
+        The equations have no inertial parameters: masses and moments are numbers or depend on other parameters.
 
     Examples
     --------

@@ -1,8 +1,9 @@
-"""Straight-line programs: what is left of an expression when only the order of its operations matters."""
+"""Straight-line programs: expressions as a sequence of operations without branches and without repeated work."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -14,24 +15,38 @@ if TYPE_CHECKING:
     import casadi
 
 
+COUNTED_AS = {
+    "add": "additions",
+    "subtract": "additions",
+    "multiply": "multiplications",
+    "divide": "divisions",
+    "negate": "negations",
+    "sqrt": "square roots",
+    "sin": "sines and cosines",
+    "cos": "sines and cosines",
+    "atan2": "arctangents",
+}
+"""Names under which :func:`operation_count` counts operations; all others count as ``others``."""
+
+
 @dataclass(frozen=True)
 class Variable:
-    """A named input or output of a program: an array of numbers, row by row."""
+    """A named input or output of a program, an array of doubles stored row by row."""
 
     name: str
     shape: tuple[int, ...]
 
     @property
     def size(self) -> int:
-        """How many numbers."""
+        """The number of entries."""
         return math.prod(self.shape)
 
 
 @dataclass(frozen=True)
 class Node:
-    """One operation.
+    """One operation of a program.
 
-    ``constant`` has a value, ``input`` the places (variable, entry); all others work on the results of earlier nodes:
+    ``constant`` has a value, ``input`` the indices (variable, entry) as arguments; other operations have earlier nodes:
     add, subtract, multiply, divide, negate, absolute, floor, sqrt, sin, cos, atan2, minimum, maximum, less, less_equal,
     equal, unequal, logical_and, logical_or, logical_not, and select (condition, where true, where false).
     """
@@ -56,17 +71,17 @@ FOLDING: Mapping[str, Callable[..., float]] = {
     "maximum": max,
     "floor": math.floor,
 }
-"""What is worked out when all arguments are constants."""
+"""Operations that are evaluated while a program is built when all arguments are constants."""
 
 SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
-"""What a sign can be taken out of."""
+"""Operations from which a negative sign can be taken out."""
 LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
 COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
 
 
 @cache
 def _operations() -> dict[int, str]:
-    """Return our names of CasADi's operations, by its numbers; those with a rule of their own begin with a colon."""
+    """Return our names of CasADi's operations, by CasADi's numbers; names with a colon have a rule of their own."""
     import casadi
 
     names = {
@@ -102,7 +117,7 @@ def _operations() -> dict[int, str]:
 
 @dataclass(frozen=True)
 class Graph:
-    """A straight-line program: nodes in an order in which each follows its arguments.
+    """A straight-line program: nodes in an order in which each node follows its arguments.
 
     Examples
     --------
@@ -118,7 +133,7 @@ class Graph:
     outputs: tuple[Variable, ...]
     nodes: tuple[Node, ...]
     results: tuple[tuple[int, ...], ...]
-    """Of each output the nodes of its entries, row by row."""
+    """For each output, the nodes of its entries, row by row."""
 
     @classmethod
     def of(
@@ -128,7 +143,7 @@ class Graph:
         outputs: Mapping[str, casadi.SX],
         shapes: Mapping[str, tuple[int, ...]] | None = None,
     ) -> Graph:
-        """Return the program of CasADi expressions; equal operations become one, constants are worked out.
+        """Return the program of CasADi expressions; equal operations are merged, operations on constants evaluated.
 
         Parameters
         ----------
@@ -166,7 +181,7 @@ class Graph:
 
     @property
     def angle_pairs(self) -> dict[int, tuple[int, int]]:
-        """Of each angle's node, the nodes of its sine and its cosine; -1 for one that nobody needs."""
+        """Nodes of the sine and the cosine of each angle, by the angle's node; -1 where one of them is not needed."""
         pairs: dict[int, tuple[int, int]] = {}
         for k, node in enumerate(self.nodes):
             if node.operation in ("sin", "cos"):
@@ -184,7 +199,7 @@ class Graph:
 
 
 class _Builder:
-    """Numbers equal values equally while a CasADi function is read."""
+    """Builds nodes from a CasADi function; equal operations on equal arguments get the same node."""
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
@@ -246,7 +261,7 @@ class _Builder:
         return self.apply("select", (self.apply("less", (zero, x)), self.constant(1.0), below))
 
     def _signed(self, operation: str, arguments: Sequence[int]) -> int | None:
-        """Return an operation on negated values with the sign taken out: a sum or a difference takes it in for free."""
+        """Return the node of an operation on negated values, with the sign moved to where it costs no operation."""
         plain = [self.nodes[k].arguments[0] if self.nodes[k].operation == "negate" else k for k in arguments]
         negated = [k != own for k, own in zip(plain, arguments, strict=True)]
         if not any(negated):
@@ -257,14 +272,14 @@ class _Builder:
             result = self.apply(operation, plain)
             return result if all(negated) else self.apply("negate", (result,))
         x, y = plain
-        flipped = (negated[0], negated[1] != (operation == "subtract"))  # the signs of x and y in their sum
+        flipped = (negated[0], negated[1] != (operation == "subtract"))  # whether x and y are subtracted in their sum
         if flipped[0] == flipped[1]:
             total = self.apply("add", (x, y))
             return self.apply("negate", (total,)) if flipped[0] else total
         return self.apply("subtract", (y, x) if flipped[0] else (x, y))
 
     def _decided(self, operation: str, arguments: Sequence[int]) -> int | None:
-        """Return the result of a choice or of a logical operation one of whose conditions is a constant."""
+        """Return the result of a selection or logical operation that a constant condition decides."""
         first, *others = arguments
         if self.nodes[first].operation != "constant":
             if operation == "select" or not others or self.nodes[others[0]].operation != "constant":
@@ -279,7 +294,7 @@ class _Builder:
         return others[0] if true == neutral else self.constant(0.0 if neutral else 1.0)
 
     def _selected(self, arguments: Sequence[int]) -> int | None:
-        """Return the choice that CasADi writes as (a if c else 0) + (b if not c else 0)."""
+        """Return the selection that CasADi writes as (a if c else 0) + (b if not c else 0)."""
         one, other = (self.nodes[k] for k in arguments)
         if one.operation != "select" or other.operation != "select":
             return None
@@ -296,7 +311,7 @@ class _Builder:
         return self.add(Node("constant", (), float(value) + 0.0))
 
     def add(self, node: Node) -> int:
-        key = (node.operation, node.arguments, repr(node.value))  # by their text all NaN are one
+        key = (node.operation, node.arguments, repr(node.value))  # NaN differs from itself; as text all NaN are equal
         if key not in self._places:
             self._places[key] = len(self.nodes)
             self.nodes.append(node)
@@ -306,7 +321,7 @@ class _Builder:
 def _pruned(
     nodes: Sequence[Node], results: tuple[tuple[int, ...], ...]
 ) -> tuple[tuple[Node, ...], tuple[tuple[int, ...], ...]]:
-    """Drop what no result needs, and renumber."""
+    """Return nodes and results without the nodes that no result needs."""
     needed = {k for entries in results for k in entries}
     for k in range(len(nodes) - 1, -1, -1):
         if k in needed and nodes[k].operation != "input":
@@ -321,3 +336,21 @@ def _pruned(
     return tuple(moved(nodes[k]) for k in sorted(needed)), tuple(
         tuple(place[k] for k in entries) for entries in results
     )
+
+
+def operation_count(graph: Graph) -> dict[str, int]:
+    """Return how many operations of each kind a program has.
+
+    Subtractions count as additions; comparisons, choices and the like are ``"others"``; inputs and constants are free.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> x = casadi.SX.sym("x")
+    >>> operation_count(Graph.of("line", {"x": x}, {"y": 3 * casadi.sin(x) - 1}))
+    {'additions': 1, 'multiplications': 1, 'sines and cosines': 1}
+    """
+    counts = Counter(
+        COUNTED_AS.get(x.operation, "others") for x in graph.nodes if x.operation not in ("input", "constant")
+    )
+    return dict(sorted(counts.items()))

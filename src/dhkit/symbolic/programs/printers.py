@@ -8,8 +8,9 @@ from pathlib import Path
 
 from dhkit.description import write_atomically
 from dhkit.symbolic.programs.graph import Graph, Node
+from dhkit.symbolic.syntax import C
 
-C = {
+OPERATORS = {
     "add": "{} + {}",
     "subtract": "{} - {}",
     "multiply": "{} * {}",
@@ -19,27 +20,18 @@ C = {
     "less_equal": "{} <= {}",
     "equal": "{} == {}",
     "unequal": "{} != {}",
-    "absolute": "fabs({})",
-    "floor": "floor({})",
-    "sqrt": "sqrt({})",
-    "sin": "sin({})",
-    "cos": "cos({})",
-    "atan2": "atan2({}, {})",
-    "minimum": "fmin({}, {})",
-    "maximum": "fmax({}, {})",
     "logical_and": "{} && {}",
     "logical_or": "{} || {}",
     "logical_not": "!{}",
     "select": "{} ? {} : {}",
 }
-"""Operations in C."""
-C_NUMBERS = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+"""Operations that C writes with operators; the others are functions."""
 
 
 def c_source(graph: Graph) -> str:
     """Return a C99 function ``void NAME(const double *input, ..., double *output, ...)``; arrays are row by row.
 
-    Inputs and outputs must not overlap. Beyond the standard mathematical functions it needs nothing.
+    Inputs and outputs must not overlap. The function needs only the standard mathematical functions.
     """
     used = {node.arguments[0] for node in graph.nodes if node.operation == "input"}
     lines = [f"{_c_signature(graph)}\n{{"]
@@ -57,13 +49,13 @@ def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str
     Parameters
     ----------
     graphs
-        Programs of different names.
+        Programs with different names.
     folder
         An existing folder.
     name
-        An identifier: the files' name.
+        The files' name, an identifier.
     remark
-        What stands in the files' first comment.
+        Text of the files' first comment.
 
     Raises
     ------
@@ -89,10 +81,13 @@ def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str
 
 def _c_expression(graph: Graph, node: Node) -> str:
     if node.operation == "constant":
-        return C_NUMBERS.get(repr(node.value), repr(node.value))
+        return C.number(node.value)
     if node.operation == "input":
-        return f"{graph.inputs[node.arguments[0]].name}[{node.arguments[1]}]"
-    return C[node.operation].format(*(f"v{k}" for k in node.arguments))
+        return C.entry(graph.inputs[node.arguments[0]].name, node.arguments[1])
+    arguments = [f"v{k}" for k in node.arguments]
+    if node.operation in OPERATORS:
+        return OPERATORS[node.operation].format(*arguments)
+    return C.call(node.operation, arguments)
 
 
 def _c_signature(graph: Graph) -> str:

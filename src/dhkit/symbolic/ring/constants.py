@@ -1,4 +1,4 @@
-"""Which constants a ring needs to hold a robot file's expressions."""
+"""The constants that a ring needs for a robot file's expressions."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from dhkit.expressions.exact import Monomial
 from dhkit.symbolic.ring.reading import is_exact, reciprocal_text
 from dhkit.symbolic.ring.ring import Constant
 
-MOST = 8
-"""The largest multiple of an angle that is written in the cosine and sine of the angle itself."""
+MAX_MULTIPLE = 8
+"""Largest multiple of an angle that is expanded into powers of the angle's own cosine and sine."""
 
 
 @dataclass
 class Constants:
     """Finds the constants of expressions and of cosines and sines of angles.
 
-    Numbers stay rational. Of angles only multiples of 15 degrees have cosines that can be written exactly; the cosine
-    and the sine of another angle are two constants, related by the sum of their squares.
+    Numbers stay rational. Cosines of multiples of 15 degrees are written with square roots; the cosine and the sine of
+    any other angle are two constants whose squares add up to 1.
 
     Attributes
     ----------
     found
-        By text, each after those that it is written in.
+        The constants by text; each follows those that it depends on.
     notes
-        What is a constant of its own though it is a number.
+        One sentence for each number that becomes a constant because it has no exact form.
     """
 
     found: dict[str, Constant] = field(default_factory=dict)
@@ -38,7 +38,7 @@ class Constants:
 
     @classmethod
     def of(cls, expressions: Iterable[Expression], angles: Iterable[Expression]) -> Constants:
-        """Return those of expressions, and of the cosines and sines of angles."""
+        """Return the constants of expressions, and of the cosines and sines of angles."""
         expressions, angles = list(expressions), list(angles)
         constants = cls()
         constants._units = _common_angles(expressions, angles)
@@ -78,7 +78,7 @@ class Constants:
                 self._scan(sin(PI * coefficient))
                 continue
             unit = self._units[monomial]
-            one = Expression(((monomial, unit if abs(coefficient) / unit <= MOST else abs(coefficient)),))
+            one = Expression(((monomial, unit if abs(coefficient) / unit <= MAX_MULTIPLE else abs(coefficient)),))
             cosine, sine = (Expression.of_atom(Atom(name, (one,))) for name in ("cos", "sin"))
             if cosine.text in self.found:
                 continue
@@ -92,7 +92,7 @@ class Constants:
 
 
 def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
-    """Return the number that a constant is, given those of the parameters; NaN of the reciprocal of 0."""
+    """Return the value of a constant for given parameters; NaN for the reciprocal of 0."""
     try:
         return float(substitute(constant.meaning or Expression.symbol(constant.text), values))
     except ExpressionError:
@@ -100,7 +100,7 @@ def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
 
 
 def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expression]) -> dict[Monomial, Fraction]:
-    """Return, of the angles that are multiples of one another, the largest that all are whole multiples of."""
+    """Return, for each monomial in angles, the largest factor of which all factors that occur are whole multiples."""
     multiples: dict[Monomial, set[Fraction]] = {}
 
     def collect(angle: Expression) -> None:

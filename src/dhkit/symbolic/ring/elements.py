@@ -21,16 +21,16 @@ from dhkit.formats import format_function
 from dhkit.symbolic.ring.polynomials import Monomial, Polynomials, Relation
 
 READABLE = 200
-"""Terms that are shown unasked."""
+"""Longest element, in terms, that is printed without being asked for."""
 MAX_TERMS = 300_000
-"""Terms of a product: ten times the longest of the library, a Jaco's with every inertial parameter a symbol."""
+"""Largest number of terms of a product: ten times the longest of the library's robots (Jaco, symbols="inertial")."""
 TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
 MAX_PAIRS = 500_000
-"""Pairs of terms that one product may have: six times that Jaco's; seconds on sympy's rings."""
+"""Largest number of pairs of terms that one product multiplies: six times the Jaco's, some seconds in sympy's rings."""
 
 
 class RingError(DhkitError):
-    """An expression that the exact ring does not have, or one too long for it."""
+    """An expression that the exact ring does not contain, or one that is too long for it."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class Generator:
     Attributes
     ----------
     kind
-        One of sine, cosine, position (of a sliding joint), rate, acceleration and constant.
+        One of sine, cosine, position (of a prismatic joint), rate, acceleration and constant.
     text
-        What it is written as: s1, c23, q2, qd1, qdd1, or the constant's text.
+        Its text in equations: s1, c23, q2, qd1, qdd1, or the constant's text.
     joint
-        Which joint, from 0; -1 for constants.
+        Index of the joint, from 0; -1 for constants and for sums of angles that are only printed.
     joints
-        Of a sine or a cosine the joints whose variables its angle is the sum of: (1, 2) for c23.
+        For a sine or cosine, the joints whose variables add up to its angle: (1, 2) for c23.
     meaning
-        The expression that a constant stands for; None where its text is its name.
+        The expression that a constant stands for; None for a parameter, whose text is its name.
     """
 
     kind: str
@@ -59,7 +59,7 @@ class Generator:
 
     @property
     def key(self) -> tuple[str, int | str]:
-        """What it is found by in any ring of the arm: its kind, and its joint or, where it has none, its text."""
+        """Key of the same generator in every ring of the arm: its kind, and its joint or, for constants, its text."""
         return self.kind, self.text if self.joint < 0 else self.joint
 
 
@@ -148,13 +148,14 @@ class Element:
         return NotImplemented
 
     def __hash__(self) -> int:
-        # Equal elements may be written in two ways, with reciprocals or sums of angles.
+        # Equal elements may have different terms: with reciprocals, or with sums of angles.
         return hash(self.ring)
 
     def _cleared(self) -> Element:
-        """Return this times what its reciprocals are the reciprocals of: zero only together with this.
+        """Return this element times the denominators of all its reciprocals; it is zero exactly when this element is.
 
-        Reciprocals of sums that share parameters have more than one form (partial fractions).
+        The normal form does not decide equality alone: reciprocals of sums that share parameters have several forms
+        (partial fractions).
         """
         element = self
         for relation in self.ring.relations:
@@ -176,7 +177,7 @@ class Element:
 
     @cached_property
     def _products(self) -> list[tuple[float, list[tuple[int, int]]]]:
-        """Of each term its coefficient, and its generators with their exponents."""
+        """Coefficient of each term, and its generators with their exponents."""
         return [(float(c), [(k, e) for k, e in enumerate(m) if e]) for m, c in self.terms.items()]
 
     def __len__(self) -> int:
@@ -216,18 +217,18 @@ class Element:
         return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i)))
 
     def by_constant(self, text: str) -> Element:
-        """Return the partial derivative by a constant that nothing else is written in."""
+        """Return the partial derivative by a constant that no other constant depends on."""
         place = self.ring.place("constant", text)
         return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, place))
 
     def by_time(self) -> Element:
-        """Return the time derivative along the motion: qd by qdd, q by qd."""
+        """Return the time derivative: that of q is qd, that of qd is qdd."""
         ring = self.ring
         parts = [self.by_position(i) * ring.rate(i) for i in range(ring.n)]
         return ring.sum([*parts, *(self.by_rate(i) * ring.acceleration(i) for i in range(ring.n))])
 
     def value(self, values: Sequence[Any]) -> Any:
-        """Return the number, or array (...), at values of the generators; see :meth:`Ring.values`."""
+        """Return the element's value, a number or an array (...), at :meth:`PolynomialRing.values` of a state."""
         total: Any = 0.0
         for coefficient, powers in self._products:
             product: Any = coefficient
@@ -238,15 +239,15 @@ class Element:
 
 
 class PolynomialRing(ABC):
-    """What an element asks of its ring: its generators, the relations between them, and other elements."""
+    """The part of a ring that its elements use: generators, relations between them, and construction of elements."""
 
     kinds: str
     """One letter a joint, R or P."""
     generators: tuple[Generator, ...]
     polynomials: Polynomials
-    """Arithmetic of polynomials in as many generators."""
+    """Arithmetic of polynomials in the generators."""
     relations: tuple[Relation, ...]
-    """Polynomials that are zero, that of the greatest generator first."""
+    """Polynomials that are zero, in the order of the generators that they replace."""
     _places: dict[tuple[str, int | str], int]
 
     @abstractmethod
@@ -276,30 +277,30 @@ class PolynomialRing(ABC):
         Raises
         ------
         RingError
-            The ring has none of that name.
+            The ring has no constant of that text.
         """
         if ("constant", text) not in self._places:
             raise RingError(f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}")
         return self._element(("constant", text))
 
     def sine(self, i: int) -> Element:
-        """Return the sine of joint i's variable, from 0."""
+        """Return the sine of joint i's angle; joints count from 0."""
         return self._element(("sine", i))
 
     def cosine(self, i: int) -> Element:
-        """Return the cosine of joint i's variable."""
+        """Return the cosine of joint i's angle."""
         return self._element(("cosine", i))
 
     def position(self, i: int) -> Element:
-        """Return the variable of a sliding joint."""
+        """Return the position of prismatic joint i, m."""
         return self._element(("position", i))
 
     def rate(self, i: int) -> Element:
-        """Return joint i's rate."""
+        """Return joint i's rate, rad/s or m/s."""
         return self._element(("rate", i))
 
     def acceleration(self, i: int) -> Element:
-        """Return joint i's acceleration."""
+        """Return joint i's acceleration, rad/s^2 or m/s^2."""
         return self._element(("acceleration", i))
 
     def sum(self, elements: Iterable[Element]) -> Element:
@@ -310,12 +311,12 @@ class PolynomialRing(ABC):
         return Element(self, total)
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
-        """Return the element of coefficients by monomial, in the order of :attr:`generators`."""
+        """Return the element with these coefficients by monomial; exponents are in the order of :attr:`generators`."""
         return Element(self, self.polynomials.from_terms(terms)).reduced()
 
     @cached_property
     def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
-        """Places of each angle's sine and cosine, and the joints that it is the sum of."""
+        """Indices of each angle's sine and cosine among the generators, and the joints whose variables add up to it."""
         cosines = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
         return tuple((k, cosines[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
 
@@ -330,7 +331,7 @@ class PolynomialRing(ABC):
         return tuple(g.text for g in self.generators if g.kind == "constant")
 
     def place(self, kind: str, which: int | str) -> int:
-        """Return the place of a generator in a monomial, by its kind and its joint or, for a constant, its text."""
+        """Return the index of a generator in a monomial, by its kind and its joint or, for a constant, its text."""
         return self._places[kind, which]
 
     def values(
@@ -340,7 +341,7 @@ class PolynomialRing(ABC):
         qd: Array | None = None,
         qdd: Array | None = None,
     ) -> list[Any]:
-        """Return a number or an array (...) for each generator, for states (..., n)."""
+        """Return the value of each generator, a number or an array (...), at states (..., n), rad, m and seconds."""
         zero = np.zeros_like(q)
         states = {"rate": zero if qd is None else qd, "acceleration": zero if qdd is None else qdd, "position": q}
         values: list[Any] = []
@@ -356,11 +357,11 @@ class PolynomialRing(ABC):
 
 
 Elements: TypeAlias = NDArray[Any]
-"""An array whose entries are elements of one ring."""
+"""An object array whose entries are elements of one ring."""
 
 
 def element_array(value: Any) -> Elements:
-    """Return an element, a list of them, or an array, as an array of the same shape."""
+    """Return an element, a list of elements or an array of them as an object array of the same shape."""
     array: Elements = np.empty(np.shape(value), dtype=object)
     array[...] = value
     return array
@@ -370,7 +371,7 @@ Scalar: TypeAlias = "Element | int | float | Fraction"
 
 
 def _without(element: Element, place: int, divisor: Any) -> Element:
-    """Multiply by what the generator at ``place`` is the reciprocal of, once."""
+    """Multiply an element once by the denominator ``divisor`` of the reciprocal at index ``place``."""
     ring = element.ring
     with_it = {m: c for m, c in element.terms.items() if m[place]}
     rest = {m: c for m, c in element.terms.items() if not m[place]}
@@ -380,12 +381,12 @@ def _without(element: Element, place: int, divisor: Any) -> Element:
 
 
 def _rational(number: Any) -> Fraction:
-    """Return a number as the rational that it was written for: 1e-9 is 1/10^9.
+    """Return the rational that a number was written as: 1e-9 is 1/10^9.
 
     Raises
     ------
     ExpressionError
-        It is not finite.
+        The number is not finite.
     """
     if isinstance(number, int | Fraction):
         return Fraction(number)

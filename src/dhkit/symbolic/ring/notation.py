@@ -1,4 +1,4 @@
-"""What the generators of a ring are called, so that no two are called alike."""
+"""Names of a ring's generators in equations; no two generators have the same name."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from dhkit.symbolic.ring import Element, Generator, Ring, angle_name
 
 @dataclass(frozen=True)
 class Notation:
-    """Names of constants: their own, but for those that mean something else in our equations.
+    """Names of constants in equations: their own, unless the name has another meaning there.
 
     Attributes
     ----------
     names
-        Of each constant's symbol what it is written as.
+        Printed name of each symbol of the constants.
     """
 
     names: dict[str, str]
 
     def __call__(self, name: str) -> str:
-        """Return what a constant is written as."""
+        """Return the printed name of a constant."""
         return self.names.get(name, name)
 
     def printed(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return constants' values by what the constants are written as."""
+        """Return constants' values by their printed names."""
         return {self(name): value for name, value in values.items()}
 
 
 @dataclass(frozen=True)
 class Angle:
-    """A sine or cosine that occurs: of the sum of these joints' values."""
+    """A sine or cosine that occurs in equations, of the sum of some joints' variables."""
 
     name: str
     function: str
@@ -46,14 +46,14 @@ class Angle:
 
 @lru_cache(maxsize=64)
 def notation(ring: Ring) -> Notation:
-    """Return the names of a ring's constants; one that already means something else gets an underscore."""
+    """Return the printed names of a ring's constants; a name that has another meaning gets an underscore."""
     return Notation(
         distinct(sorted(symbols_of(constants_of(ring.generators))), {*variables(ring), *entry_names(ring.n)})
     )
 
 
 def variables(ring: Ring) -> set[str]:
-    """Return what joints' variables, rates and accelerations and the sines and cosines of their sums are called."""
+    """Return the names of joint variables, rates and accelerations, and of sines and cosines of their sums."""
     runs = [range(a, b) for a in range(ring.n) for b in range(a + 1, ring.n + 1)]
     names = {f"{function}{angle_name(run)}" for function in "sc" for run in runs}
     names |= {g.text for g in ring.generators if g.kind != "constant"}
@@ -61,7 +61,7 @@ def variables(ring: Ring) -> set[str]:
 
 
 def entry_names(n: int) -> set[str]:
-    """Return what the entries of all quantities of n joints are called: M12, g1, K."""
+    """Return the names of the entries of all quantities of n joints: M12, g1, K."""
     vectors = {entry_name(name, (i,)) for name in ("h", "g", "tau") for i in range(n)}
     square = {entry_name(name, (i, j)) for name in "MC" for i in range(n) for j in range(n)}
     kinematic = {entry_name("T", (i, j)) for i in range(4) for j in range(4)}
@@ -75,7 +75,7 @@ def entry_name(quantity: str, place: tuple[int, ...]) -> str:
 
 
 def renamings(elements: Iterable[Element]) -> list[str]:
-    """Return which constants of elements are written otherwise than in the file, in words."""
+    """Return one sentence for each constant of elements whose printed name differs from that in the file."""
     notes: dict[str, None] = {}
     for element in elements:
         used = symbols_of(constants_of(generators_of([element])))
@@ -88,7 +88,7 @@ def renamings(elements: Iterable[Element]) -> list[str]:
 
 
 def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
-    """Return for each name itself, with underscores behind it until it is neither taken nor another's."""
+    """Return distinct printed names: each name followed by underscores until it is neither taken nor another's."""
     names = list(names)
     used = {*taken, *names}
     written = {}
@@ -102,7 +102,7 @@ def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
 
 
 def symbols_of(generators: Iterable[Generator]) -> set[str]:
-    """Return the names that constants are written in."""
+    """Return the names of the parameters that constants depend on."""
     found: set[str] = set()
     for g in generators:
         found |= {g.text} if g.meaning is None else g.meaning.symbols
@@ -125,6 +125,6 @@ def constants_of(generators: Iterable[Generator]) -> list[Generator]:
 
 def angles_of(generators: Iterable[Generator]) -> list[Angle]:
     """Return the sines and cosines among generators, joint by joint, cosines first."""
-    # Entries in other angles have generators of their own of the same name.
+    # Entries written in other sums of angles have other generators of the same names.
     found = {Angle(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
     return sorted(found, key=lambda angle: (len(angle.joints) > 1, angle.joints, angle.function))

@@ -10,21 +10,21 @@ from operator import itemgetter
 from typing import Any, Protocol, TypeAlias
 
 Monomial: TypeAlias = tuple[int, ...]
-"""One exponent a generator."""
+"""Exponents, one for each generator."""
 
 
 @dataclass(frozen=True)
 class Relation:
-    """A polynomial that is zero, by which a power of a generator is replaced.
+    """A polynomial that equals zero, used to replace a power of a generator.
 
     Attributes
     ----------
     place
-        Which generator.
+        Index of the generator.
     power
         2 for x^2 = replacement; 1 for x * (a sum) = 1.
     polynomial
-        What is zero. Its leading term, in the lexicographic order of the generators, has the generator to that power.
+        The polynomial that is zero. Its leading term, in lexicographic order of the generators, contains that power.
     """
 
     place: int
@@ -51,14 +51,14 @@ class Polynomials(Protocol):
         """Return the derivative by generator k."""
 
     def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
-        """Return what is left when relations, the greatest generator's first, are put to use as often as they can."""
+        """Return the remainder after applying all relations, in their order, as often as possible."""
 
     def quotient(self, dividend: Any, divisor: Any) -> Any:
-        """Return the quotient of a division that leaves no remainder, None where one is left."""
+        """Return the quotient of an exact division; None if a remainder is left."""
 
 
 def polynomials(count: int) -> Polynomials:
-    """Return the polynomials in so many generators, by python-flint unless it is missing or ``DHKIT_FLINT=off``."""
+    """Return the ring in ``count`` generators: python-flint's, or sympy's if missing or ``DHKIT_FLINT=off``."""
     if os.environ.get("DHKIT_FLINT", "").lower() != "off":
         try:
             return _Flint(count)

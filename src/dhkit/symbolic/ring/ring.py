@@ -1,10 +1,10 @@
 """The exact ring: polynomials in an arm's parameters and the sines and cosines of its joints, in a normal form.
 
-Elements are polynomials over the rationals in sines and cosines of the joint angles, the values of sliding joints,
-joint rates and accelerations, and constants (parameters, roots, functions of parameters, reciprocals). Squares of sines
-become 1 - c^2, squares of roots what stands below them, and a reciprocal cancels against what it is the reciprocal of,
-so that equality is decided, not sampled. Of angles whose cosine cannot be written exactly, only multiples of a common
-one are known to be related.
+Elements are polynomials with rational coefficients in sines and cosines of joint angles, positions of prismatic joints,
+joint rates and accelerations, and constants (parameters, square roots, functions of parameters, reciprocals). The
+normal form replaces the square of a sine by 1 - c^2, the square of a square root by its argument, and the product of a
+reciprocal with its denominator by 1. So equality is decided, not sampled. One limit: among angles whose cosine has no
+exact form, relations are known only between multiples of a common angle.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class Constant:
     Attributes
     ----------
     text
-        What it is written as: ``m2``, ``sqrt(2)``, ``cos(beta)``, ``1/(m1 + m2)``.
+        Its text in equations: ``m2``, ``sqrt(2)``, ``cos(beta)``, ``1/(m1 + m2)``.
     meaning
-        The expression that it stands for; None where its text is its name.
+        The expression that it stands for; None for a parameter, whose text is its name.
     square
-        What its square is; None where nothing is known of it.
+        The expression that its square equals; None where no relation is known.
     reciprocal_of
-        What it is the reciprocal of; None for all others.
+        The denominator of a reciprocal; None for other constants.
     """
 
     text: str
@@ -45,7 +45,7 @@ class Constant:
 
     @property
     def symbols(self) -> frozenset[str]:
-        """The names that it is made of."""
+        """The names of the parameters that it depends on."""
         return frozenset({self.text}) if self.meaning is None else self.meaning.symbols
 
 
@@ -57,14 +57,13 @@ class Ring(PolynomialRing):
     kinds
         One letter a joint, R or P.
     constants
-        What else there is; each may be written in those before it.
+        Generators that do not depend on the state; each may depend on those before it.
     angles
-        Of each turning joint the joints, itself the last, whose variables the angle of its sine and cosine is the sum
-        of; itself alone unless given. Frames of parallel axes turn by sums of joint values, which makes c23 of
-        c2*c3 - s2*s3.
+        For each revolute joint, the joints whose variables add up to the angle of its sine and cosine, the joint itself
+        last; the joint alone unless given. With parallel axes, sums make expressions shorter: c23 for c2*c3 - s2*s3.
     sums
-        Angles that have a sine and a cosine besides, to print with. Elements in them are compared after
-        :meth:`expanded` has put in what they are.
+        Further sums of angles that have a sine and a cosine, for printing. Elements that contain them are compared
+        after :meth:`expanded`.
 
     Examples
     --------
@@ -91,7 +90,7 @@ class Ring(PolynomialRing):
         self.sums = tuple(joints for joints in sums if joints not in self.angles.values())
         turning = [(i, joints, angle_name(joints)) for i, joints in self.angles.items()]
         summed = [(-1, joints, angle_name(joints)) for joints in self.sums]
-        # Relations rewrite the greatest generator that they hold: reciprocals first, the last made foremost.
+        # A relation replaces its first generator in this order: reciprocals come first, the last one foremost.
         self.generators: tuple[Generator, ...] = (
             *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(reciprocals)),
             *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(others) if c.square is not None),
@@ -115,7 +114,7 @@ class Ring(PolynomialRing):
                 self._relate(place, 1, self.read(constant.reciprocal_of))
 
     def _relate(self, place: tuple[str, int | str], power: int, other: Element) -> None:
-        """Add x^2 = other (power 2), or x other = 1 (power 1)."""
+        """Add the relation x^2 = other (power 2) or x other = 1 (power 1) for the generator x with this key."""
         x = self._element(place).polynomial
         zero = x * x - other.polynomial if power == 2 else x * other.polynomial - self.polynomials.constant(1)
         relations = [*self.relations, Relation(self._places[place], power, zero)]
@@ -143,7 +142,7 @@ class Ring(PolynomialRing):
         Raises
         ------
         RingError
-            It has a name or a function that the ring has not.
+            A name or function in it is not a constant of the ring.
         """
         return Reader(self, self.units).expression(expression)
 
@@ -159,7 +158,7 @@ class Ring(PolynomialRing):
 
     @cached_property
     def _expansions(self) -> dict[int, Element]:
-        """What sines and cosines of :attr:`sums` are in those of the ring's own angles."""
+        """Sines and cosines of :attr:`sums` in terms of those of the ring's own angles, by index."""
         single = {joints: (self.sine(i), self.cosine(i)) for i, joints in self.angles.items()}
         expansions: dict[int, Element] = {}
         for sine, cosine, joints in self.turning:
@@ -173,7 +172,7 @@ class Ring(PolynomialRing):
 
     @cached_property
     def units(self) -> Mapping[TermMonomial, Sequence[Fraction]]:
-        """Angles whose cosines are constants, as multiples by what they are multiples of: pi, a parameter, 1."""
+        """Angles whose cosines are constants: factors by the monomial (pi, a parameter, 1) that they multiply."""
         units: dict[TermMonomial, list[Fraction]] = {}
         for constant in self.given:
             if constant.meaning is not None and constant.text.startswith("cos("):
@@ -186,7 +185,7 @@ class Ring(PolynomialRing):
 def _sum_of_angles(
     ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
 ) -> tuple[Element, Element]:
-    """Return sine and cosine of a sum of joint angles; an angle that begins earlier takes off what is too much."""
+    """Return sine and cosine of a sum of joint angles, from those of the ring's angles and of their differences."""
     s, c = ring.zero, ring.one
     for i in joints:
         own = ring.angles[i]
@@ -204,11 +203,11 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
     Parameters
     ----------
     element
-        Of any ring.
+        An element of any ring.
     ring
-        Where the result is.
+        The ring of the result.
     replacements
-        What generators become, by their place in the element's ring; others become those of the same kind and name.
+        Elements that replace generators, by index in the element's ring; other generators keep their kind and name.
     """
     own = element.ring.generators
     powers: dict[tuple[int, int], Element] = {}
@@ -237,6 +236,6 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
 
 
 def angle_name(joints: Sequence[int]) -> str:
-    """Return what a sum of joint angles is called: 23 for q2 + q3; 9_10 where a number has two digits."""
+    """Return the index text of a sum of joint angles: 23 for q2 + q3; 9_10 where a joint number has two digits."""
     numbers = [str(joint + 1) for joint in joints]
     return ("_" if any(len(number) > 1 for number in numbers) and len(numbers) > 1 else "").join(numbers)

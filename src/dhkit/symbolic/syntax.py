@@ -1,0 +1,67 @@
+"""How programming languages write entries of arrays, calls of functions and numbers: shared by all code generators."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """The parts of a language's syntax that generated code uses; operators are the same in all languages.
+
+    Attributes
+    ----------
+    item
+        An array's entry, from the array's name and the entry's index: ``{array}[{k}]``.
+    first_index
+        Index of an array's first entry.
+    pi
+        The number pi.
+    functions
+        Functions that have another name in the language.
+    nan, infinity
+        The values that no literal has.
+    """
+
+    item: str
+    first_index: int
+    pi: str
+    functions: Mapping[str, str]
+    nan: str
+    infinity: str
+
+    def entry(self, array: str, k: int) -> str:
+        """Return entry k of an array, counted from 0."""
+        return self.item.format(array=array, k=k + self.first_index)
+
+    def call(self, function: str, arguments: Sequence[str]) -> str:
+        """Return a call of a function of :data:`dhkit.expressions.FUNCTIONS` or of an operation of a graph."""
+        return f"{self.functions.get(function, function)}({', '.join(arguments)})"
+
+    def number(self, value: float) -> str:
+        """Return a literal that is read as the same double."""
+        if math.isfinite(value):
+            return repr(value)
+        return self.nan if math.isnan(value) else self.infinity if value > 0 else f"-{self.infinity}"
+
+
+C = Syntax(
+    item="{array}[{k}]",
+    first_index=0,
+    pi=repr(math.pi),
+    functions={"abs": "fabs", "absolute": "fabs", "minimum": "fmin", "maximum": "fmax"},
+    nan="NAN",
+    infinity="INFINITY",
+)
+MATLAB = Syntax(item="{array}({k})", first_index=1, pi="pi", functions={}, nan="NaN", infinity="Inf")
+NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
+PYTHON = Syntax(
+    item="{array}[..., {k}]",
+    first_index=0,
+    pi="np.pi",
+    functions={name: f"np.{NUMPY_NAMES.get(name, name)}" for name in (*NUMPY_NAMES, "tan", "sqrt", "abs")},
+    nan="1e999 - 1e999",  # so that generated modules import nothing for it
+    infinity="1e999",
+)
