@@ -25,7 +25,7 @@ from dhkit.display import LONGEST_LINE, MOST_ROWS, html_table, plain, repr_line
 from dhkit.dynamics import ParameterGrouping, dynamics_graph, parameter_grouping
 from dhkit.expressions import Atom, Budget, Expression, parse
 from dhkit.kernels import Kernel
-from dhkit.kinematics.kernels import kinematic_kernels
+from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate import Check
 from dhkit.symbolic.exact.regressor import regressor

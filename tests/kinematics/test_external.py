@@ -51,7 +51,7 @@ def check(arm, found, T):
     assert np.array_equal(found.valid, np.arange(len(found.branches)) < counts[:, None])
     assert max(1, counts.max()) == len(found.branches)
     first = np.where(found.valid, found.q[..., 0], 2 * np.pi)
-    assert np.all(np.diff(first, axis=1) > -2 * external.SAME)
+    assert np.all(np.diff(first, axis=1) > -2 * external.SAME_ANGLE)
 
 
 def test_all_solutions_of_six_joints(ssik):

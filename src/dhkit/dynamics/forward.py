@@ -16,8 +16,8 @@ from dhkit.symbolic import SINGULAR, Friction
 
 log = logging.getLogger(__name__)
 
-PROBES = 16
-"""Random states at which a mass matrix must be singular to be called singular everywhere."""
+SINGULAR_SAMPLES = 16
+"""Number of random states at which a mass matrix must be singular to count as singular at every state."""
 
 
 @takes_robot
@@ -58,11 +58,11 @@ def forward_dynamics(
     load = external_torque(description, q, qd, wrench, friction, threads)
     q, qd, tau = (joint_array(description, array, name) for array, name in ((q, "q"), (qd, "qd"), (tau, "tau")))
     if out is not None and np.may_share_memory(out, q):
-        q = q.copy()  # where the arm was is asked once more if it has no acceleration there
+        q = q.copy()  # out= may overwrite q, which is needed to explain a missing acceleration
     drive = tau if load is None else tau + load
     states = {"q": q, "qd": qd, "tau": drive}
     qdd = evaluate("forward_dynamics", description, states, (description.n,), out, threads)
-    # The sum finds a NaN in one pass; only then is it asked where it comes from.
+    # The sum finds a NaN in one pass; only then its cause is looked for.
     if qdd.size and not np.isfinite(qdd.sum()):
         _explain(description, q, qdd)
     return qdd
@@ -70,7 +70,7 @@ def forward_dynamics(
 
 @takes_robot
 def require_inertia(description: Description) -> None:
-    """Refuse an arm whose mass matrix is singular at every state, so that its joints have no accelerations.
+    """Check that an arm's mass matrix is regular at some state, so that its joints have accelerations.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def require_inertia(description: Description) -> None:
 
 
 def _explain(description: Description, q: Array, qdd: Array) -> None:
-    """Raise or log where M is singular; other NaN come from states that are not finite, as everywhere."""
+    """Raise an error or log a warning where M is singular; other NaN come from states that are not finite."""
     require_inertia(description)
     lost = np.isnan(qdd).any(axis=-1)
     joints = _failing(mass_matrix(description, np.broadcast_to(q, qdd.shape)[lost]))
@@ -103,20 +103,20 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
 
 
 def _failing(M: Array) -> Array:
-    """Return, of each matrix (N, n, n), the last joint that feels no inertia, or -1; as ``solve_for_acceleration``."""
+    """Return for each matrix (N, n, n) the last joint without inertia, found as ``solve_for_acceleration`` does; -1: none."""
     A, least = M.copy(), SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
     failing = np.full(len(M), -1)
     for k in reversed(range(M.shape[-1])):
         pivot = A[:, k, k].copy()
         singular = (pivot <= least) & (failing < 0)
         failing[singular] = k
-        with np.errstate(all="ignore"):  # what comes behind a singular pivot is of no interest
+        with np.errstate(all="ignore"):  # results after a singular pivot are not used
             A -= A[:, :, k, None] * A[:, None, k, :] / pivot[:, None, None]
     return failing
 
 
 def _random_states(description: Description) -> Array:
-    return np.random.default_rng(0).uniform(-np.pi, np.pi, (PROBES, description.n))
+    return np.random.default_rng(0).uniform(-np.pi, np.pi, (SINGULAR_SAMPLES, description.n))
 
 
 def _named(description: Description, joints: Array) -> str:

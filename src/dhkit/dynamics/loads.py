@@ -22,7 +22,7 @@ def friction_torque(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return the torques that friction takes: viscous, and dry friction that differs by direction.
+    """Return friction torques: viscous, and dry friction that differs by direction.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def friction_torque(
     Returns
     -------
     Array
-        Shape (..., n), joint side, N m and N, of the sign of the motion: what a motor must give on top.
+        Shape (..., n), joint side, N m and N, with the sign of the motion: the torque that a motor must add.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def external_torque(
     friction: bool | Friction,
     threads: int = 1,
 ) -> Array | None:
-    """Return J^T wrench - friction, shape (..., n): what drives the joints beside their motors; None for nothing.
+    """Return J^T wrench - friction, shape (..., n), N m and N; None if there is neither.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def friction_kernel(n: int, smooth: bool) -> Kernel:
 
 @lru_cache(maxsize=512)
 def wrench_kernel(description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`wrench_torque` and an arm's parameters of it."""
+    """Return the kernel of :func:`wrench_torque` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     return kernel("wrench_torque", pattern, lambda: _wrench_graph(description)), parameters
 

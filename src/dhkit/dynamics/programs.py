@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array
+from dhkit.description import Array, Description, joint_array, takes_robot
+from dhkit.dynamics.loads import friction_kernel, wrench_kernel
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import (
     Graph,
@@ -38,7 +39,7 @@ EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "kinetic_energy": kinetic_energy,
     "potential_energy": potential_energy,
 }
-"""What computes each quantity, as a function of the table and of the joint vectors of ``STATES``."""
+"""Derivations of each quantity, as functions of the table and of the joint vectors of ``STATES``."""
 STATES: Mapping[str, tuple[str, ...]] = {
     "mass_matrix": ("q",),
     "coriolis_matrix": ("q", "qd"),
@@ -49,7 +50,7 @@ STATES: Mapping[str, tuple[str, ...]] = {
     "kinetic_energy": ("q", "qd"),
     "potential_energy": ("q",),
 }
-"""The joint vectors that each quantity is a function of."""
+"""The joint vectors that each quantity depends on."""
 
 
 def evaluate(
@@ -76,7 +77,7 @@ def evaluate(
 
 @lru_cache(maxsize=4096)
 def dynamics_kernel(quantity: str, description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of a quantity and an arm's parameters of it.
+    """Return the kernel of a quantity and the arm's values of its parameters.
 
     Raises
     ------
@@ -98,3 +99,13 @@ def dynamics_graph(quantity: str, description: Description) -> Graph:
 @lru_cache(maxsize=512)
 def _pattern_of(description: Description) -> tuple[str, Array]:
     return inertial_pattern(description)
+
+
+@takes_robot
+def dynamic_kernels(description: Description) -> list[Kernel]:
+    """Return the kernels of friction and wrenches and, for an arm with bodies, of its equation of motion."""
+    kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]
+    kernels.append(wrench_kernel(description)[0])
+    if all(joint.bodies for joint in description.joints):
+        kernels += [dynamics_kernel(quantity, description)[0] for quantity in EXPRESSIONS]
+    return kernels

@@ -51,21 +51,23 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     carriers = carrying(description.convention, frames)
     prismatic = description.numbers.prismatic
     omega, rate = np.zeros((2, *q.shape[:-1], 3))
-    a = np.broadcast_to(-description.numbers.gravity, omega.shape)  # an arm that accelerates upwards feels its weight
+    a = np.broadcast_to(
+        -description.numbers.gravity, omega.shape
+    )  # gravity acts like an acceleration of the base upwards
     Y = np.zeros((*q.shape, 10 * n))
     for i in range(n):
         axis, at = carriers[i][..., :3, 2], carriers[i][..., :3, 3]
         lever = frames[i + 1][..., :3, 3] - frames[i][..., :3, 3]
         v, dv = (x[..., i, None] for x in (qd, qdd))
         if prismatic[i]:
-            a = a + _swung(omega, rate, lever) + 2 * v * np.cross(omega, axis) + dv * axis
+            a = a + _relative_acceleration(omega, rate, lever) + 2 * v * np.cross(omega, axis) + dv * axis
         else:
             # The joint's axis passes through a point of the link before; the link's own frame turns about it.
-            a = a + _swung(omega, rate, at - frames[i][..., :3, 3])
+            a = a + _relative_acceleration(omega, rate, at - frames[i][..., :3, 3])
             rate = rate + dv * axis + v * np.cross(omega, axis)
             omega = omega + v * axis
-            a = a + _swung(omega, rate, frames[i + 1][..., :3, 3] - at)
-        force, moment = _needed(frames[i + 1][..., :3, :3], omega, rate, a)
+            a = a + _relative_acceleration(omega, rate, frames[i + 1][..., :3, 3] - at)
+        force, moment = _force_and_moment(frames[i + 1][..., :3, :3], omega, rate, a)
         for j in range(i + 1):
             z, p = carriers[j][..., :3, 2], carriers[j][..., :3, 3]
             effort = force
@@ -77,13 +79,13 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     return Y
 
 
-def _swung(omega: Array, rate: Array, lever: Array) -> Array:
-    """Return how a point of a link accelerates against another at ``lever`` from it."""
+def _relative_acceleration(omega: Array, rate: Array, lever: Array) -> Array:
+    """Return the acceleration of a point of a link relative to another, which is at -``lever`` from it."""
     swung: Array = np.cross(rate, lever) + np.cross(omega, np.cross(omega, lever))
     return swung
 
 
-def _needed(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:
+def _force_and_moment(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:
     """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10)."""
     w, dw, acceleration = (np.einsum("...ji,...j->...i", R, x) for x in (omega, rate, a))
     force, moment = np.zeros((2, *w.shape, 10))

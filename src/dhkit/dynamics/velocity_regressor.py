@@ -16,10 +16,9 @@ from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 from dhkit.symbolic import velocity_regressor as velocity_regressor_expression
 
 DEPENDENT = 1e-9
-"""Remainder of a column of unit length, its part along earlier columns taken off, below which it depends on them:
-roundings leave 1e-14."""
+"""A column of unit length depends on earlier ones where less than this remains of it; rounding leaves 1e-14."""
 STATES_PER_JOINT = 20
-"""Random states per joint at which dependent columns are looked for: twice as many equations as parameters."""
+"""Number of random states per joint for the rank: twice as many equations as parameters."""
 
 
 @takes_robot
@@ -68,7 +67,7 @@ def velocity_regressor(
 
 @lru_cache(maxsize=512)
 def velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`velocity_regressor` and an arm's parameters of it."""
+    """Return the kernel of :func:`velocity_regressor` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     numbers = description.numbers
     gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
@@ -95,7 +94,7 @@ class ParameterGrouping:
     """
 
     columns: tuple[int, ...]
-    """Places of the columns of a regressor that are independent, ascending."""
+    """Indices of independent columns of the regressor, ascending."""
     matrix: Array
     """Shape (m, 10 n)."""
 
@@ -139,7 +138,7 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
         if size <= floor:
             continue
         rest = A[:, k] / size
-        for _ in range(2):  # the second time takes off what roundings left
+        for _ in range(2):  # the second pass removes what rounding left
             rest = rest - basis @ (basis.T @ rest)
         if np.linalg.norm(rest) > DEPENDENT:
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])

@@ -1,12 +1,10 @@
 """Where an arm is, how it moves and how it gets there: forward and inverse kinematics, Jacobians, workspace."""
 
 from dhkit.kinematics.boundaries import Boundary, boundaries
-from dhkit.kinematics.c_code import export_kinematics
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics, inverse_kinematics_in_chunks
 from dhkit.kinematics.jacobian import jacobian, jacobian_dot
-from dhkit.kinematics.kernels import kinematic_kernels
 from dhkit.kinematics.manipulability import (
     Ellipsoid,
     Motion,
@@ -20,6 +18,7 @@ from dhkit.kinematics.manipulability import (
 )
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
+from dhkit.kinematics.programs import export_kinematics, kinematic_kernels
 from dhkit.kinematics.singularities import (
     Singularities,
     determinant,

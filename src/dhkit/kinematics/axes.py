@@ -1,4 +1,4 @@
-"""How the axes of an arm lie to each other: what decides whether its inverse kinematics have a closed form."""
+"""How the joint axes of an arm lie to each other, which decides whether its inverse kinematics have a closed form."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from dhkit.description import Array, Description, world_to_frames
 from dhkit.description.frames import carrying
 
 TOLERANCE = 1e-12
-"""Sine of the angle by which axes may miss being parallel or perpendicular; share of the reach by which they may miss
-each other where they intersect. A closed form then still closes to about this."""
+"""Tolerance for parallel and perpendicular axes (sine of an angle) and for intersecting ones (share of the reach). A
+closed form then closes to about this."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
-    """The joint axes at zero joint values, offsets included, in the world; joints count from 1, as in words."""
+    """The joint axes in the world at zero joint positions, offsets included; methods count joints from 1."""
 
     directions: Array
-    """Shape (n, 3), unit vectors: the positive sense of each joint."""
+    """Unit vectors in the positive sense of each joint, shape (n, 3)."""
     points: Array
-    """Shape (n, 3), m: a point of each axis."""
+    """A point of each axis, shape (n, 3), m."""
     prismatic: NDArray[np.bool_]
     T_world_tool: Array
-    """Shape (4, 4)."""
+    """The tool in the world, shape (4, 4), m."""
     scale: float
-    """The reach, m: what lengths are compared with."""
+    """The reach, m, which lengths are compared with."""
     tolerance: float = TOLERANCE
 
     @classmethod
@@ -73,11 +73,11 @@ class Axes:
         return bool(abs(self.direction(i) @ self.direction(j)) <= self.tolerance)
 
     def sense(self, i: int, j: int) -> float:
-        """Return +1 where parallel axes i and j have the same direction, else -1."""
+        """Return +1 if parallel axes i and j have the same direction, else -1."""
         return 1.0 if self.direction(i) @ self.direction(j) > 0 else -1.0
 
     def distance(self, i: int, point: Array) -> float:
-        """Return how far a point is from axis i, m."""
+        """Return the distance of a point, shape (3,), m, from axis i, m."""
         return float(np.linalg.norm(np.cross(self.direction(i), point - self.point(i))))
 
     def on(self, i: int, point: Array) -> bool:
@@ -85,11 +85,11 @@ class Axes:
         return self.distance(i, point) <= self.tolerance * self.scale
 
     def snapped(self, length: float) -> float:
-        """Return a length, or 0 where it is rounding."""
+        """Return a length, m, or 0 if it is as small as rounding."""
         return 0.0 if abs(length) <= self.tolerance * self.scale else float(length)
 
     def meeting_point(self, i: int, j: int) -> Array | None:
-        """Return where axes i and j intersect, or None where they are parallel or miss each other."""
+        """Return the point, shape (3,), m, where axes i and j intersect; None if they are parallel or skew."""
         a, b = self.direction(i), self.direction(j)
         normal = np.cross(a, b)
         size = normal @ normal
@@ -101,7 +101,7 @@ class Axes:
 
 
 def inverse_pose(T: Array) -> Array:
-    """Return the inverse of a rigid transform, shape (4, 4): by its transposed rotation, which rounds nothing."""
+    """Return the inverse of a rigid transform, shape (4, 4), by its transposed rotation."""
     inverse = np.eye(4)
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]

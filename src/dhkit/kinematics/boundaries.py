@@ -1,4 +1,4 @@
-"""How far an arm with a closed form reaches, whatever its turning joints' limits: curves about axis 1.
+"""Boundary curves of the workspace of arms with a closed form, revolute joints without limits.
 
 A wrist centre that two links move in the arm's plane stays in the ring between abs(L2 - L3) and L2 + L3 about axis 2;
 joint 1 turns that ring about axis 1, outside the cylinder whose radius is the arm's lateral offset (Siciliano et al.,
@@ -17,38 +17,37 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane
 from dhkit.kinematics.closed_form.family import Fit
-from dhkit.kinematics.singular_factors import Side, link_radii, slide_radii
+from dhkit.kinematics.singular_factors import ShoulderFactor, link_radii, slide_radii
 from dhkit.kinematics.singularities import singularities
 
-TURNED = {"elbow_wrist", "slide_wrist", "three_parallel", "yaw_two", "yaw_three"}
+ARMS_IN_A_PLANE = {"elbow_wrist", "slide_wrist", "three_parallel", "yaw_two", "yaw_three"}
 """Families with an arm in a plane that joint 1 turns."""
 PLANAR = {"parallel_chain", "polar"}
-"""Families that keep to a plane across their first axis, or slide along it."""
+"""Families whose tool moves in a plane across the first axis, or also along that axis."""
 NAMES = {
     "elbow_wrist": "wrist centre",
     "slide_wrist": "wrist centre",
     "three_parallel": "meeting point of axes 5 and 6",
 }
-PIECES = 180
-"""Pieces of a circle."""
+CIRCLE_SEGMENTS = 180
 TOUCHING = 1e-9
-"""Share of a1 by which two circles may miss each other where they touch: at x = 0 each meets its mirror image."""
-SMALLEST = 1e-3
-"""A circle with a radius below this share of the reach is a point."""
+"""Share of a1 by which two circles that touch may miss each other; at x = 0 each touches its mirror image."""
+MIN_RADIUS = 1e-3
+"""A circle with a radius below this share of the reach is drawn as a point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """A surface that bounds where a point of an arm can be, as two curves in the world."""
+    """A surface that bounds the positions of a point of an arm, as two curves in the world."""
 
     name: str
-    """outer, inner or shoulder."""
+    """Which boundary: outer, inner or shoulder."""
     point: str
-    """What it bounds, such as ``wrist centre``."""
+    """The point whose positions it bounds, such as ``wrist centre``."""
     section: Array
-    """With joint 1 at zero, shape (k, 3), m."""
+    """Section with joint 1 at zero, shape (k, 3), m."""
     circle: Array
-    """What it is seen as along axis 1, shape (m, 3), m; m is 0 where it is no border from there."""
+    """Outline seen along axis 1, shape (m, 3), m; empty if the surface has no outline from there."""
 
     def __repr__(self) -> str:
         return repr_line("Boundary", self.point, f"{self.name}, {len(self.section)} points")
@@ -56,10 +55,10 @@ class Boundary:
 
 @takes_robot
 def boundaries(description: Description) -> tuple[Boundary, ...]:
-    """Return an arm's boundaries in closed form: outer, inner and shoulder, as far as it has them.
+    """Return an arm's boundaries in closed form: outer, inner and shoulder, as far as they exist.
 
-    Limits of turning joints do not count, those of a slide do; without them an arm with a slide has no outer boundary.
-    An arm whose boundaries are not known in closed form, or whose first joint slides, has none here.
+    Limits of revolute joints are ignored. Without limits of a prismatic joint there is no outer boundary.
+    The result is empty if no boundaries are known in closed form, or if the first joint is prismatic.
 
     Examples
     --------
@@ -71,17 +70,17 @@ def boundaries(description: Description) -> tuple[Boundary, ...]:
     family, fit = found.family, found.fit
     if family is None or fit is None or not description.joints[0].is_revolute:
         return ()
-    if family.name in TURNED:
+    if family.name in ARMS_IN_A_PLANE:
         return _turned_ring(description, NAMES.get(family.name, "tool"))
     return _ring(description, fit) if family.name in PLANAR else ()
 
 
 def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
-    """Return the boundaries of a ring in a plane that turns about axis 1, with an offset across it."""
-    (side,) = (factor for factor in singularities(description).factors if isinstance(factor, Side))
+    """Return the boundaries of a ring in a plane that joint 1 turns about axis 1, with an offset across the plane."""
+    (side,) = (factor for factor in singularities(description).factors if isinstance(factor, ShoulderFactor))
     plane = ArmPlane.of(Axes.of(description))
     least, most = side.radii(description.numbers.lower, description.numbers.upper)
-    # All turns of joint 1 in one: each point in front of axis 1 is reached from the front, from behind, or both.
+    # Over all q1 together: a point in front of axis 1 is reached from the front, from behind, or both.
     a1, sign = abs(side.a1), -1.0 if side.a1 < 0 else 1.0
     ring = _Ring(a1, least, most)
 
@@ -97,7 +96,7 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     if np.isfinite(most):
         found.append(Boundary("outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))))
     inner = ring.inner
-    if np.isfinite(inner).any() and least > SMALLEST * side.size:
+    if np.isfinite(inner).any() and least > MIN_RADIUS * side.size:
         found.append(Boundary("inner", point, world(inner), nowhere))
     if side.offset and np.isfinite(most) and most > a1:
         found.append(Boundary("shoulder", point, world(ring.edge), around(abs(side.offset))))
@@ -106,22 +105,22 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
 
 @dataclass(frozen=True)
 class _Ring:
-    """A ring about (a1, 0) together with its mirror image at the axis x = 0, of which only x >= 0 counts."""
+    """A ring about (a1, 0) and its mirror image at the axis x = 0, restricted to x >= 0."""
 
     a1: float
-    """m, not negative."""
+    """Distance of the ring's centre from the axis, m, not negative."""
     least: float
     most: float
-    """Radii, m; the larger one may be infinite."""
+    """Radii, least then most, m; the larger may be infinite."""
 
     @property
     def outer(self) -> Array:
-        """The outer boundary, shape (k, 2); the mirror image never goes beyond it."""
+        """The outer boundary, shape (k, 2), m; the mirror image lies inside it."""
         return self._circle(self.a1, self.most)
 
     @property
     def inner(self) -> Array:
-        """The boundary of the hole, shape (k, 2), in pieces with NaN between: what neither ring covers."""
+        """The boundary of the hole that neither ring covers, shape (k, 2), m, pieces separated by NaN."""
         if not self.a1:
             return self._circle(0.0, self.least)
         pieces = [
@@ -134,10 +133,12 @@ class _Ring:
 
     @property
     def edge(self) -> Array:
-        """The part of the axis x = 0 that is covered, shape (k, 2), with NaN at the hole."""
+        """The covered part of the axis x = 0, shape (k, 2), m, NaN at the hole."""
         high, low = (np.sqrt(max(0.0, radius**2 - self.a1**2)) for radius in (self.most, self.least))
-        upper = np.linspace(low, high, PIECES + 1)
-        heights = np.concatenate([-upper[::-1], [np.nan], upper]) if low else np.linspace(-high, high, PIECES + 1)
+        upper = np.linspace(low, high, CIRCLE_SEGMENTS + 1)
+        heights = (
+            np.concatenate([-upper[::-1], [np.nan], upper]) if low else np.linspace(-high, high, CIRCLE_SEGMENTS + 1)
+        )
         return np.stack([0.0 * heights, heights], axis=1)
 
     def _circle(self, centre: float, radius: float) -> Array:
@@ -145,7 +146,7 @@ class _Ring:
         if radius <= -centre or not radius:
             return np.empty((0, 2))
         half = np.arccos(max(-1.0, -centre / radius))
-        angles = np.linspace(-half, half, PIECES + 1)
+        angles = np.linspace(-half, half, CIRCLE_SEGMENTS + 1)
         return np.stack([centre + radius * np.cos(angles), radius * np.sin(angles)], axis=1)
 
     def _uncovered(self, points: Array, centre: float) -> Array:
@@ -157,7 +158,7 @@ class _Ring:
 
 
 def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
-    """Return the boundaries of a ring across the first axis, or of the tube that a slide along it makes of it."""
+    """Return the boundaries of a ring across the first axis, or of the tube if a prismatic joint moves along it."""
     p = fit.parameters
     T_plane_world = np.asarray(p["T_plane_world"])
     R, origin = T_plane_world[:, :3], -T_plane_world[:, :3].T @ T_plane_world[:, 3]
@@ -165,16 +166,16 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
 
     def boundary(name: str, radius: float) -> Boundary:
         line = np.stack([[radius, 0.0, height] for height in heights])
-        circle = np.hstack([radius * _unit_circle(), np.full((PIECES + 1, 1), heights[0])])
+        circle = np.hstack([radius * _unit_circle(), np.full((CIRCLE_SEGMENTS + 1, 1), heights[0])])
         return Boundary(name, "tool", np.asarray(origin + line @ R), np.asarray(origin + circle @ R))
 
     radii = zip(("inner", "outer"), _radii(description, fit), strict=True)
-    least = SMALLEST * float(np.asarray(p["reach"]))
+    least = MIN_RADIUS * float(np.asarray(p["reach"]))
     return tuple(boundary(name, radius) for name, radius in radii if least < radius < np.inf)[::-1]
 
 
 def _radii(description: Description, fit: Fit) -> tuple[float, float]:
-    """Return the tool's least and largest distance from the first axis, m."""
+    """Return the least and largest distance of the tool from the first axis, m."""
     p, numbers = {key: np.asarray(value, dtype=float) for key, value in fit.parameters.items()}, description.numbers
     if "start" in p:
         return slide_radii(float(p["start"]), float(p["lift"]), float(numbers.lower[1]), float(numbers.upper[1]))
@@ -182,7 +183,7 @@ def _radii(description: Description, fit: Fit) -> tuple[float, float]:
 
 
 def _rises(description: Description, fit: Fit) -> Array:
-    """Return how far the slide of a chain moves the tool along the first axis at its limits, shape (2,), m."""
+    """Return the tool's displacement along the first axis at the prismatic joint's limits, shape (2,), m."""
     if "P" not in fit.structure:
         return np.zeros(2)
     joint, numbers = fit.structure.index("P"), description.numbers
@@ -191,5 +192,5 @@ def _rises(description: Description, fit: Fit) -> Array:
 
 
 def _unit_circle() -> Array:
-    angles = np.linspace(0, 2 * np.pi, PIECES + 1)
+    angles = np.linspace(0, 2 * np.pi, CIRCLE_SEGMENTS + 1)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)

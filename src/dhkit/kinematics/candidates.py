@@ -1,6 +1,8 @@
-"""Joint values that a solver without closed form has found, made into solutions: what counts, flags and status."""
+"""Joint positions from a solver without closed form as solutions, with flags and status."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +10,6 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description
 from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatus
-
-TURN = 2 * np.pi
 
 
 def collect(
@@ -21,20 +21,20 @@ def collect(
     branches: tuple[str, ...],
     met: tuple[str, ...],
 ) -> IKSolutions:
-    """Return the solutions that joint values are.
+    """Return joint positions as solutions.
 
     Parameters
     ----------
     description
         The robot.
     q
-        Joint values that close, NaN rows for what was not found, shape (..., B, n).
+        Joint positions that reach the poses, shape (..., B, n), rad and m; NaN rows where none was found.
     distance
-        What is to be said of poses that nothing was found for, m, shape (...).
+        Distance to report for poses without solution, m, shape (...).
     posed
-        Which poses are poses, shape (...).
+        Whether each matrix is a pose, shape (...).
     branches, met
-        As of :class:`dhkit.kinematics.IKSolutions`.
+        See :class:`dhkit.kinematics.IKSolutions`.
     """
     valid = np.asarray(~np.isnan(q).any(axis=-1))
     found = valid.any(axis=-1)
@@ -52,7 +52,7 @@ def collect(
 
 
 def are_poses(T: Array) -> NDArray[np.bool_]:
-    """Return which matrices (..., 4, 4) are poses: finite, orthonormal to 1e-6, last row 0 0 0 1."""
+    """Return whether matrices (..., 4, 4) are poses, shape (...): finite, orthonormal to 1e-6, last row 0 0 0 1."""
     with np.errstate(over="ignore", invalid="ignore"):
         R = T[..., :3, :3]
         defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
@@ -64,9 +64,9 @@ def are_poses(T: Array) -> NDArray[np.bool_]:
 
 
 def orthonormal(T: Array) -> Array:
-    """Return poses (..., 4, 4) with the rotations nearest to theirs, which are rotations to 1e-6.
+    """Return poses (..., 4, 4) with orthonormal rotations, from poses whose rotations are orthonormal to 1e-6.
 
-    Each round of R (3 - R^T R) / 2 squares what is missing (Björck and Bowie 1971).
+    Each iteration R (3 - R^T R) / 2 squares the defect (Björck and Bowie 1971).
     """
     T = T.copy()
     for _ in range(2):
@@ -76,18 +76,18 @@ def orthonormal(T: Array) -> Array:
     return T
 
 
-def wrapped(q: Array, turning: NDArray[np.bool_]) -> Array:
-    """Return joint values (..., n) with the angles of the joints that are marked, shape (n,), in (-pi, pi]."""
+def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
+    """Return joint positions (..., n) with the angles of marked joints, shape (n,), reduced to (-pi, pi]."""
     inside = (q > -np.pi) & (q <= np.pi)
-    wound: Array = np.where(turning & ~inside, q - TURN * np.ceil((q - np.pi) / TURN), q)
+    wound: Array = np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
     return wound
 
 
 def _outside(description: Description, q: Array) -> NDArray[np.bool_]:
-    """Return where some joint is outside its limits whatever whole turns are added, shape (...); NaN is not."""
+    """Return whether a joint is outside its limits for all whole turns, shape (...); False for NaN."""
     numbers = description.numbers
     lower, upper = numbers.lower - LIMIT_SLACK, numbers.upper + LIMIT_SLACK
     with np.errstate(invalid="ignore"):
-        windings = np.floor((upper - q) / TURN) - np.ceil((lower - q) / TURN)
+        windings = np.floor((upper - q) / math.tau) - np.ceil((lower - q) / math.tau)
         outside: NDArray[np.bool_] = np.where(numbers.prismatic, (q < lower) | (q > upper), windings < 0)
     return np.asarray(outside.any(axis=-1))

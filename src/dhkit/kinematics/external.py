@@ -13,9 +13,9 @@ from dhkit.description import Array, Description
 from dhkit.errors import ModelError, from_checkout
 from dhkit.kernels import pose_rows, uncounted
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.closed_form.family import ALL
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.numeric import closes, descend
 from dhkit.kinematics.solutions import IKSolutions
@@ -23,11 +23,11 @@ from dhkit.kinematics.solutions import IKSolutions
 log = logging.getLogger(__name__)
 
 CLOSES = 1e-10
-"""What a solution may miss: of the position as a share of the reach, of the rotation in rad."""
-EXACT = 1e-13
-"""What Newton's method is to get the solutions down to."""
-SAME = 1e-6
-"""rad: angles are told apart by more than this when solutions are put in order."""
+"""Largest error of a solution: position as a share of the reach, rotation in rad."""
+POLISHED = 1e-13
+"""Error at which Newton's method stops polishing a solution."""
+SAME_ANGLE = 1e-6
+"""Angles that differ by less, rad, count as equal when solutions are sorted."""
 
 
 def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
@@ -78,7 +78,7 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
         np.full(posed.shape, np.nan),
         posed=posed,
         branches=tuple(f"solution {k + 1}" for k in range(B)),
-        met=ALL,
+        met=ALL_COORDINATES,
     )
 
 
@@ -95,7 +95,7 @@ def _solver(description: Description) -> Any:
         raise ModelError(message) from None
     log.info("preparing ssik for %s, which may take a minute the first time", description.name)
     axes = Axes.of(description)
-    # From the world to the first axis, from axis to axis, from the last to the tool: ssik's P, with H the directions.
+    # ssik's P: from the world to the first axis, from axis to axis, and to the tool; its H: the axes' directions.
     offsets = np.diff(axes.points, axis=0, prepend=0.0, append=axes.T_world_tool[None, :3, 3])
     solver = ssik.Manipulator.from_axes(axes.directions, offsets)
     solver.prepare()
@@ -103,14 +103,14 @@ def _solver(description: Description) -> Any:
 
 
 def _tool_axes(description: Description) -> Array:
-    """Return what turns our tool into ssik's, whose axes are the world's where all joint values are 0, (4, 4)."""
+    """Return the transform, shape (4, 4), from our tool to ssik's, whose axes at q = 0 are the world's."""
     turn = np.eye(4)
     turn[:3, :3] = Axes.of(description).T_world_tool[:3, :3].T
     return turn
 
 
 def _solutions(solver: Any, goal: Array, n: int) -> Array:
-    """Return what ssik finds for one pose, limits or not, shape (K, n)."""
+    """Return ssik's solutions for one pose, inside limits or not, shape (K, n), rad."""
     try:
         with np.errstate(all="ignore"):
             found = solver.solve(goal, respect_limits=False)
@@ -121,18 +121,18 @@ def _solutions(solver: Any, goal: Array, n: int) -> Array:
 
 
 def _polished(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return joint values (K, n) with angles in (-pi, pi] after some steps of Newton, and which of them close."""
+    """Return joint positions (K, n) after some Newton steps, angles in (-pi, pi], and whether each closes."""
     newton = Newton.of(description, position_only=False, limits=False)
-    # How many solutions a pose has must not start a compilation in a control loop.
+    # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
     with np.errstate(all="ignore"), uncounted():
-        q, error = descend(newton, goals, q, EXACT)
-    return wrapped(q, ~description.numbers.prismatic), closes(error, CLOSES)
+        q, error = descend(newton, goals, q, POLISHED)
+    return wrap_angles(q, ~description.numbers.prismatic), closes(error, CLOSES)
 
 
 def _ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
-    """Return solutions (K, n) of the poses that own them as a table (poses, B, n), NaN where there are no more."""
+    """Return solutions (K, n) sorted by the poses that they belong to, shape (poses, B, n), filled up with NaN."""
     counts = np.bincount(owner, minlength=poses)
-    order = np.lexsort([*np.rint(q.T / SAME)[::-1], owner])
+    order = np.lexsort([*np.rint(q.T / SAME_ANGLE)[::-1], owner])
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     table = np.full((poses, max(1, int(counts.max(initial=0))), q.shape[1]), np.nan)
     table[owner[order], place] = q[order]

@@ -1,4 +1,4 @@
-"""Forward kinematics: where the tool and the frames are."""
+"""Forward kinematics: poses of the tool and of all frames."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
     description
         The robot.
     q
-        Joint values, shape (..., n), rad and m; angles up to 1e6 rad.
+        Joint positions, shape (..., n), rad and m; angles up to 1e6 rad.
     out
-        Where to write, shape (..., 4, 4), float64, contiguous.
+        Array to write into, shape (..., 4, 4), float64, contiguous.
     threads
-        How many threads share a large batch.
+        Number of threads for a large batch.
 
     Returns
     -------
@@ -49,14 +49,14 @@ def frames(description: Description, q: ArrayLike, out: Array | None = None, thr
 
 @lru_cache(maxsize=512)
 def tool_kernel(description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`forward_kinematics` and an arm's parameters of it."""
+    """Return the kernel of :func:`forward_kinematics` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     return kernel("forward_kinematics", pattern, lambda: _tool_graph(description)), parameters
 
 
 @lru_cache(maxsize=512)
 def frames_kernel(description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`frames` and an arm's parameters of it."""
+    """Return the kernel of :func:`frames` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     return kernel("frames", pattern, lambda: _frames_graph(description)), parameters
 

@@ -19,7 +19,7 @@ from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
 CHUNK = 16_384
-"""Poses of a chunk: about 6 MB of joint values with eight branches, which the processor's cache holds."""
+"""Poses per chunk: with eight branches 6 MB of joint positions, which fit into the processor's cache."""
 
 
 @takes_robot
@@ -38,24 +38,24 @@ def inverse_kinematics(
     T
         Poses of the tool in the world, shape (..., 4, 4).
     seed
-        Joint values, shape (n,) or (..., n): where two axes of the wrist coincide, one joint may take any angle (q4,
-        or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 may:
-        it takes that of the seed, or 0. ssik does not use it.
+        Joint positions, shape (n,) or (..., n), rad and m. Where two axes of the wrist coincide, one joint is free (q4,
+        or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 is:
+        a free joint takes its angle from the seed, or 0. ssik does not use it.
     out
-        Where to write the joint values, shape (..., B, n), float64, contiguous. Not with ssik.
+        Array for the joint positions, shape (..., B, n), float64, contiguous. Not with ssik.
     threads
-        How many threads share a large batch. Not with ssik.
+        Number of threads for a large batch. Not with ssik.
 
     Returns
     -------
     IKSolutions
-        B branches in a fixed order. A pose that is out of reach, or that is none, has a status that says so.
+        B branches in a fixed order. The status tells poses that are out of reach, or that are no pose.
 
     Raises
     ------
     ModelError
-        No closed form is known for this arm, and ssik does not take it or is not installed: says what its axes are
-        like and what to use.
+        No closed form is known for this arm, and ssik does not accept it or is not installed; says how its axes lie
+        and what to use.
     ValueError, TypeError
         T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
     """
@@ -102,8 +102,8 @@ def inverse_kinematics_in_chunks(
 ) -> Iterator[tuple[slice, IKSolutions]]:
     """Return an iterator over the solutions of many poses, ``size`` at a time, without memory for all of them.
 
-    A million poses of an arm with eight branches have 384 MB of joint values. Memory that is new to a process costs
-    page faults, up to ten times what solving does; chunks lie in memory that is used again.
+    A million poses of an arm with eight branches have 384 MB of joint positions. Page faults for new memory take up to
+    ten times as long as solving; chunks reuse their memory.
 
     Parameters
     ----------
@@ -112,14 +112,14 @@ def inverse_kinematics_in_chunks(
     T
         Poses of the tool in the world, shape (N, 4, 4).
     size
-        Poses of a chunk.
+        Number of poses per chunk.
     seed, threads
         As for :func:`inverse_kinematics`; ``seed`` of shape (n,) or (N, n).
 
     Returns
     -------
     Iterator[tuple[slice, IKSolutions]]
-        Which poses, and their solutions. The joint values are overwritten by the next chunk: copy what is to be kept.
+        The slice of the poses, and their solutions. The next chunk overwrites the joint positions: copy what you keep.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def _solved_externally(description: Description, T: Array, out: Array | None) ->
 
 
 def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
-    """Return the angles of joint 1 and of the wrist's free joint where they are not determined, shape (..., 2)."""
+    """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (..., 2), rad."""
     if seed is None:
         return np.zeros((*batch, 2))
     start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
@@ -170,7 +170,7 @@ def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, bat
 
 @dataclass(frozen=True)
 class Solver:
-    """An arm's closed form, made ready."""
+    """The kernel of an arm's closed form with the arm's parameters."""
 
     fit: Fit
     kernel: Kernel
@@ -179,7 +179,7 @@ class Solver:
 
 @lru_cache(maxsize=512)
 def solver_of(description: Description) -> Solver | None:
-    """Return an arm's closed form, or None where we have none."""
+    """Return the solver of an arm's closed form; None if no closed form is known."""
     found = classify(description)
     if found.family is None or found.fit is None:
         return None

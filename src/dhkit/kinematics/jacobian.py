@@ -28,7 +28,7 @@ def jacobian(
     description
         The robot.
     q
-        Joint values, shape (..., n), rad and m; angles up to 1e6 rad.
+        Joint positions, shape (..., n), rad and m; angles up to 1e6 rad.
     frame
         ``"world"`` or ``"tool"``: the axes that both rows of three are resolved in. The point is always the tool's
         origin.
@@ -66,7 +66,7 @@ def jacobian_dot(
     description
         The robot.
     q, qd
-        Joint values and rates, shapes (..., n), rad, m and per second; batch axes broadcast.
+        Joint positions and velocities, shapes (..., n), rad, m, rad/s and m/s; batch axes broadcast.
     frame, out, threads
         As for :func:`jacobian`. In ``"tool"`` axes it is the derivative of the components.
 
@@ -88,14 +88,14 @@ def jacobian_dot(
 
 @lru_cache(maxsize=1024)
 def jacobian_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`jacobian` and an arm's parameters of it."""
+    """Return the kernel of :func:`jacobian` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     return kernel(f"jacobian_{frame}", pattern, lambda: _graph(description, frame)), parameters
 
 
 @lru_cache(maxsize=1024)
 def jacobian_dot_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
-    """Return the kernel of :func:`jacobian_dot` and an arm's parameters of it."""
+    """Return the kernel of :func:`jacobian_dot` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     return kernel(f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame)), parameters
 

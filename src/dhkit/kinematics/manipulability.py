@@ -1,4 +1,4 @@
-"""How well an arm can move its tool from where it stands: manipulability, isotropy and their ellipsoids."""
+"""How well an arm can move its tool at a configuration: manipulability, isotropy and their ellipsoids."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 
 Motion: TypeAlias = Literal["translational", "rotational", "whole"]
-"""Which of the tool's motions: its origin's velocity, its angular velocity, or both (in m and rad, unweighted)."""
+"""Part of the tool's velocity: that of its origin, its angular velocity, or both (m and rad, unweighted)."""
 
 ROWS = {"translational": slice(0, 3), "rotational": slice(3, 6), "whole": slice(0, 6)}
-ZERO = 1e-9
-"""A singular value below this share of the largest is none: far above rounding, far below any drawn arm's."""
-PROBES = 4
-"""Random configurations that tell the generic rank; one has it with probability 1."""
-FLATTEST = 6 * np.finfo(float).eps
-"""An ellipsoid whose shortest axis is at most this share of its longest is flat: that is the rounding of an SVD."""
+RANK_TOLERANCE = 1e-9
+"""Singular values below this share of the largest count as 0: far above rounding, far below those of regular states."""
+RANK_SAMPLES = 4
+"""Number of random configurations that determine the generic rank; each has it with probability 1."""
+FLATNESS = 6 * np.finfo(float).eps
+"""An ellipsoid is flat if its shortest axis is at most this share of its longest, the rounding of an SVD."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """Ellipsoids in the world, one or a batch; NaN where the configuration was.
+    """Ellipsoids in the world, one or a batch; NaN where the configuration is.
 
     A point of the surface is center + axes @ (lengths * u) with a unit vector u.
     """
@@ -50,11 +50,11 @@ class Ellipsoid:
 
 @takes_robot
 def manipulability(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
-    """Return Yoshikawa's manipulability: the volume, up to a constant, of what joint rates of unit norm can do.
+    """Return Yoshikawa's manipulability: the volume of the velocity ellipsoid for joint rates of unit norm, unscaled.
 
-    That is sqrt(det(J J^T)) (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 9). An arm that can never
-    move its tool in all directions is measured in those that it has: the product of the :func:`freedoms` largest
-    singular values, so that a planar arm with links l1 and l2 has l1 l2 abs(sin q2).
+    It is sqrt(det(J J^T)) (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 9). For an arm that can never
+    move its tool in all directions, it is the product of the :func:`freedoms` largest singular values: a planar arm
+    with links l1 and l2 has l1 l2 abs(sin q2).
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def manipulability(description: Description, q: ArrayLike, motion: Motion = "tra
     q
         Joint values, shape (..., n), rad and m.
     motion
-        Which rows of the Jacobian. ``"whole"`` mixes m and rad: its values depend on the unit of length.
+        Rows of the Jacobian that are used. ``"whole"`` mixes m and rad: its values depend on the unit of length.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
     if not rank:
         return 0.0 * sigma[..., 0]
     largest, smallest = sigma[..., 0], sigma[..., rank - 1]
-    flat = smallest <= FLATTEST * largest
+    flat = smallest <= FLATNESS * largest
     return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
 
 
@@ -135,7 +135,7 @@ def singular_values(description: Description, q: ArrayLike, motion: Motion = "tr
 
 @takes_robot
 def freedoms(description: Description, motion: Motion = "translational") -> int:
-    """Return in how many independent directions the tool can move in general: the generic rank of the Jacobian.
+    """Return the number of independent directions in which the tool can move: the generic rank of the Jacobian.
 
     Examples
     --------
@@ -143,9 +143,9 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
     >>> freedoms(library_robot("planar3r")), freedoms(library_robot("planar3r"), "whole")
     (2, 3)
     """
-    q = np.random.default_rng(0).uniform(0.3, 1.2, (PROBES, description.n))
+    q = np.random.default_rng(0).uniform(0.3, 1.2, (RANK_SAMPLES, description.n))
     sigma = singular_values(description, q, motion)
-    return int(np.sum(sigma > ZERO * sigma.max(initial=0.0), axis=-1).max())
+    return int(np.sum(sigma > RANK_TOLERANCE * sigma.max(initial=0.0), axis=-1).max())
 
 
 @takes_robot
@@ -177,7 +177,7 @@ def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = 
     U, sigma, _ = np.linalg.svd(J)
     U[..., 2] *= np.linalg.det(U)[..., None]  # right-handed
     lengths = np.zeros((*U.shape[:-2], 3))
-    lengths[..., : sigma.shape[-1]] = np.where(sigma <= FLATTEST * sigma[..., :1], 0.0, sigma)
+    lengths[..., : sigma.shape[-1]] = np.where(sigma <= FLATNESS * sigma[..., :1], 0.0, sigma)
     for array in (U, lengths):
         array[missing] = np.nan
     return Ellipsoid(forward_kinematics(description, q)[..., :3, 3], U, lengths)
@@ -194,7 +194,11 @@ def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "tr
     velocity = velocity_ellipsoid(description, q, motion)
     with np.errstate(divide="ignore"):
         lengths = 1.0 / velocity.lengths[..., ::-1]
-    axes = velocity.axes[..., ::-1] * (1.0, -1.0, 1.0)  # the order turned about: one axis too, to stay right-handed
+    axes = velocity.axes[..., ::-1] * (
+        1.0,
+        -1.0,
+        1.0,
+    )  # the order is reversed, and one axis with it to stay right-handed
     return Ellipsoid(velocity.center, axes, lengths)
 
 
@@ -205,13 +209,13 @@ def _rows(description: Description, q: ArrayLike, motion: Motion) -> Array:
 
 
 def _known(J: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return matrices (..., m, n) with zeros for those that have NaN, which LAPACK refuses, and which these are."""
+    """Return matrices (..., m, n) with those that contain NaN, which LAPACK refuses, set to 0; and a mask of them."""
     missing = np.asarray(np.isnan(J).any(axis=(-2, -1)))
     return np.where(missing[..., None, None], 0.0, J), missing
 
 
 def _volume(J: Array, rank: int) -> Array:
-    """Return the product of the first so many singular values of matrices (..., 3, n) that have no more.
+    """Return the product of the ``rank`` singular values of matrices (..., 3, n) of that rank.
 
     Its square is the sum of the squares of all minors of that size (Cauchy and Binet), which, unlike det(J J^T),
     loses no digits near singularities.

@@ -1,7 +1,8 @@
-"""One damped Newton step towards a pose, inside the joint limits: what iterative inverse kinematics repeat."""
+"""One damped Newton step towards a pose inside the joint limits, for iterative inverse kinematics."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,20 +15,18 @@ from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.symbolic import Graph
 
-TURN = 2 * np.pi
-
 
 @dataclass(frozen=True, eq=False)
 class Newton:
-    """Errors and steps of an arm: lengths are measured by the reach, so that metres and radians compare."""
+    """Errors and steps of an arm; lengths are divided by the reach to compare them with radians."""
 
     description: Description
     length: float
-    """What counts as much as a radian, m: the reach."""
+    """Length that counts as much as a radian, m: the reach."""
     size: int
-    """How many coordinates of a pose are to be met: 6, or 3 for the position alone."""
+    """Number of coordinates of a pose to reach: 6, or 3 for the position alone."""
     lower: Array
-    """Limits that are kept, shape (n,), rad and m."""
+    """Joint limits that steps keep, shape (n,), rad and m."""
     upper: Array
 
     @classmethod
@@ -44,18 +43,18 @@ class Newton:
 
     @property
     def units(self) -> Array:
-        """What one step of a joint is measured by, shape (n,): rad, or m."""
+        """Unit of each joint's steps, shape (n,): 1 rad, or the reach in m."""
         return np.where(self.description.numbers.prismatic, self.length, 1.0)
 
     @property
     def endless(self) -> NDArray[np.bool_]:
-        """Joints that need not stop at a limit since a whole turn leads back inside, shape (n,)."""
-        endless: NDArray[np.bool_] = ~self.description.numbers.prismatic & (self.upper - self.lower >= TURN)
+        """Whether a joint need not stop at a limit because a whole turn leads back inside, shape (n,)."""
+        endless: NDArray[np.bool_] = ~self.description.numbers.prismatic & (self.upper - self.lower >= math.tau)
         return endless
 
     @property
     def middle(self) -> Array:
-        """The middle of the limits, 0 where there are none, shape (n,)."""
+        """Middle of the limits, 0 without limits, shape (n,), rad and m."""
         lower, upper = self.ranges(0.0)
         return (lower + upper) / 2
 
@@ -67,11 +66,11 @@ class Newton:
     def inside(self, q: Array) -> Array:
         """Return joint values (..., n) moved into the limits: by whole turns, or else to the nearest limit."""
         outside = (q < self.lower) | (q > self.upper)
-        turns = np.where(self.description.numbers.prismatic, 0.0, TURN * np.rint((q - self.middle) / TURN))
+        turns = np.where(self.description.numbers.prismatic, 0.0, math.tau * np.rint((q - self.middle) / math.tau))
         return np.clip(np.where(outside, q - turns, q), self.lower, self.upper)
 
     def error(self, q: Array, goals: Array) -> Array:
-        """Return what is missing from poses of the tool to goals.
+        """Return the errors from poses of the tool to goals.
 
         Parameters
         ----------
@@ -83,8 +82,7 @@ class Newton:
         Returns
         -------
         Array
-            Shape (N, 6) or (N, 3): the way to go over ``length``, then the rotation vector to turn by, rad, both in
-            world axes.
+            Shape (N, 6) or (N, 3): displacement over ``length``, then rotation vector, rad, both in world axes.
         """
         T = forward_kinematics(self.description, q).reshape(-1, 16)
         error = np.empty((len(q), self.size))
@@ -102,7 +100,7 @@ class Newton:
         error
             Shape (N, 6) or (N, 3), as of :meth:`error`.
         damping
-            What is added to the squares of the Jacobian's singular values, positive, shape (N,).
+            Positive number added to the squares of the Jacobian's singular values, shape (N,).
         """
         n = self.description.n
         J = jacobian(self.description, q).reshape(-1, 6 * n)

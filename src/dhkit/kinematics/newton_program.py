@@ -1,21 +1,20 @@
-"""The programs of Newton's step: from a pose to what is missing, from that to joint values, without branches."""
+"""Programs of Newton's method without branches: the error of a pose, and the step that reduces it."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, TypeAlias
 
 import casadi as ca
-import numpy as np
 
 from dhkit.symbolic import Graph
 
 SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-TURN = 2 * np.pi
-STRIDE = 1.0
-"""rad, or share of the reach: no joint moves more in a step, so that a search does not leave its neighbourhood."""
+MAX_STEP = 1.0
+"""Largest step of a joint, rad or share of the reach, so that a search does not leave its neighbourhood."""
 TINY = 1e-300
-"""Keeps 0 / 0 from being worked out."""
+"""Added to denominators to avoid 0 / 0."""
 
 
 def error_program(size: int) -> Graph:
@@ -45,7 +44,7 @@ def step_program(n: int, size: int) -> Graph:
         dq = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
     else:
         dq = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
-    new = q + dq * units * ca.fmin(1.0, STRIDE / (ca.norm_inf(dq) + TINY))
+    new = q + dq * units * ca.fmin(1.0, MAX_STEP / (ca.norm_inf(dq) + TINY))
     ends = [_ends(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
     parameters = ca.vertcat(length, units, turns, lower, upper)
     inputs = {"parameters": parameters, "q": q, "error": error, "J": J, "damping": damping}
@@ -58,9 +57,9 @@ def _stays(x: SX, push: SX, lower: SX, upper: SX, endless: SX) -> SX:
 
 
 def _ends(x: SX, lower: SX, upper: SX, endless: SX) -> SX:
-    """Return a joint value inside its limits: a turn back where there is room for one."""
-    x = ca.if_else(ca.logic_and(x > upper, endless), x - TURN, x)
-    x = ca.if_else(ca.logic_and(x < lower, endless), x + TURN, x)
+    """Return a joint position inside its limits, by a whole turn back where the range allows one."""
+    x = ca.if_else(ca.logic_and(x > upper, endless), x - math.tau, x)
+    x = ca.if_else(ca.logic_and(x < lower, endless), x + math.tau, x)
     return ca.fmin(ca.fmax(x, lower), upper)
 
 
@@ -73,8 +72,8 @@ def _solve(A: SX, b: SX) -> SX:
 def _rotation_vector(R: SX) -> SX:
     """Return the rotation vector of a matrix, of length up to pi, accurate near 0 and near pi.
 
-    By the quaternion (w, v), of whose products with itself the matrix has all: from those with its largest entry
-    (Shepperd 1978, Quaternion from rotation matrix).
+    It is computed from the quaternion, whose entries are taken from the products with its largest entry (Shepperd 1978,
+    Quaternion from rotation matrix).
     """
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     odd = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])

@@ -1,4 +1,4 @@
-"""Inverse kinematics of any arm by iteration: damped Newton steps from several starts, a batch at a time."""
+"""Inverse kinematics of any arm by iteration: damped Newton steps from several starts, for batches."""
 
 from __future__ import annotations
 
@@ -12,32 +12,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.kernels import SMALL, check_whole, in_threads, pose_rows, uncounted
-from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrapped
-from dhkit.kinematics.closed_form.family import ALL
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.solutions import IKSolutions
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with how many poses are done and how many there are."""
+"""Called with the number of finished poses and of all poses."""
 
 CHUNK = 8_192
-"""Searches that run side by side: what they work on takes about 5 MB."""
-SHARE = 64
-"""Poses that a thread must have to itself."""
-CANDIDATES = 512
-"""Random joint values at least among which starts are looked for."""
-SMOOTH = 1e-2
-"""Squared error, (rad, share of the reach)^2, below which steps are taken without asking whether they help: along a
-curved valley Newton's method gets worse before it gets better."""
-PROGRESS = 0.7
-"""A search gets on as long as its squared error falls below this share of what it was ..."""
-PATIENCE = 10
-"""... in so many steps."""
-LEAST, EASIER, HARDER = 1e-4, 0.25, 4.0
-"""Damping over the squared error: its least value, and what a step that helps and one that does not change it by."""
-ROUNDING = 1e-13
-"""Damping that is always there, for Jacobians without full rank."""
+"""Number of searches that run together; their arrays take about 5 MB."""
+MIN_POSES_PER_THREAD = 64
+MIN_CANDIDATES = 512
+"""Smallest number of random joint positions from which starts are chosen."""
+ALWAYS_STEP = 1e-2
+"""Squared error, (rad, share of the reach)^2, below which every step is taken, because along a curved valley the error
+of Newton's method grows before it falls."""
+STALL_RATIO, STALL_STEPS = 0.7, 10
+"""A search is stalled, and given up, when its squared error has not fallen below STALL_RATIO times its value
+STALL_STEPS steps earlier."""
+MIN_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = 1e-4, 0.25, 4.0
+"""Damping over the squared error: its smallest value, and its factors after a step that helps and one that does not."""
+BASE_DAMPING = 1e-13
+"""Damping that is always added, for Jacobians without full rank."""
 
 
 @takes_robot
@@ -59,33 +57,32 @@ def solve_numerically(
     Newton's method with Levenberg's damping, which is in proportion to the squared error, so that the last steps are
     undamped and converge quadratically, for redundant arms too (Yamashita and Fukushima 2001, On the rate of
     convergence of the Levenberg-Marquardt method; Sugihara 2011, Solvability-unconcerned inverse kinematics by the
-    Levenberg-Marquardt method). A pose whose search gets stuck is searched for again from random joint values, those
-    whose pose is nearest to it first, twice as many each time; of solutions found together the one nearest to the
-    first start is returned. What is found for a pose does not depend on the other poses.
+    Levenberg-Marquardt method). A stalled search is restarted from random joint positions, those with the nearest poses
+    first, twice as many each time; of solutions found together the one nearest to the first start is returned. The
+    result for a pose does not depend on the other poses.
 
     Parameters
     ----------
     description
-        The robot: any joints, any number of them.
+        The robot, with any kinds and number of joints.
     T
         Poses of the tool in the world, shape (..., 4, 4).
     q0
-        Where to start, shape (n,) or (..., n), rad and m; moved into the limits. None, and rows that are not finite:
-        the middle of the limits, 0 where there are none.
+        Start, shape (n,) or (..., n), rad and m; moved into the limits. For None, and in rows that are not finite, the
+        middle of the limits, or 0 without limits.
     position_only
-        Whether the tool's position alone is to be met. Otherwise the whole pose is, by arms of fewer than six joints
-        too: a pose that such an arm does not meet in full is out of its reach.
+        Whether only the tool's position is to be reached. Otherwise the whole pose is, also by arms with fewer than six
+        joints: a pose that such an arm does not reach in full is out of its reach.
     restarts
-        How many more starts a pose is given at most.
+        Largest number of further starts for a pose.
     tolerance
-        What may be missing: of the position as a share of the reach, of the rotation in rad. Rounding allows about
-        1e-14.
+        Largest error: position as a share of the reach, rotation in rad. Rounding allows about 1e-14.
     seed
-        Of the random starts.
+        Seed of the random starts.
     limits
-        Whether joints are kept inside their limits. Otherwise a flag says where they are not.
+        Whether joints stay inside their limits. Otherwise a flag tells where they are not.
     threads
-        How many threads share a large batch.
+        Number of threads for a large batch.
     progress
         Called after every few thousand poses; an exception in it ends the work.
 
@@ -93,9 +90,9 @@ def solve_numerically(
     -------
     IKSolutions
         One branch, ``"numeric"``. Angles of joints without limits are in (-pi, pi], all are with ``limits=False``;
-        others are inside their limits. Singular branches are not flagged. Where nothing was found ``distance`` is
-        what is missing of the position after the best search: 0 means that only the rotation is not met. It is no
-        proof that the pose is out of reach.
+        others are inside their limits. Singular branches are not flagged. Where no solution was found, ``distance`` is
+        the position error of the best search: 0 means that only the rotation is not reached. It does not prove that the
+        pose is out of reach.
 
     Raises
     ------
@@ -128,7 +125,7 @@ def solve_numerically(
     search = Search(newton, tolerance, restarts, seed)
     rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
 
-    # A few poses are searched for from many starts: that must not start a compilation in a control loop.
+    # Not counted for a few poses, so that their many starts do not start a compilation in a control loop.
     few = uncounted if posed.size < SMALL else nullcontext
 
     def solve(some: slice) -> int:
@@ -136,22 +133,24 @@ def solve_numerically(
             q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
         return int(rows[some][-1]) + 1
 
-    for done in in_threads(solve, _chunks(len(rows), min(CHUNK, max(SHARE, -(-len(rows) // threads)))), threads):
+    for done in in_threads(
+        solve, _chunks(len(rows), min(CHUNK, max(MIN_POSES_PER_THREAD, -(-len(rows) // threads)))), threads
+    ):
         if progress is not None:
             progress(done, posed.size)
     return collect(
         description,
-        wrapped(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
+        wrap_angles(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
         distance.reshape(batch),
         posed=posed,
         branches=("numeric",),
-        met=ALL[: newton.size],
+        met=ALL_COORDINATES[: newton.size],
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """How one solution for each pose is looked for."""
+    """The search for one solution of each pose."""
 
     newton: Newton
     tolerance: float
@@ -159,14 +158,14 @@ class Search:
     seed: int
 
     def __call__(self, goals: Array, first: Array) -> tuple[Array, Array]:
-        """Return joint values (N, n), NaN where none were found, and what is missing of the positions, m, (N,).
+        """Return joint positions (N, n), NaN where none were found, and position errors, m, shape (N,).
 
         Parameters
         ----------
         goals
             Poses, shape (N, 16).
         first
-            The first start of each, shape (N, n).
+            First start of each pose, shape (N, n), rad and m.
         """
         q, error = descend(self.newton, goals, first, self.tolerance)
         open_rows = np.flatnonzero(~closes(error, self.tolerance))
@@ -183,20 +182,20 @@ class Search:
         return q, self.newton.length * np.linalg.norm(error[:, :3], axis=1)
 
     def _polish(self, q: Array, error: Array, goals: Array) -> None:
-        """Take one more step where that helps: it squares what is missing, down to rounding."""
-        last = self.newton.step(q, error, np.full(len(q), ROUNDING))
+        """Take one more step where that helps: it squares the error, down to rounding."""
+        last = self.newton.step(q, error, np.full(len(q), BASE_DAMPING))
         last_error = self.newton.error(last, goals)
         helps = np.sum(last_error**2, axis=1) < np.sum(error**2, axis=1)
         q[helps], error[helps] = last[helps], last_error[helps]
 
     def _starts(self, goals: Array) -> Array:
-        """Return random joint values whose poses are near the goals, nearest first, shape (N, restarts, n)."""
+        """Return random joint positions whose poses are near the goals, nearest first, shape (N, restarts, n)."""
         newton = self.newton
         lower, upper = newton.ranges(np.where(newton.description.numbers.prismatic, newton.length, np.pi))
-        draws = np.random.default_rng(self.seed).random((max(CANDIDATES, self.restarts), newton.description.n))
+        draws = np.random.default_rng(self.seed).random((max(MIN_CANDIDATES, self.restarts), newton.description.n))
         q = lower + (upper - lower) * draws
         theirs = self._coordinates(forward_kinematics(newton.description, q).reshape(-1, 16))
-        # |a - b|^2 = a a - 2 a b + b b, of which a a orders nothing.
+        # |a - b|^2 = a a - 2 a b + b b; a a is the same for all candidates.
         gaps = np.sum(theirs**2, axis=1) - 2 * self._coordinates(goals) @ theirs.T
         nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
         order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
@@ -204,7 +203,7 @@ class Search:
         return starts
 
     def _coordinates(self, poses: Array) -> Array:
-        """Return points whose distances are those of poses (N, 16): lengths over the reach, angles up to a cube."""
+        """Return points (N, 12) with about the distances of poses (N, 16): lengths over the reach, angles."""
         rows = poses.reshape(-1, 4, 4)[:, :3]
         position = rows[:, :, 3] / self.newton.length
         if self.newton.size == 3:
@@ -215,14 +214,14 @@ class Search:
     def _improve(
         self, q: Array, error: Array, rows: NDArray[np.intp], goals: Array, first: Array, starts: Array
     ) -> None:
-        """Search from starts (M, k, n) and put what is better into rows of ``q`` and ``error``."""
+        """Search from starts (M, k, n) and store better results in rows of ``q`` and ``error``."""
         count, k, n = starts.shape
         many = np.ascontiguousarray(starts.reshape(-1, n))
         found, misses = descend(self.newton, np.repeat(goals, k, axis=0), many, self.tolerance)
         found, misses = found.reshape(count, k, n), misses.reshape(count, k, -1)
         closed = closes(misses, self.tolerance)
         moved = np.sum(((found - first[:, None]) / self.newton.units) ** 2, axis=-1)
-        # Any that closes is better than any that does not.
+        # A result that reaches its pose is better than any that does not.
         rank = np.where(closed, -1 / (1 + moved), np.sum(misses**2, axis=-1))
         best = np.argmin(rank, axis=1)
         better = closed.any(axis=1) | (rank.min(axis=1) < np.sum(error[rows] ** 2, axis=-1))
@@ -232,21 +231,21 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Searches that are under way; N rows."""
+    """Running searches, N rows."""
 
     row: NDArray[np.intp]
-    """Where each came from."""
+    """Index of the pose of each search."""
     goals: Array
     q: Array
     error: Array
     cost: Array
     """The squared error."""
     damping: Array
-    """Over the squared error."""
-    mark: Array
-    """The squared error that has last been got down to ..."""
-    waited: NDArray[np.intp]
-    """... and the steps since."""
+    """Damping over the squared error."""
+    reference_cost: Array
+    """Squared error at the last progress by STALL_RATIO."""
+    steps_since: NDArray[np.intp]
+    """Number of steps since that progress."""
 
     @classmethod
     def start(cls, newton: Newton, goals: Array, q: Array) -> Descent:
@@ -255,47 +254,47 @@ class Descent:
         cost = np.sum(error**2, axis=1)
         return cls(np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp))
 
-    def kept(self, keep: NDArray[np.bool_]) -> Descent:
-        """Return some of the searches."""
+    def selected(self, keep: NDArray[np.bool_]) -> Descent:
+        """Return the searches marked in ``keep``, shape (N,)."""
         return self if keep.all() else Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
 
-    def stepped(self, newton: Newton) -> Descent:
-        """Take a step, or where it does not help raise the damping."""
-        q = newton.step(self.q, self.error, self.damping * self.cost + ROUNDING)
+    def step(self, newton: Newton) -> Descent:
+        """Return the searches after a step; where it does not help, the damping is raised instead."""
+        q = newton.step(self.q, self.error, self.damping * self.cost + BASE_DAMPING)
         error = newton.error(q, self.goals)
         cost = np.sum(error**2, axis=1)
         helps = cost < self.cost
-        taken = helps | (np.maximum(cost, self.cost) < SMOOTH)
+        taken = helps | (np.maximum(cost, self.cost) < ALWAYS_STEP)
         cost = np.where(taken, cost, self.cost)
-        gets_on = cost < PROGRESS * self.mark
-        eased = np.maximum(self.damping * EASIER, LEAST)
+        gets_on = cost < STALL_RATIO * self.reference_cost
+        eased = np.maximum(self.damping * DAMPING_DECREASE, MIN_DAMPING)
         return Descent(
             self.row,
             self.goals,
             np.where(taken[:, None], q, self.q),
             np.where(taken[:, None], error, self.error),
             cost,
-            np.where(helps, eased, np.where(taken, self.damping, self.damping * HARDER)),
-            np.where(gets_on, cost, self.mark),
-            np.where(gets_on, 0, self.waited + 1),
+            np.where(helps, eased, np.where(taken, self.damping, self.damping * DAMPING_INCREASE)),
+            np.where(gets_on, cost, self.reference_cost),
+            np.where(gets_on, 0, self.steps_since + 1),
         )
 
 
 def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
-    """Search for poses (N, 16) from q (N, n) until all are met or stuck; return joint values and errors."""
+    """Search for poses (N, 16) from q (N, n) until all are reached or stalled; return joint positions and errors."""
     last_q, last_error = np.empty_like(q), np.empty((len(q), newton.size))
     searches = Descent.start(newton, goals, q)
     while len(searches.row):
-        over = closes(searches.error, tolerance) | (searches.waited >= PATIENCE)
+        over = closes(searches.error, tolerance) | (searches.steps_since >= STALL_STEPS)
         last_q[searches.row[over]], last_error[searches.row[over]] = searches.q[over], searches.error[over]
-        searches = searches.kept(~over)
+        searches = searches.selected(~over)
         if len(searches.row):
-            searches = searches.stepped(newton)
+            searches = searches.step(newton)
     return last_q, last_error
 
 
 def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Return which errors (..., 6) or (..., 3) are within the tolerance, position and rotation each."""
+    """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
     squares = error**2
     position, rotation = squares[..., :3].sum(axis=-1), squares[..., 3:].sum(axis=-1)
     within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
@@ -303,7 +302,7 @@ def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
 
 
 def _first_starts(newton: Newton, q0: ArrayLike | None, batch: tuple[int, ...]) -> Array:
-    """Return the joint values to start from, inside the limits, shape (..., n)."""
+    """Return the first starts, inside the limits, shape (..., n), rad and m."""
     description = newton.description
     if q0 is None:
         return np.broadcast_to(newton.middle, (*batch, description.n))

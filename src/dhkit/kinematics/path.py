@@ -17,29 +17,29 @@ from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
-JUMP = np.pi / 4
-"""rad, or as a share of the reach: a joint that moves more between two poses has left its branch."""
-NEAR = 0.02
-"""A pose whose Jacobian has a smaller singular value, lengths over the reach, counts as near a singularity."""
+MAX_STEP = np.pi / 4
+"""Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
+NEAR_SINGULAR = 0.02
+"""A pose counts as near a singularity if a singular value of its Jacobian, lengths over the reach, is below this."""
 
 
 @dataclass(frozen=True, eq=False)
 class IKPath:
-    """Joint values along a path of poses, and where following it was not smooth."""
+    """Joint positions along a path of poses, and the poses where they are not smooth."""
 
     q: Array
     """Shape (N, n), rad and m, continuous through whole turns; NaN where no branch reaches."""
     branch: tuple[str, ...]
-    """The name of the branch at each pose, empty where none reaches."""
+    """Name of the branch at each pose; empty where no branch reaches."""
     switches: tuple[int, ...]
-    """Places (of the pose after) where a joint jumps: the branch followed so far ended, or left its limits."""
+    """Indices of poses before which a joint jumps, because the branch ended or left its limits."""
     lost: tuple[int, ...]
-    """Places of poses that no branch reaches inside the limits."""
+    """Indices of poses that no branch reaches inside the limits."""
     start: float
-    """The largest difference between ``q0`` and the joint values at the first pose reached, rad or m."""
+    """Largest difference between ``q0`` and the joint positions at the first pose that is reached, rad or m."""
     near_singular: tuple[int, ...]
-    """Places of poses at which a singular value of the Jacobian that is not always 0, lengths over the reach, is
-    below 0.02: there joints may have to turn fifty times as fast as the tool."""
+    """Indices of poses at which a singular value of the Jacobian, lengths over the reach, is below 0.02 (values that
+    are always 0 left out): joints there may have to turn fifty times as fast as the tool."""
 
     @property
     def ok(self) -> bool:
@@ -52,7 +52,7 @@ class IKPath:
         Raises
         ------
         UnreachableError
-            A pose is not reached, or the branch had to be switched: says where.
+            A pose is not reached, or the branch had to be switched; names the pose.
         """
         if self.lost:
             raise UnreachableError(
@@ -69,7 +69,7 @@ class IKPath:
     def _repr_html_(self) -> str:
         named = dict.fromkeys(self.near_singular, "near a singularity")
         named |= dict.fromkeys(self.switches, "switched") | dict.fromkeys(self.lost, "lost")
-        # Poses in a row of which the same is to be said share a line.
+        # Consecutive poses with the same note share a line.
         runs = groupby(enumerate(sorted(named)), lambda at: (at[1] - at[0], named[at[1]], self.branch[at[1]]))
         rows = []
         for (_, what, branch), run in runs:
@@ -89,8 +89,8 @@ class IKPath:
 def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
     """Follow one branch along a path of poses.
 
-    The branch nearest to ``q0`` is taken at the first pose, and from then on the solution nearest to the last one,
-    whole turns added: near means the least sum of squared joint differences.
+    At the first pose the branch nearest to ``q0`` is taken, then at each pose the solution nearest to the last one,
+    whole turns added. Nearest means the least sum of squared joint differences.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     Returns
     -------
     IKPath
-        Joint values, and where the branch had to be switched, was lost, or came near a singularity.
+        Joint positions, and the poses where the branch had to be switched, was lost, or came near a singularity.
 
     Raises
     ------
@@ -123,17 +123,17 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     q0 = joint_vector(description, q0, "q0")
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
-    jump = JUMP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
+    jump = MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
     switches, lost, at = [], [], q0
     for k in range(len(poses)):
         candidates, allowed = solutions.q[k], usable[k]
         if np.any(solutions.flags[k] & (IKFlag.wrist | IKFlag.shoulder)):
-            # Where the wrist is straight, or its centre on axis 1, one joint is free: it keeps its angle.
+            # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
             candidates, allowed = here.q, here.allowed if limits else here.valid
-        chosen = _next(candidates, allowed, at, solutions, limits)
+        chosen = _nearest_branch(candidates, allowed, at, solutions, limits)
         if chosen is None:
             lost.append(k)
             continue
@@ -152,10 +152,10 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     )
 
 
-def _next(
+def _nearest_branch(
     candidates: Array, allowed: NDArray[np.bool_], at: Array, solutions: IKSolutions, limits: bool
 ) -> tuple[int, Array] | None:
-    """Return the branch nearest to the last joint values, and its own with whole turns added, or None."""
+    """Return the branch nearest to the last joint positions, and its positions with whole turns added; None if none."""
     if not allowed.any():
         return None
     wound = solutions.wound(candidates, at, limits=limits)
@@ -169,4 +169,4 @@ def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[
     J[:, :3] /= description.reach or 1.0
     J = J if motion == "whole" else J[:, :3]
     smallest = np.linalg.svd(J, compute_uv=False)[:, freedoms(description, motion) - 1]
-    return tuple(int(k) for k in np.flatnonzero((smallest < NEAR) & ~np.isnan(q).any(axis=-1)))
+    return tuple(int(k) for k in np.flatnonzero((smallest < NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1)))

@@ -1,13 +1,13 @@
-"""Singular configurations in closed form: where the determinant of the Jacobian, a product, has a factor that is 0.
+"""Singular configurations in closed form: zeros of the factors of the Jacobian's determinant.
 
-For six joints with a spherical wrist on two parallel axes it is
+For six joints with a spherical wrist on two parallel axes the determinant is
 
     abs(det J) = L2 L3 abs(sin(elbow)) abs(x) abs(sin(wrist)),
 
-x being the wrist centre's distance from axis 1 along the arm's plane: only the first three joints move the wrist centre
-(Siciliano et al., Robotics, 2009, section 3.3). It holds for an arm of the UR family too, with x that of the point
-where axes 5 and 6 meet: in the plane, joints 2, 3 and 4 move that point by velocities that differ by those of two
-links, and the axes 2, 5 and 6 turn the tool as a wrist does.
+where x is the distance of the wrist centre from axis 1 along the arm's plane: only the first three joints move it
+(Siciliano et al., Robotics, 2009, section 3.3). The same product holds for arms of the UR family, with x of
+the point where axes 5 and 6 meet: in the plane, the velocities that joints 2, 3 and 4 give that point differ by those
+of two links, and axes 2, 5 and 6 turn the tool like a wrist.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from dhkit.display import html_table, repr_line
 from dhkit.errors import ModelError
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
-from dhkit.kinematics.singular_factors import Factor, Kind, Link, Side, Slide, Turn
+from dhkit.kinematics.singular_factors import AngleFactor, Factor, Kind, Link, ShoulderFactor, SlideFactor
 
-BATCH, BATCHES = 256, 64
-"""Random states tried at once, and how often, until enough are singular inside the limits."""
+DRAWS, MAX_BATCHES = 256, 64
+"""Random states drawn at once, and largest number of such batches, to find states that are singular inside limits."""
 STRETCHED = ("stretched", "folded")
-LONGEST_WORDS = 200
-"""Characters that a notebook shows of where a kind is."""
+MAX_WORDS_LENGTH = 200
+"""Longest description of a kind in a notebook, characters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,34 +39,34 @@ class Singularities:
     """Where an arm is singular; as text, one line for each kind."""
 
     kinds: tuple[Kind, ...]
-    """What they are called: shoulder, elbow, wrist, as in :class:`dhkit.kinematics.IKFlag`."""
+    """Names of the kinds: shoulder, elbow, wrist, as in :class:`dhkit.kinematics.IKFlag`."""
     factors: tuple[Factor, ...]
-    """Those of the determinant, one for each kind."""
+    """Factors of the determinant, one for each kind."""
     point: str
-    """What the shoulder's words are about, such as the wrist centre."""
+    """The point whose distance from axis 1 vanishes at the shoulder's singularity, such as the wrist centre."""
     task: Array
-    """The twists that the arm controls: rows, in the tool's axes, that make its Jacobian square, shape (n, 6).
+    """The twists that the arm controls, rows in the tool's axes, shape (n, 6); they make its Jacobian square.
 
-    They are all six for a six-joint arm, the velocity for a turntable with two joints.
+    All six for an arm of six joints; the velocity alone for a turning plane with two joints.
     """
 
     @property
     def words(self) -> dict[str, str]:
-        """Where each kind is, such as ``q5 = 0° or 180°: axes 4 and 6 coincide``."""
+        """The condition for each kind, such as ``q5 = 0° or 180°: axes 4 and 6 coincide``."""
         return {factor.kind: factor.words(self.point) for factor in self.factors}
 
     @property
     def values(self) -> dict[str, tuple[float, ...]]:
-        """The singular values of the one joint that a kind is about, rad or m; none for the shoulder.
+        """Singular positions of the one joint that decides a kind, rad or m; none for the shoulder.
 
-        Angles are in (-pi, pi]; an elbow's first one stretches the arm, the second folds it.
+        Angles are in (-pi, pi]; an elbow's first angle stretches the arm, the second folds it.
         """
         return {factor.kind: factor.values for factor in self.factors}
 
     @property
     def joints(self) -> dict[str, int | None]:
-        """The joint, from 0, whose :attr:`values` these are."""
-        return {factor.kind: None if isinstance(factor, Side) else factor.joint for factor in self.factors}
+        """Index, from 0, of the joint that decides each kind; None for the shoulder."""
+        return {factor.kind: None if isinstance(factor, ShoulderFactor) else factor.joint for factor in self.factors}
 
     def __str__(self) -> str:
         return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
@@ -75,18 +75,18 @@ class Singularities:
         return repr_line("Singularities", said=", ".join(self.kinds))
 
     def _repr_html_(self) -> str:
-        return html_table(("singular", "where"), list(self.words.items()), longest=LONGEST_WORDS)
+        return html_table(("singular", "where"), list(self.words.items()), longest=MAX_WORDS_LENGTH)
 
 
 @takes_robot
 @lru_cache(maxsize=512)
 def singularities(description: Description) -> Singularities:
-    """Return where an arm is singular, in closed form.
+    """Return the singularities of an arm in closed form.
 
     Raises
     ------
     ModelError
-        It is not known for this arm: says what its axes are like and what to use.
+        No closed form is known for this arm; says how its axes lie and what to use.
 
     Examples
     --------
@@ -112,9 +112,9 @@ def singularities(description: Description) -> Singularities:
 
 @takes_robot
 def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
-    """Return how far joint values are from each kind of singularity: 0 on it, without unit.
+    """Return a measure of the distance from each kind of singularity, 0 at the singularity, without unit.
 
-    They are abs(sin) of the elbow's and the wrist's angle, and abs(x) over the reach for the shoulder and for a slide.
+    For elbow and wrist it is abs(sin) of the angle; for the shoulder and a prismatic joint, the length over the reach.
     Inverse kinematics flag a branch where one is below 1e-6.
 
     Parameters
@@ -142,7 +142,7 @@ def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
 
 @takes_robot
 def determinant(description: Description, q: ArrayLike) -> Array:
-    """Return abs(det J) as the product of its factors, shape (...), for joint values (..., n).
+    """Return abs(det J) as the product of its factors, shape (...), at joint positions (..., n), rad and m.
 
     J is the Jacobian, or for an arm of fewer than six joints ``task @ jacobian(description, q, "tool")``: see
     :attr:`Singularities.task`. SI; raises as :func:`measures` does.
@@ -162,7 +162,7 @@ def determinant(description: Description, q: ArrayLike) -> Array:
 
 @takes_robot
 def singular_configurations(description: Description, kind: str, count: int, seed: int = 0) -> Array:
-    """Return random joint values at one kind of singularity, inside the joint limits where there are such.
+    """Return random joint positions at one kind of singularity, inside the joint limits where possible.
 
     Parameters
     ----------
@@ -171,10 +171,10 @@ def singular_configurations(description: Description, kind: str, count: int, see
     kind
         One of its :attr:`Singularities.kinds`.
     count
-        How many.
+        Number of configurations.
     seed
-        Of the other joints' values, which are uniform inside limits, over a full turn without limits, and over twice
-        the reach to both sides for a slide without. For the shoulder joint 2 is solved for.
+        Seed of the other joints' positions. These are uniform inside limits; without limits over a full turn, or over
+        twice the reach to both sides for a prismatic joint. For the shoulder, joint 2 is solved for.
 
     Returns
     -------
@@ -192,15 +192,15 @@ def singular_configurations(description: Description, kind: str, count: int, see
     lower, upper = _ranges(description)
     rng = np.random.default_rng(seed)
     inside, outside = [np.empty((0, description.n))], [np.empty((0, description.n))]
-    for batch in range(BATCHES):
-        limited = batch < BATCHES / 2 or bool(sum(map(len, inside)))
+    for batch in range(MAX_BATCHES):
+        limited = batch < MAX_BATCHES / 2 or bool(sum(map(len, inside)))
         low, high = (lower, upper) if limited else (-_room(description), _room(description))
-        drawn = low + (high - low) * rng.random((max(BATCH, count), description.n))
-        met = factor.met(drawn, lower, upper, rng)
-        met = met[np.isfinite(met).all(axis=1)]
-        within = ((met >= lower) & (met <= upper)).all(axis=1)
-        inside.append(met[within])
-        outside.append(met[~within])
+        drawn = low + (high - low) * rng.random((max(DRAWS, count), description.n))
+        moved = factor.moved_onto_singularity(drawn, lower, upper, rng)
+        moved = moved[np.isfinite(moved).all(axis=1)]
+        within = ((moved >= lower) & (moved <= upper)).all(axis=1)
+        inside.append(moved[within])
+        outside.append(moved[~within])
         if sum(map(len, inside)) >= count:
             break
     found: Array = np.concatenate([*inside, *outside])[:count]
@@ -226,11 +226,11 @@ def _ranges(description: Description) -> tuple[Array, Array]:
 
 
 def _room(description: Description) -> Array:
-    """Return how far joints without limits are moved to both sides, shape (n,): a slide to where any turntable ends."""
+    """Return the range to both sides for joints without limits, shape (n,), rad and m; prismatic: twice the reach."""
     return np.where(description.numbers.prismatic, 2 * (description.reach or 1.0), np.pi)
 
 
-# How the families' parameters (closed_form) make up factors. A task is given in the axes x, u, v of the arm's plane.
+# Factors from the parameters of the families in closed_form. A task is given in the axes x, u, v of the arm's plane.
 
 Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
 WHOLE, VELOCITY, TURNING_TOO = np.eye(6), np.eye(6)[:3], np.eye(6)[[0, 1, 2, 5]]
@@ -284,7 +284,7 @@ BUILDERS: Mapping[str, Callable[[Fit], Parts]] = {
     "parallel_chain": _parallel_chain,
     "polar": _polar,
 }
-"""By the family's name."""
+"""Builders of factors and task, by the family's name."""
 
 
 def _parameters(fit: Fit) -> dict[str, Array]:
@@ -300,19 +300,19 @@ def _lever(p: Mapping[str, Array]) -> Link:
     return Link(complex(*p["lever"]), (float(p["sense3"]), float(p["sense4"])))
 
 
-def _side(p: Mapping[str, Array], links: tuple[Link, ...]) -> Side:
-    return Side(float(p["a1"]), links, float(p["offset"]), float(p["reach"]))
+def _side(p: Mapping[str, Array], links: tuple[Link, ...]) -> ShoulderFactor:
+    return ShoulderFactor(float(p["a1"]), links, float(p["offset"]), float(p["reach"]))
 
 
-def _elbow(p: Mapping[str, Array], joint: int = 2, sense: float | None = None) -> Turn:
+def _elbow(p: Mapping[str, Array], joint: int = 2, sense: float | None = None) -> AngleFactor:
     sense = float(p["sense3"]) if sense is None else sense
     size = float(p["L2"] * p["L3"])
-    return Turn("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, STRETCHED)
+    return AngleFactor("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, STRETCHED)
 
 
-def _wrist(p: Mapping[str, Array], words: str) -> Turn:
-    return Turn("wrist", 4, 1.0, float(np.angle(complex(*p["wrist"]))), 1.0, (words, words))
+def _wrist(p: Mapping[str, Array], words: str) -> AngleFactor:
+    return AngleFactor("wrist", 4, 1.0, float(np.angle(complex(*p["wrist"]))), 1.0, (words, words))
 
 
-def _slide(p: Mapping[str, Array], joint: int) -> Slide:
-    return Slide(joint, float(p["start"]), abs(float(p["lift"])), float(p["reach"]))
+def _slide(p: Mapping[str, Array], joint: int) -> SlideFactor:
+    return SlideFactor(joint, float(p["start"]), abs(float(p["lift"])), float(p["reach"]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from itertools import product
@@ -16,7 +17,6 @@ from dhkit.errors import UnreachableError
 
 LIMIT_SLACK = 1e-9
 """rad or m: how far outside its limits a joint still counts as inside, for rounding."""
-TURN = 2 * np.pi
 FIRST = 5
 """Poses of a batch that a notebook shows."""
 
@@ -166,12 +166,12 @@ class IKSolutions:
         With limits, as near as they allow; angles that no winding brings inside them stay outside.
         """
         with np.errstate(invalid="ignore"):
-            turns = np.rint((near - q) / TURN)
+            turns = np.rint((near - q) / math.tau)
             if limits:
-                first = np.ceil((self.lower - LIMIT_SLACK - q) / TURN)
-                last = np.floor((self.upper + LIMIT_SLACK - q) / TURN)
+                first = np.ceil((self.lower - LIMIT_SLACK - q) / math.tau)
+                last = np.floor((self.upper + LIMIT_SLACK - q) / math.tau)
                 turns = np.clip(turns, first, last)
-        return q + TURN * np.where(self.prismatic | ~np.isfinite(turns), 0.0, turns)
+        return q + math.tau * np.where(self.prismatic | ~np.isfinite(turns), 0.0, turns)
 
     def windings(self, branch: str) -> list[Array]:
         """Return every joint vector inside the limits that puts one pose's branch there, whole turns added.
@@ -291,9 +291,9 @@ class IKSolutions:
             return []
         if self.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
             return [value] if lower - LIMIT_SLACK <= value <= upper + LIMIT_SLACK or np.isinf(upper - lower) else []
-        first = int(np.ceil((lower - LIMIT_SLACK - value) / TURN))
-        last = int(np.floor((upper + LIMIT_SLACK - value) / TURN))
-        return [value + TURN * k for k in range(first, last + 1)]
+        first = int(np.ceil((lower - LIMIT_SLACK - value) / math.tau))
+        last = int(np.floor((upper + LIMIT_SLACK - value) / math.tau))
+        return [value + math.tau * k for k in range(first, last + 1)]
 
     def _reason(self, place: tuple[int, ...], count: int) -> str:
         where = f"pose {place[0] if len(place) == 1 else place}" if place else "the pose"

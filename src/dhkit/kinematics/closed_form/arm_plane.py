@@ -1,7 +1,7 @@
-"""Joint 1 as a turntable under an arm that moves in a plane: where the plane goes, and what it looks like inside.
+"""Arms that move in a plane which joint 1 turns about its axis: the plane's frame, and joint 1 for a given point.
 
-Coordinates: u along axis 1, v along the parallel axes behind it (at right angles to axis 1), x = u x v. They are taken
-at zero joint values, with the origin on axis 1 at the height of axis 2, and turn with joint 1.
+The frame has u along axis 1, v along axis 2 (at right angles to axis 1), and x = u x v. It is taken at zero joint
+positions, with its origin on axis 1 at the height of axis 2, and turns with joint 1.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from dhkit.kinematics.closed_form.formulas import (
     SINGULAR,
     SX,
     Pair,
+    add_angles,
     fabs,
-    logic_and,
-    select_pair,
     hypot,
+    if_else,
+    logic_and,
     logic_not,
+    select_pair,
     sign,
     sqrt,
-    add_angles,
     unit_pair,
-    if_else,
 )
 
 FLIPS = ("no-flip", "flip")
 UPRIGHT = 1e-9
-"""Sine of the angle by which axis 1 may miss being upright or level."""
+"""Entries of the vertical's direction below this count as 0, so that a base that is upright but for rounding is."""
 
 Vector: TypeAlias = tuple[SX, SX, SX]
 """Coordinates along x, u and v."""
@@ -46,11 +46,11 @@ class ArmPlane:
     """The frame (x, u, v) of an arm whose axis 2 is at right angles to axis 1."""
 
     R: Array
-    """Shape (3, 3): rows x, u, v in the world."""
+    """Rows x, u, v in the world, shape (3, 3)."""
     origin: Array
-    """Shape (3,), m, in the world."""
+    """Origin in the world, shape (3,), m."""
     up: tuple[float, float, float]
-    """The world's vertical in this frame."""
+    """The world's vertical in this frame, a unit vector."""
 
     @classmethod
     def of(cls, axes: Axes) -> ArmPlane:
@@ -58,18 +58,17 @@ class ArmPlane:
         u, v = axes.direction(1), axes.direction(2)
         height = u @ (axes.point(2) - axes.point(1))
         R = np.stack([np.cross(u, v), u, v]) + 0.0
-        # A base that is upright but for rounding is upright.
         x, along, across = (0.0 if abs(entry) <= UPRIGHT else float(entry) for entry in R[:, 2])
         return cls(R, axes.point(1) + height * u, (x, along, across))
 
     def coordinates(self, point: Array) -> Array:
-        """Return a point's coordinates (x, u, v), m."""
+        """Return the coordinates (x, u, v) of a point of the world, shape (3,), m."""
         place: Array = self.R @ (point - self.origin)
         return place
 
     @property
     def T(self) -> Array:
-        """Shape (4, 4): the world in this frame."""
+        """The world in this frame, shape (4, 4)."""
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = self.R, -self.R @ self.origin
         return T
@@ -77,11 +76,11 @@ class ArmPlane:
 
 @dataclass(frozen=True)
 class Shoulder:
-    """One of the two places of joint 1 that bring the arm's plane through a point."""
+    """One of the two positions of joint 1 that bring the arm's plane through a point."""
 
     q1: Pair
     x: SX
-    """The point's distance from axis 1 along the plane, m, with its sign."""
+    """Signed distance of the point from axis 1 along the plane, m."""
     miss: SX
     r: SX
     """The point's distance from axis 1, m."""
@@ -89,21 +88,21 @@ class Shoulder:
     clamped: SX
 
     def shortfall(self, offset: SX, x: SX, rise: SX) -> SX:
-        """Return how far the point is from one at x along the plane and ``rise`` higher, m, joint 1 turning freely."""
+        """Return the distance of the point from one at x along the plane and ``rise`` higher, m, over all joint 1."""
         return hypot(self.r - hypot(x, offset), rise)
 
 
 def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
-    """Turn joint 1 so that a point has the coordinate ``offset`` across the plane; the point in front, then behind.
+    """Return the two positions of joint 1 that give a point the coordinate v = ``offset``: point in front, then behind.
 
     Parameters
     ----------
     point
-        Where it is, with joint 1 at zero, m.
+        The point's coordinates with joint 1 at zero, m.
     offset
-        How far across the plane it must be, m.
+        Its coordinate v across the plane after turning joint 1, m.
     scale, reach
-        What rounding and nearness to the singularity are measured by, m.
+        Lengths that rounding and nearness to the singularity are shares of, m.
     free
         The angle of joint 1 where the point is on its axis.
     """
@@ -115,7 +114,7 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tu
     front = sqrt(if_else(square > 0, square, 0.0))
 
     def side(along: SX) -> Shoulder:
-        # The plane's point (along, offset) seen in the fixed frame is (x, v): their angle is that of joint 1.
+        # Joint 1 turns (along, offset) in the plane's frame into (x, v) in the fixed frame.
         return Shoulder(
             q1=add_angles(unit_pair(along, offset, scale), unit_pair(x, v, scale, (free[0], -free[1])), -1.0),
             x=along,
@@ -131,7 +130,7 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tu
 def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) -> tuple[Shoulder, Shoulder]:
     """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
 
-    An arm without lateral offset has no left and right: there the shoulder in front comes first.
+    Without lateral offset there is no left and right; the shoulder in front then comes first.
     """
     front, back = shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
     swap = sign(p["up"][1]) * p["offset"] > 0
@@ -143,22 +142,22 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
 
 
 def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of branches: the shoulder's side, then every combination of the other choices.
+    """Return the names of branches: the shoulder's side with every combination of the other choices.
 
-    An arm whose plane holds axis 1 (offset 0) has no left and right: its shoulders are front and back.
+    With offset 0 the shoulders are called front and back in place of left and right.
     """
     sides = ("left", "right") if offset else ("front", "back")
     return tuple(" ".join(words) for words in product(sides, *choices))
 
 
-def turned_back(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
-    """Return a vector as the arm sees it: joint 1 undone, then a turn rho about v."""
+def to_arm_frame(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
+    """Return a vector in the axes of the arm's plane at joint 1 = q1, then rotated by -rho about v."""
     c, s = q1
     x, u, v = c * vector[0] - s * vector[2], vector[1], c * vector[2] + s * vector[0]
     return rho[0] * x + rho[1] * u, rho[0] * u - rho[1] * x, v
 
 
 def as_pair(x: SX, y: SX) -> tuple[float, float]:
-    """Return the direction of a vector of numbers that is not zero as (cosine, sine)."""
+    """Return the direction of a nonzero vector of numbers as (cosine, sine)."""
     size = float(np.hypot(x, y))
     return x / size + 0.0, y / size + 0.0

@@ -1,4 +1,4 @@
-"""Which closed form an arm has, and why, in words."""
+"""The closed form of an arm, if it has one, with the reason in words."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ FAMILIES = (
     Family("polar", planar.polar_fit, planar.polar_formulas),
     Family("slider", planar.slider_fit, planar.slider_formulas),
 )
-"""In the order in which they are tried."""
-NEARLY = 1e-3
-"""How near an arm must be to a family for a typing error to be suspected."""
+"""Families of closed forms, in the order in which they are tried."""
+NEAR_MISS = 1e-3
+"""Tolerance (rad, share of the reach) within which an arm that misses a family probably has a typing error."""
 
 
 @dataclass(frozen=True, eq=False)
 class Classification:
-    """What the geometry of an arm's axes allows; prints as its words."""
+    """The closed form that the geometry of an arm's axes allows; prints as its words."""
 
     words: str
-    """Such as ``6R, spherical wrist, axes 2 and 3 parallel: closed form, 8 branches``."""
+    """Description, such as ``6R, spherical wrist, axes 2 and 3 parallel: closed form, 8 branches``."""
     family: Family | None
-    """Arms that share its closed form; None where none is known."""
+    """The family of arms that share its closed form; None if none is known."""
     fit: Fit | None
-    """Its numbers in that form."""
+    """The arm's parameters in the family's formulas; None if there is no family."""
 
     @property
     def closed_form(self) -> bool:
@@ -45,7 +45,7 @@ class Classification:
 
     @property
     def name(self) -> str:
-        """The family's identifier, such as ``elbow_wrist``; empty where there is none."""
+        """The family's identifier, such as ``elbow_wrist``; empty without a family."""
         return "" if self.family is None else self.family.name
 
     @property
@@ -77,7 +77,7 @@ def classify(description: Description) -> Classification:
         met = "" if len(fit.met) == 6 else f"; meets {', '.join(fit.met)}"
         return Classification(f"{kinds}, {fit.words}: closed form, {branches}{met}", family, fit)
     words = f"{kinds}: no closed form known"
-    near = _first(Axes.of(description, NEARLY))
+    near = _first(Axes.of(description, NEAR_MISS))
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].words}, but not to {TOLERANCE:g}: are its angles rounded?)"
     return Classification(words, None, None)

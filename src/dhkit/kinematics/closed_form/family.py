@@ -1,7 +1,8 @@
-"""What a family of closed forms is, and the pose that its formulas start from."""
+"""A family of closed forms: how arms are recognized, their parameters, and the pose that the formulas start from."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -16,51 +17,50 @@ from dhkit.kinematics.solutions import LIMIT_SLACK
 if TYPE_CHECKING:
     import casadi as ca
 
-ALL = ("x", "y", "z", "rx", "ry", "rz")
+ALL_COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 """The coordinates of a pose: position, and rotation about the axes."""
 OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")
-"""Of joint values, distance, valid, flags and status."""
-TURN = 2 * np.pi
+"""Types of joint positions, distance, valid, flags and status."""
 Vector: TypeAlias = tuple[SX, SX, SX]
 Parameter: TypeAlias = "Array | float | np.floating[Any] | tuple[float, ...]"
 
 
 def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> Array:
-    """Return two numbers a joint: where its limits begin and how wide they are, m, or rad over a turn.
+    """Return lower limit and range of each joint, shape (2 n,): m, or turns (rad / 2 pi).
 
-    A joint without limits begins anywhere and is as wide as can be.
+    A joint without limits has the range of a whole turn, or 2e300 m.
     """
     begin = np.where(np.isfinite(lower), lower - LIMIT_SLACK, -1e300)
     width = np.where(np.isfinite(upper), upper + LIMIT_SLACK - begin, 2e300)
     unlimited = ~(np.isfinite(lower) & np.isfinite(upper))
     turning = ~np.asarray(prismatic)
     begin = np.where(turning & unlimited, 0.0, begin)
-    width = np.where(turning & unlimited, TURN, width)
-    return np.where(turning, np.stack([begin, width]) / TURN, np.stack([begin, width])).T.ravel()
+    width = np.where(turning & unlimited, math.tau, width)
+    return np.where(turning, np.stack([begin, width]) / math.tau, np.stack([begin, width])).T.ravel()
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An arm seen as a member of a family."""
+    """An arm as a member of a family."""
 
     words: str
-    """What the axes are like."""
+    """How the axes lie, in words."""
     parameters: Mapping[str, Parameter]
     """The numbers that the family's formulas work with, by name."""
     branches: tuple[str, ...]
     met: tuple[str, ...]
-    """Coordinates of a pose that are met."""
+    """Coordinates of a pose that the arm can meet."""
     structure: str = ""
-    """What the formulas look like beyond their parameters, such as the order of the joints."""
+    """What the formulas depend on besides their parameters, such as the order of the joints."""
     free: int | None = None
-    """The joint, from 0, that may take any angle where two axes of the wrist coincide."""
+    """Index, from 0, of the joint that is free where two axes of the wrist coincide; None if there is none."""
 
     def vector(self) -> Array:
-        """Return all parameters in one row."""
+        """Return all parameters, shape (parameters,)."""
         return np.concatenate([np.ravel(value) for value in self.parameters.values()]).astype(float)
 
     def named(self, row: ca.SX) -> dict[str, SX]:
-        """Return a column of all parameters, or symbols for them, by name: pairs as tuples, matrices as matrices."""
+        """Return the entries of a column of parameters by name: pairs as tuples, matrices as matrices."""
         import casadi as ca
 
         named: dict[str, SX] = {}
@@ -83,14 +83,14 @@ class Family:
     name: str
     """An identifier."""
     fit: Callable[[Axes], Fit | None]
-    """Recognises an arm by its axes, at zero joint values."""
+    """Returns an arm's fit from its axes at zero joint positions; None if it is no member."""
     formulas: Callable[[Mapping[str, SX], PoseSymbols], list[Branch]]
-    """Return the branches, in the order of ``Fit.branches``."""
+    """Returns the branches in the order of ``Fit.branches``, from named parameters and the pose."""
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A pose in another frame: its three axes and its origin."""
+class FramedPose:
+    """A pose in another frame: its three axes and its origin, m."""
 
     rotation: tuple[Vector, Vector, Vector]
     position: Vector
@@ -98,26 +98,26 @@ class Seen:
 
 @dataclass(frozen=True)
 class PoseSymbols:
-    """The pose asked for, of the tool in the world."""
+    """Symbols of the required pose of the tool in the world."""
 
     T: ca.SX
-    """3 x 4."""
+    """The pose without its last row, 3 x 4."""
     scale: SX
-    """What rounding of positions is measured by, m."""
+    """Length that rounding of positions is a share of, m."""
     structure: str = ""
-    """That of the fit."""
+    """Structure of the fit."""
     free: Pair = (1.0, 0.0)
-    """The angle that the free joint takes at a wrist singularity."""
+    """Angle of the free joint at a wrist singularity, as a pair."""
     free_1: Pair = (1.0, 0.0)
-    """The angle that joint 1 takes where the point that it turns is on its axis."""
+    """Angle of joint 1 where the point that it turns is on its axis, as a pair."""
     noise: SX = 0.0
-    """By how much the rotation misses being orthonormal: how exactly the pose is known."""
+    """Largest entry of R^T R - 1, which tells how exactly the pose is known."""
 
-    def seen(self, left: SX, right: SX) -> Seen:
-        """Return left T right, all 3 x 4 with a last row 0 0 0 1."""
+    def seen(self, left: SX, right: SX) -> FramedPose:
+        """Return left T right; all are 3 x 4 with an implied last row 0 0 0 1."""
         T = _product(_product(left, self.T), right)
         columns = [tuple(T[i, k] for i in range(3)) for k in range(4)]
-        return Seen((columns[0], columns[1], columns[2]), columns[3])
+        return FramedPose((columns[0], columns[1], columns[2]), columns[3])
 
 
 def _product(A: SX, B: SX) -> SX:

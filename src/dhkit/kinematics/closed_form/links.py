@@ -1,4 +1,4 @@
-"""Two links in the arm's plane: axes 2 and 3, parallel, bring a point in place with the elbow up or down."""
+"""Joints 2 and 3 with parallel axes: two links in the arm's plane that reach a point with the elbow up or down."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.arm_plane import ArmPlane, as_pair, turned_back
+from dhkit.kinematics.closed_form.arm_plane import ArmPlane, as_pair, to_arm_frame
 from dhkit.kinematics.closed_form.family import Parameter
 from dhkit.kinematics.closed_form.formulas import (
     SX,
     Pair,
-    fabs,
-    angle,
-    select_pair,
-    clamp,
-    hypot,
-    sign,
     add_angles,
-    two_link,
+    angle,
+    clamp,
+    fabs,
+    hypot,
     if_else,
+    select_pair,
+    sign,
+    two_link,
 )
 
 ELBOWS = ("up", "down")
 
 
 def link_parameters(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parameter] | None:
-    """Return the links from axis 2 to axis 3 to a point (in the world); None where one has no length."""
+    """Return the parameters of the links from axis 2 to axis 3 to ``end`` (world, m); None if one has no length."""
     second, third, last = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), end))
     upper, fore = third[:2] - second[:2], last[:2] - third[:2]
     if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
@@ -48,15 +48,15 @@ def link_parameters(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parame
 
 @dataclass(frozen=True)
 class Elbow:
-    """One of the two ways of joints 2 and 3 to bring the point in place."""
+    """One of the two solutions of joints 2 and 3."""
 
     q2: Pair
     bent: Pair
-    """How far link 3 has turned against link 2 about v since zero joint values."""
+    """Rotation of link 3 against link 2 about v since zero joint positions, as a pair."""
     q3: SX
     miss: SX
     nearest: tuple[SX, SX]
-    """The point nearest to the one asked for that the two links reach, from axis 2, m."""
+    """Point nearest to the required one that the two links reach, from axis 2, m."""
     singular: SX
     clamped: SX
 
@@ -66,19 +66,19 @@ class Elbow:
         return angle(self.q2), self.q3
 
     @property
-    def turned(self) -> Pair:
-        """How far link 3 has turned about v since zero joint values."""
+    def rotation(self) -> Pair:
+        """Rotation of link 3 about v since zero joint positions, as a pair."""
         return add_angles(self.q2, self.bent)
 
 
 def elbows(p: Mapping[str, SX], x: SX, u: SX, q1: Pair, scale: SX) -> tuple[Elbow, Elbow]:
-    """Return the upper elbow, then the lower one, for a point at (x, u) from axis 2, as joint 1 holds the plane.
+    """Return the upper and the lower elbow for a point at (x, u) from axis 2, m, with joint 1 at q1.
 
-    The upper one is higher in the world; where they are level, the one on the left of the line to the point is.
+    The upper one is higher in the world; if both are level, it is the one left of the line to the point.
     """
     arm = two_link(x, u, p["L2"], p["L3"], scale)
-    # The elbow on the left of the line to the point is off it in the direction (-u, x).
-    vertical = turned_back(p["up"], q1)
+    # From the line to the point, the elbow on its left lies in the direction (-u, x).
+    vertical = to_arm_frame(p["up"], q1)
     left_is_up = sign(vertical[1] * x - vertical[0] * u)
     R = hypot(x, u)
     share = clamp(R, fabs(p["L2"] - p["L3"]), p["L2"] + p["L3"]) / if_else(R > 0, R, 1.0)

@@ -22,30 +22,30 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
-    fabs,
+    add_angles,
     angle,
-    logic_and,
-    select_pair,
-    weighted_sum,
+    fabs,
     hypot,
+    if_else,
+    logic_and,
     logic_not,
     positive_part,
+    select_pair,
     sqrt,
-    add_angles,
     two_link,
     unit_pair,
-    if_else,
+    weighted_sum,
 )
 
 FLAT = 1e-9
-"""Share of the reach by which a pose may lie off the plane of an arm that cannot leave it."""
+"""Share of the reach by which a pose may lie off the plane of a planar arm."""
 IDENTITY = np.eye(4)[:3]
 CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
-"""Orders of joints: any with two or three revolute ones, and at most one slide."""
+"""Orders of joints that form a chain: two or three revolute joints and at most one prismatic."""
 
 
 def chain_fit(axes: Axes) -> Fit | None:
-    """Recognise two or three parallel revolute joints with at most one slide along them."""
+    """Recognize two or three parallel revolute joints with at most one slide along them."""
     if axes.kinds not in CHAINS or not all(axes.parallel(1, i) for i in range(2, axes.n + 1)):
         return None
     revolute = [i for i in range(1, axes.n + 1) if not axes.prismatic[i - 1]]
@@ -84,7 +84,7 @@ def chain_fit(axes: Axes) -> Fit | None:
 
 
 def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the elbow, seen from above, left of the line from the first axis, then right of it."""
+    """Return two branches: the elbow left of the line from the first axis to the last, seen from above; then right."""
     T = pose.seen(p["T_plane_world"], IDENTITY)
     kinds = pose.structure
     turning = kinds.count("R") == 3
@@ -100,7 +100,7 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     off = 0.0 if "P" in kinds else _off_plane(rise, pose.scale)
     branches = []
     for side in (0, 1):
-        # Seen from above, left is left where v points up.
+        # FramedPose from above, left is left where v points up.
         upright, other = p["up"] > 0, 1 - side
         qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
         qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
@@ -114,7 +114,7 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def polar_fit(axes: Axes) -> Fit | None:
-    """Recognise a revolute joint with a slide across its axis."""
+    """Recognize a revolute joint with a slide across its axis."""
     if axes.kinds != "RP" or not axes.perpendicular(1, 2):
         return None
     R, origin = _across(axes.direction(1)), axes.point(1)
@@ -135,7 +135,7 @@ def polar_fit(axes: Axes) -> Fit | None:
 
 
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the tool out along the slide's positive direction, then in."""
+    """Return two branches: the prismatic joint extended in its positive direction, then in its negative."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     R, lift = hypot(x, u), fabs(p["lift"])
     beyond = lift - R > ROUNDING * pose.scale
@@ -145,7 +145,13 @@ def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     return [
         Branch(
             (
-                angle(add_angles(unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0)),
+                angle(
+                    add_angles(
+                        unit_pair(x, u, pose.scale),
+                        add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)),
+                        -1.0,
+                    )
+                ),
                 along - p["start"],
             ),
             miss=miss,
@@ -157,7 +163,7 @@ def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def slider_fit(axes: Axes) -> Fit | None:
-    """Recognise a slide that carries a revolute joint across it."""
+    """Recognize a slide that carries a revolute joint across it."""
     if axes.kinds != "PR" or not axes.perpendicular(1, 2):
         return None
     v, x = axes.direction(2), axes.direction(1)
@@ -181,7 +187,7 @@ def slider_fit(axes: Axes) -> Fit | None:
 
 
 def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the tool ahead of the revolute axis along the slide, then behind it."""
+    """Return two branches: the tool ahead of the revolute axis along the prismatic joint, then behind it."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     L = p["L"]
     beyond = fabs(u) - L > ROUNDING * pose.scale
@@ -200,7 +206,7 @@ def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def _across(v: Array) -> Array:
-    """Return rows x, u, v of a right-handed frame, x as near to the world's x or y axis as can be."""
+    """Return rows x, u, v of a right-handed frame, shape (3, 3), with x close to the world's x or y axis."""
     helper = np.eye(3)[0] if abs(v[0]) < 0.9 else np.eye(3)[1]
     x = helper - (helper @ v) * v
     x /= np.linalg.norm(x)
@@ -208,7 +214,7 @@ def _across(v: Array) -> Array:
 
 
 def _frame(R: Array, origin: Array) -> Array:
-    """Return the world in the frame of rows R at an origin, shape (3, 4)."""
+    """Return the world in the frame with rows R and an origin, m, shape (3, 4)."""
     return np.column_stack([R, -R @ origin])
 
 

@@ -1,7 +1,8 @@
-"""A family's formulas as one program: from a pose to all branches, with what is to be said about each."""
+"""A family's formulas as one program: from a pose to all branches with distance, validity, flags and status."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.description.poses import ORTHONORMAL
-from dhkit.kinematics.closed_form.family import TURN, Family, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import Family, Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import SX, Branch, if_else
 from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.symbolic import Graph
@@ -20,14 +21,14 @@ from dhkit.symbolic import Graph
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     """Return the program of a family: T (4 x 4) and the free joints' angles to q, distance, valid, flags and status.
 
-    Its parameters are ``fit.vector()`` and then ``limit_parameters``.
+    The program's parameters are ``fit.vector()`` followed by ``limit_parameters``.
     """
     symbols, limits = ca.SX.sym("p", len(fit.vector())), ca.SX.sym("limits", 2 * len(prismatic))
     return _graph(family, fit, prismatic, fit.named(symbols), limits, {"parameters": ca.vertcat(symbols, limits)})
 
 
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
-    """Return the same program with one arm's numbers in place of the parameters."""
+    """Return the same program with an arm's numbers in place of the parameters."""
     return _graph(family, fit, prismatic, fit.named(ca.SX(fit.vector())), ca.SX(limits), {})
 
 
@@ -77,7 +78,7 @@ def _graph(
 
 
 def _is_finite(branch: Branch) -> Any:
-    """Return whether no joint value is lost, as by the squares of coordinates above 1e150."""
+    """Return whether all joint positions are finite; squares of coordinates above 1e150 overflow."""
     return ca.fabs(sum(branch.q)) < 1e300
 
 
@@ -118,5 +119,5 @@ def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
 def _inside(x: Any, begin: Any, width: Any, slides: bool) -> Any:
     if slides:
         return ca.logic_and(x >= begin, x - begin <= width)
-    turns = x * (1.0 / TURN) - begin  # a product: dividing costs as much as an arc tangent
+    turns = x * (1.0 / math.tau) - begin  # multiplied, for a division costs as much as an arc tangent
     return turns - ca.floor(turns) <= width

@@ -20,39 +20,39 @@ from dhkit.kinematics.closed_form.arm_plane import (
     as_pair,
     branch_names,
     ordered_shoulders,
-    turned_back,
+    to_arm_frame,
 )
-from dhkit.kinematics.closed_form.family import ALL, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
     SINGULAR,
     SX,
     Branch,
     Pair,
-    fabs,
+    add_angles,
     angle,
-    logic_and,
-    either,
-    turn_by_pi,
+    fabs,
     hypot,
+    if_else,
+    logic_and,
     logic_not,
+    logic_or,
     positive_part,
     sqrt,
-    add_angles,
+    turn_by_pi,
     unit_pair,
-    if_else,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
-from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, turned, wrist_parameters
+from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, wrist_axes, wrist_parameters
 
 
 @dataclass(frozen=True)
 class Region:
-    """One way of the first three joints to put the wrist's centre in place."""
+    """One solution of the first three joints for the position of the wrist's centre."""
 
     q: tuple[SX, SX, SX]
     rho: Pair
-    """How far link 3 has turned about v since zero joint values."""
+    """Rotation of link 3 about v since zero joint positions, as a pair."""
     shoulder: Shoulder
     miss: SX
     elbow: SX
@@ -61,7 +61,7 @@ class Region:
 
 
 def elbow_fit(axes: Axes) -> Fit | None:
-    """Recognise an arm with parallel axes 2 and 3."""
+    """Recognize an arm with parallel axes 2 and 3."""
     if axes.kinds != "RRRRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3)):
         return None
     centre = _wrist_centre(axes)
@@ -75,7 +75,7 @@ def elbow_fit(axes: Axes) -> Fit | None:
         words="spherical wrist, axes 2 and 3 parallel",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | links,
         branches=branch_names(links["offset"], ELBOWS, FLIPS),
-        met=ALL,
+        met=ALL_COORDINATES,
         free=3,
     )
 
@@ -88,11 +88,11 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         for elbow in elbows(p, shoulder.x - p["a1"], T.position[1], shoulder.q1, pose.scale):
             region = Region(
                 q=(angle(shoulder.q1), *elbow.joints),
-                rho=elbow.turned,
+                rho=elbow.rotation,
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, elbow.miss),
                 elbow=elbow.singular,
-                clamped=either(shoulder.clamped, elbow.clamped),
+                clamped=logic_or(shoulder.clamped, elbow.clamped),
                 distance=shoulder.shortfall(p["offset"], p["a1"] + elbow.nearest[0], T.position[1] - elbow.nearest[1]),
             )
             branches += _with_wrist(p, T.rotation, region, pose)
@@ -100,7 +100,7 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def slide_fit(axes: Axes) -> Fit | None:
-    """Recognise an arm whose third joint slides at right angles to axis 2."""
+    """Recognize an arm whose third joint slides at right angles to axis 2."""
     if axes.kinds != "RRPRRR" or not (axes.perpendicular(1, 2) and axes.perpendicular(2, 3)):
         return None
     centre = _wrist_centre(axes)
@@ -121,7 +121,7 @@ def slide_fit(axes: Axes) -> Fit | None:
         words="spherical wrist, joint 3 slides at right angles to axis 2",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | geometry,
         branches=branch_names(geometry["offset"], ("out", "in"), FLIPS),
-        met=ALL,
+        met=ALL_COORDINATES,
         free=3,
     )
 
@@ -138,22 +138,24 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         square = (R - lift) * (R + lift)
         length = sqrt(positive_part(square))
         for along in (length, -length):
-            # The wrist is at e^(i q2) boom (along + i lift) from axis 2.
-            q2 = add_angles(unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0)
+            # As complex numbers, the wrist is at e^(i q2) boom (along + i lift) from axis 2.
+            q2 = add_angles(
+                unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0
+            )
             region = Region(
                 q=(angle(shoulder.q1), angle(q2), along - p["start"]),
                 rho=q2,
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, if_else(beyond, short, 0.0)),
                 elbow=length < SINGULAR * p["reach"],
-                clamped=either(shoulder.clamped, logic_and(square < 0, logic_not(beyond))),
+                clamped=logic_or(shoulder.clamped, logic_and(square < 0, logic_not(beyond))),
             )
             branches += _with_wrist(p, T.rotation, region, pose)
     return branches
 
 
 def _wrist_centre(axes: Axes) -> Array | None:
-    """Return where the last three axes meet, if the middle one is at right angles to its neighbours."""
+    """Return the point where the last three axes meet, shape (3,), m; None unless axis 5 is perpendicular to both."""
     if not (axes.perpendicular(4, 5) and axes.perpendicular(5, 6)):
         return None
     centre = axes.meeting_point(4, 5)
@@ -168,7 +170,7 @@ def _with_wrist(
     Where axes 4 and 6 coincide, as exactly as the pose is known, q4 is the free joint's angle.
     """
     q1, rho = region.shoulder.q1, region.rho
-    wrist = turned(p, (turned_back(axis, q1, rho) for axis in rotation))
+    wrist = wrist_axes(p, (to_arm_frame(axis, q1, rho) for axis in rotation))
     q4 = unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), pose.free)
     roll = angle(q4)
     unflipped, flipped = joints_5_and_6(p, wrist, q4)

@@ -17,37 +17,43 @@ from dhkit.kinematics.closed_form.arm_plane import (
     Vector,
     branch_names,
     ordered_shoulders,
-    turned_back,
+    to_arm_frame,
 )
-from dhkit.kinematics.closed_form.family import ALL, Fit, Parameter, PoseSymbols, Seen
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Fit, FramedPose, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     SINGULAR,
     SX,
     Branch,
     Pair,
-    fabs,
+    add_angles,
     angle,
-    logic_and,
-    select_pair,
-    either,
-    hypot,
+    fabs,
     fmax,
+    hypot,
+    if_else,
+    logic_and,
+    logic_or,
     positive_part,
+    select_pair,
     sign,
     sqrt,
-    add_angles,
     unit_pair,
-    if_else,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, Elbow, elbows, link_parameters
-from dhkit.kinematics.closed_form.wrist import UNSEEN, ill_determined, joints_5_and_6, turned, wrist_parameters
+from dhkit.kinematics.closed_form.wrist import (
+    ERROR_OVER_DEFECT,
+    ill_determined,
+    joints_5_and_6,
+    wrist_axes,
+    wrist_parameters,
+)
 
-FREE = 1e-12
-"""By how much the tool's rotation may miss the pose where that brings a pose near the wrist's singularity in reach."""
+ROTATION_SLACK = 1e-12
+"""Largest error of the tool's rotation, rad, that is accepted to reach a pose near the wrist's singularity."""
 
 
 def three_parallel_fit(axes: Axes) -> Fit | None:
-    """Recognise an arm by its axes."""
+    """Recognize an arm by its axes."""
     if axes.kinds != "RRRRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
         return None
     if not (axes.perpendicular(4, 5) and axes.perpendicular(5, 6)):
@@ -69,7 +75,7 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
         words="axes 2, 3 and 4 parallel, 5 and 6 meet",
         parameters=wrist_parameters(axes, plane, axes.direction(2), meeting) | links | own,
         branches=branch_names(own["offset"], ELBOWS, FLIPS),
-        met=ALL,
+        met=ALL_COORDINATES,
         free=5,
     )
 
@@ -85,13 +91,13 @@ def three_parallel_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Bran
 
 
 def _wrists(
-    p: Mapping[str, SX], T: Seen, shoulder: Shoulder, pose: PoseSymbols
+    p: Mapping[str, SX], T: FramedPose, shoulder: Shoulder, pose: PoseSymbols
 ) -> tuple[tuple[Branch, Branch], tuple[Branch, Branch]]:
     """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it."""
-    wrist = turned(p, (turned_back(axis, shoulder.q1) for axis in T.rotation))
-    position = turned_back(T.position, shoulder.q1)
-    # rho is how far links 2 to 4 have turned in all. Where axis 6 is parallel to them only rho and joint 6 together
-    # are determined: joint 6 is then free, and rho is read off axis 5 with joint 6 undone.
+    wrist = wrist_axes(p, (to_arm_frame(axis, shoulder.q1) for axis in T.rotation))
+    position = to_arm_frame(T.position, shoulder.q1)
+    # rho is the total rotation of links 2 to 4. Where axis 6 is parallel to axes 2 to 4, only the sum of rho and q6 is
+    # determined: q6 is then free, and rho follows from axis 5 with q6 taken off.
     c6, s6 = pose.free
     swing = hypot(wrist.a[0], wrist.a[1])
     free = unit_pair(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
@@ -105,9 +111,9 @@ def _wrists(
 
 
 def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, noise: SX) -> Pair:
-    """Return rho, or where axis 4 would then be out of the two links' reach, the next one that is within it.
+    """Return rho, or the nearest one for which axis 4 is within reach of the two links.
 
-    Near the wrist's singularity rho is ill determined, and turning it costs the tool only ``swing`` times as much.
+    Near the wrist's singularity rho is ill determined: changing it rotates the tool only ``swing`` times as much.
     """
     lever = p["lever"]
     x, u = position[0] - p["a1"], position[1]
@@ -124,7 +130,7 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, n
     corner = unit_pair(cosine, side * sqrt(positive_part(1.0 - cosine * cosine)))
     turned = add_angles(add_angles(to_end, corner), to_lever, -1.0)
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
-    return select_pair(logic_and(wanted != distance, cost < FREE + UNSEEN * noise), turned, rho)
+    return select_pair(logic_and(wanted != distance, cost < ROTATION_SLACK + ERROR_OVER_DEFECT * noise), turned, rho)
 
 
 def _elbows(
@@ -140,7 +146,7 @@ def _elbows(
     x, u = position[0] - p["a1"] - reached[0], position[1] - reached[1]
 
     def branch(elbow: Elbow) -> Branch:
-        rest = add_angles(rho, elbow.turned, -1.0)
+        rest = add_angles(rho, elbow.rotation, -1.0)
         q4 = angle((rest[0], p["sense4"] * rest[1]))
         return Branch(
             (angle(shoulder.q1), *elbow.joints, q4, *wrist),
@@ -148,7 +154,7 @@ def _elbows(
             shoulder=shoulder.singular,
             elbow=elbow.singular,
             wrist=singular,
-            clamped=either(shoulder.clamped, elbow.clamped),
+            clamped=logic_or(shoulder.clamped, elbow.clamped),
         )
 
     upper, lower = elbows(p, x, u, shoulder.q1, scale)

@@ -1,4 +1,4 @@
-"""Arms of fewer than six joints on a turntable: pan and tilt, yaw with two parallel joints, and with three."""
+"""Arms of two to four joints whose first joint turns a plane: pan and tilt, yaw with two or three parallel joints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
     as_pair,
     branch_names,
     ordered_shoulders,
-    turned_back,
+    to_arm_frame,
 )
 from dhkit.kinematics.closed_form.family import Fit, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
@@ -21,12 +21,12 @@ from dhkit.kinematics.closed_form.formulas import (
     SX,
     Branch,
     Pair,
-    angle,
-    weighted_sum,
-    either,
-    hypot,
     add_angles,
+    angle,
+    hypot,
+    logic_or,
     unit_pair,
+    weighted_sum,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
@@ -34,7 +34,7 @@ IDENTITY = np.eye(4)[:3]
 
 
 def pan_tilt_fit(axes: Axes) -> Fit | None:
-    """Recognise two joints at right angles; the tool off axis 2."""
+    """Recognize two joints at right angles; the tool off axis 2."""
     if axes.kinds != "RR" or not axes.perpendicular(1, 2):
         return None
     plane = ArmPlane.of(axes)
@@ -51,7 +51,7 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
 
 
 def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Aim: put the tool in the direction of the pose's origin, whatever its distance."""
+    """Return the branches that aim: the tool lies in the direction of the pose's origin, at whatever distance."""
     position = pose.seen(p["T_plane_world"], IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
@@ -70,7 +70,7 @@ def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def yaw_two_fit(axes: Axes) -> Fit | None:
-    """Recognise a turntable with two parallel joints."""
+    """Recognize a turntable with two parallel joints."""
     if axes.kinds != "RRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3)):
         return None
     plane = ArmPlane.of(axes)
@@ -95,7 +95,7 @@ def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 
 def yaw_three_fit(axes: Axes) -> Fit | None:
-    """Recognise a turntable with three parallel joints; the tool's z axis points, or its x axis if z is sideways."""
+    """Recognize a turntable with three parallel joints; the tool's z axis points, or its x axis if z is sideways."""
     if axes.kinds != "RRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
         return None
     plane = ArmPlane.of(axes)
@@ -126,7 +126,7 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], IDENTITY)
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
-        wanted = turned_back(weighted_sum(p["axis"], T.rotation), shoulder.q1)
+        wanted = to_arm_frame(weighted_sum(p["axis"], T.rotation), shoulder.q1)
         rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
         reached = add_angles(rho, p["lever"])
         x, u = shoulder.x - p["a1"] - reached[0], T.position[1] - reached[1]
@@ -142,7 +142,7 @@ def _branches(
     for elbow in elbows(p, x, u, shoulder.q1, scale):
         joints = [angle(shoulder.q1), *elbow.joints]
         if rho is not None:
-            rest = add_angles(rho, elbow.turned, -1.0)
+            rest = add_angles(rho, elbow.rotation, -1.0)
             joints.append(angle((rest[0], p["sense4"] * rest[1])))
         branches.append(
             Branch(
@@ -151,7 +151,7 @@ def _branches(
                 shoulder=shoulder.singular,
                 elbow=elbow.singular,
                 wrist=sideways,
-                clamped=either(shoulder.clamped, elbow.clamped),
+                clamped=logic_or(shoulder.clamped, elbow.clamped),
             )
         )
     return branches

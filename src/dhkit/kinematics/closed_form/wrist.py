@@ -11,18 +11,28 @@ from dhkit.description import Array
 from dhkit.kinematics.axes import Axes, inverse_pose
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Vector, as_pair
 from dhkit.kinematics.closed_form.family import Parameter, PoseSymbols
-from dhkit.kinematics.closed_form.formulas import NOTHING, SX, Pair, angle, turn_by_pi, rotate, add_angles, unit_pair, wrap_angle
+from dhkit.kinematics.closed_form.formulas import (
+    MIN_DIRECTION,
+    SX,
+    Pair,
+    add_angles,
+    angle,
+    rotate,
+    turn_by_pi,
+    unit_pair,
+    wrap_angle,
+)
 
 
 def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -> dict[str, Parameter]:
-    """Return where arm plane and wrist are, and how the wrist's axes lie at zero joint values.
+    """Return the parameters of the arm's plane and wrist: positions, and directions of the wrist's axes at zero.
 
     Parameters
     ----------
     first
-        The axis across axis 5 on the arm's side: axis 4, or the parallel axes' direction.
+        Direction of the axis before axis 5, at right angles to it: axis 4, or the parallel axes.
     centre
-        Where axes 5 and 6 meet.
+        Point where axes 5 and 6 meet, shape (3,), m, world.
     """
     z5, z6 = axes.direction(5), axes.direction(6)
     T_world_wrist = np.eye(4)
@@ -40,35 +50,35 @@ def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -
     }
 
 
-UNSEEN = 10.0
-"""How many times as far as it shows in its columns a rotation may be wrong: that they are orthonormal leaves three of
-nine errors unseen, and the others may be small by chance."""
+ERROR_OVER_DEFECT = 10.0
+"""Assumed ratio of a rotation's error to its defect of orthonormality, which does not show three of the nine errors,
+while the others may be small by chance."""
 
 
 @dataclass(frozen=True)
 class Wrist:
-    """Where axis 6, axis 5 at zero and their product have gone, in the axes of the wrist at zero joint values."""
+    """Axis 6, axis 5 at zero and their cross product, after the wrist's rotation, in its axes at zero positions."""
 
     a: Vector
     n: Vector
     m: Vector
 
 
-def turned(p: Mapping[str, SX], axes: Iterable[Vector]) -> Wrist:
-    """Return the tool's axes as the wrist sees them, from those that the arm sees."""
+def wrist_axes(p: Mapping[str, SX], axes: Iterable[Vector]) -> Wrist:
+    """Return the tool's axes in those of the wrist, from those in the axes of the arm."""
     a, n, m = (rotate(p["F"], axis) for axis in axes)
     return Wrist(a, n, m)
 
 
 def ill_determined(pose: PoseSymbols) -> SX:
-    """Return the scale at which the first joint's direction is noise: rounding, or what the pose is wrong by."""
-    return 1.0 + UNSEEN / NOTHING * pose.noise
+    """Return the scale below which the first wrist joint's direction is undetermined: rounding, or the pose's error."""
+    return 1.0 + ERROR_OVER_DEFECT / MIN_DIRECTION * pose.noise
 
 
 def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
-    """Return q5 and q6 without flip (joint 5 turned to its positive side), and with it, where ``roll`` is pi further.
+    """Return q5 and q6 without flip (joint 5 positive), then with flip, where ``roll`` is larger by pi.
 
-    Everything is taken from the rotation that the roll about the first axis leaves over: it closes whatever it is.
+    Both follow from the rotation that remains after the roll about the first axis, so that any roll closes the pose.
     """
     a, n, m = wrist.a, wrist.n, wrist.m
     bend = unit_pair(roll[0] * a[0] + roll[1] * a[1], a[2])

@@ -1,13 +1,30 @@
-"""An arm's kinematics as C99 source, for machines without Python."""
+"""All programs of an arm's kinematics: its kernels, to compile them in advance, and C99 source without Python."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from dhkit.description import Description, takes_robot
+from dhkit.kernels import Kernel
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import limit_parameters
+from dhkit.kinematics.forward import frames_kernel, tool_kernel
+from dhkit.kinematics.inverse import solver_of
+from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
+from dhkit.kinematics.newton import error_kernel, step_kernel
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
+
+
+@takes_robot
+def kinematic_kernels(description: Description) -> list[Kernel]:
+    """Return the kernels of frames, Jacobians and inverse kinematics, in closed form where there is one."""
+    solver = solver_of(description)
+    kernels = [tool_kernel(description)[0], frames_kernel(description)[0]]
+    kernels += [jacobian_kernel(description, "world")[0], jacobian_kernel(description, "tool")[0]]
+    kernels += [jacobian_dot_kernel(description, "world")[0], jacobian_dot_kernel(description, "tool")[0]]
+    for size in (6, 3):
+        kernels += [error_kernel(size), step_kernel(description.n, size)]
+    return kernels if solver is None else [*kernels, solver.kernel]
 
 
 @takes_robot
