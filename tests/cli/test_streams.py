@@ -16,7 +16,7 @@ import pytest
 import typer
 
 from dhkit import Arm, Limits
-from dhkit.cli.commands import app
+from dhkit.cli.app import app
 from dhkit.cli.streams import _plain
 from dhkit.description.files import write_atomically
 

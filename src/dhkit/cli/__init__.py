@@ -18,7 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     # A command imports thousands of objects that all stay: looking through them for garbage is a tenth of its start.
     gc.set_threshold(50_000, 20, 50)
     try:
-        from dhkit.cli.commands import run
+        from dhkit.cli.app import run
 
         status = run(arguments)
     except BaseException as error:

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
-from dhkit.cli.output import say
-from dhkit.cli.outputs import PAGES, check_outputs
+from dhkit.cli.output import PAGES, check_outputs, say
 from dhkit.lab import Assignment, serve
 from dhkit.lab.assignment import is_assignment
 from dhkit.programs import protect_from_children

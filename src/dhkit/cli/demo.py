@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
-from dhkit.cli.output import print_json, say
-from dhkit.cli.outputs import write_figure
+from dhkit.cli.output import print_json, say, write_figure
 from dhkit.cli.quickest import race, there_and_back
 from dhkit.cli.simulation_task import chosen_motion
 from dhkit.cli.straight import Branches, Line, branches, straight_line

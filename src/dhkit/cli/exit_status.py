@@ -13,3 +13,5 @@ class ExitStatus(IntEnum):
     """Unusable input; one line on stderr says what and where."""
     INTERRUPTED = 130
     """Ctrl-C: 128 and the number of SIGINT, as shells have it."""
+    READER_GONE = 141
+    """The reader of the output went away: 128 and the number of SIGPIPE, as shells have it."""

@@ -11,10 +11,13 @@ from typing import Any, get_args
 
 from dhkit.arm import Arm
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
+from dhkit.cli.output import say
+from dhkit.description import write_atomically
 from dhkit.errors import AnswerError
 from dhkit.grading import LIBRARY, grade
 from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.batch import GIGABYTE, grade_all
+from dhkit.grading.explanation import explanation_html, explanation_text
 from dhkit.grading.isolation import Judge
 from dhkit.grading.judgement import prepare, robot_of
 from dhkit.grading.marks import marks
@@ -22,6 +25,7 @@ from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Feedback, Rubric
 from dhkit.grading.sheets import find_sheets
+from dhkit.grading.template import template
 
 
 def rubric_of(path: Path | None) -> Rubric:
@@ -260,3 +264,34 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
 
         bar.refresh()
         yield show
+
+
+def write_template(robot: str, output: Path | None) -> int:
+    """Print or write an empty answer sheet."""
+    description = Arm.load(robot).description
+    # A sheet finds robot files only in its own folder.
+    name = Path(robot).name if robot.endswith(".toml") else description.name
+    return _deliver(template(description, name), output)
+
+
+def write_explanation(arm: Arm, form: str, output: Path | None) -> int:
+    """Print or write a worked solution as text or HTML.
+
+    Raises
+    ------
+    AnswerError
+        Another format.
+    """
+    forms = {"text": explanation_text, "html": explanation_html}
+    if form not in forms:
+        raise AnswerError(f"--format: found {form!r}; expected {', '.join(forms)} for a worked solution")
+    return _deliver(forms[form](arm.description), output)
+
+
+def _deliver(text: str, output: Path | None) -> int:
+    if output is None:
+        sys.stdout.write(text)
+    else:
+        write_atomically(output, text)
+        say(f"wrote {output}")
+    return 0

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from dhkit.description import write_atomically
+from dhkit.description.files import check_place
+from dhkit.errors import DescriptionError
 
 PIPE_WIDTH = 200
 """Columns where the output is no terminal: tables then do not break."""
@@ -82,3 +88,38 @@ def finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [finite(entry) for entry in value]
     return value
+
+
+FIGURES = (".png", ".svg", ".pdf")
+PAGES = (".html", ".htm")
+RESOLUTION = 120
+"""Dots an inch."""
+
+
+def check_outputs(outputs: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
+    """Refuse what could not be written.
+
+    Parameters
+    ----------
+    outputs
+        Paths, and the suffixes that each may have; None for what is not asked for.
+
+    Raises
+    ------
+    DescriptionError
+        Another suffix, or a place that cannot be written to.
+    """
+    for path, expected in outputs:
+        if path is None:
+            continue
+        if path.suffix.lower() not in expected:
+            raise DescriptionError(f"{path}: ends in {path.suffix!r}; expected {', '.join(expected)}")
+        check_place(path)
+
+
+def write_figure(figure: Any, path: Path) -> Path:
+    """Write a figure of matplotlib in the format of the path's suffix, whole or not at all, and return the path."""
+    picture = io.BytesIO()
+    figure.savefig(picture, format=path.suffix[1:].lower(), dpi=RESOLUTION)
+    write_atomically(path, picture.getvalue())
+    return path

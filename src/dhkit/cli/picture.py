@@ -1,4 +1,4 @@
-"""`dhkit picture`: an arm, or a motion of a file, as PNG or GIF."""
+"""`dhkit picture` and `dhkit play`: an arm or a motion of a file, as PNG or GIF, in the browser, or as a page."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
-from dhkit.cli.arguments import joint_values
-from dhkit.cli.output import say
-from dhkit.cli.outputs import check_outputs
+from dhkit.cli.arguments import columns, joint_values
+from dhkit.cli.browser import until_interrupted
+from dhkit.cli.output import PAGES, check_outputs, say
 from dhkit.control import SimulationResult
 from dhkit.control.result_files import SIMULATION
 from dhkit.errors import DescriptionError
-from dhkit.trajectories import read_motion, written_by_dhkit
+from dhkit.trajectories import Trajectory, read_motion, written_by_dhkit
 from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs, write_png
 from dhkit.viewer.pictures import picture
 
@@ -42,8 +42,7 @@ def run(
         q = None if at is None else joint_values(arm, at, degrees)
         say(f"wrote {write_png(picture(arm.description, q, size=shape, frames=frames), output)}")
         return 0
-    simulated = written_by_dhkit(motion) == SIMULATION.title
-    played = SimulationResult.load(motion) if simulated else read_motion(motion, arm.description, degrees=degrees)
+    played = _read(arm, motion, degrees=degrees)
     if output.suffix.lower() == ".gif":
         say(f"wrote {write_motion_gif(arm.description, played, output, rate=rate, size=shape, frames=frames)}")
         return 0
@@ -57,3 +56,23 @@ def _size(text: str) -> tuple[int, int]:
     if found is None:
         raise DescriptionError(f"--size {text[:40]}: expected width and height in px, such as 960x720")
     return int(found[1]), int(found[2])
+
+
+def play(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str | None = None) -> int:
+    """Play a motion or a simulation of a file in the browser until it is interrupted, or write a page of it."""
+    check_outputs(((page, PAGES),))
+    played = _read(arm, path, degrees=degrees, names=names)
+    with arm.view() as view:
+        view.play(played)
+        if page is not None:
+            caption = f"The motion of {path.name}."
+            say(f"wrote {view.save_html(page, interactive=True, motions={path.name: played}, caption=caption)}")
+            return 0
+        return until_interrupted(view.url, f"playing {path}", open_browser=True)
+
+
+def _read(arm: Arm, path: Path, *, degrees: bool, names: str | None = None) -> SimulationResult | Trajectory:
+    """Return the simulation or the motion of a file."""
+    if written_by_dhkit(path) == SIMULATION.title:
+        return SimulationResult.load(path)
+    return read_motion(path, arm.description, degrees=degrees, columns=columns(names))

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.cli.output import print_json, print_table, say
-from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
+from dhkit.cli.output import FIGURES, PAGES, check_outputs, print_json, print_table, say, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
 from dhkit.description import Array

@@ -1,4 +1,4 @@
-"""`dhkit simulate`: an arm under a controller."""
+"""`dhkit simulate` and `dhkit compare`: an arm under one controller, or under several on one motion."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
-from dhkit.cli.output import print_json, print_table, say
-from dhkit.cli.outputs import FIGURES, PAGES, check_outputs, write_figure
+from dhkit.cli.output import FIGURES, PAGES, check_outputs, print_json, print_table, say, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.simulation_task import Task
 from dhkit.cli.units import joint_entry
-from dhkit.control import SimulationResult
+from dhkit.control import Comparison, Plant, SimulationResult, compare
+from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
 
 ACCOUNTED = 1e-6
@@ -143,3 +143,48 @@ def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, 
         "saturated": result.saturated.tolist(),
         "energy_error": result.audit.error,
     }
+
+
+def run_comparison(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
+    """Compare controllers on one motion, print a table and write a figure; return 0, or 1 where one failed."""
+    check_outputs(((figure, FIGURES),))
+    options = dict(task.options)
+    plant = Plant(
+        task.plant.description,
+        Friction.chosen(options.pop("friction")),
+        options.pop("restitution"),
+        tuple(options.pop("pushes")),
+    )
+    names = list(task.controllers)
+    with ProgressBar(f"simulating {names[0]}") as bar:
+        compared = compare(
+            task.arm.description,
+            task.motion,
+            names,
+            task.bandwidth,
+            task.damping,
+            lambda name: bar.show(names.index(name) + 1, len(names), f"simulated {name}"),
+            plant=plant,
+            **options,
+        )
+    if figure is not None and compared.results:
+        from dhkit.viewer import plot_comparison
+
+        write_figure(plot_comparison(compared.results, f"{task.arm.name}: {task.about}, {task.rate}"), figure)
+    if json:
+        facts = {name: facts_of(task.arm, result, degrees=degrees) for name, result in compared.results.items()}
+        print_json({"robot": task.arm.name, "controllers": facts, "failures": dict(compared.failures)})
+    else:
+        _print_comparison(task, compared, degrees=degrees)
+        if figure is not None and compared.results:
+            say(f"\nwrote {figure}")
+    return 1 if compared.failures else 0
+
+
+def _print_comparison(task: Task, compared: Comparison, *, degrees: bool) -> None:
+    say(f"{task.arm.name}: {task.about}, {task.rate}, {task.bandwidth:g} rad/s", "bold")
+    say("")
+    headings, rows = compared.rows(degrees=degrees)
+    print_table(headings, rows)
+    for name, reason in compared.failures.items():
+        say(f"\n{name}: {reason}")

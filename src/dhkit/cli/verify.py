@@ -1,8 +1,11 @@
-"""What `dhkit verify` prints and writes: our own mechanics against Pinocchio's, or a URDF against a table."""
+"""`dhkit verify` and `dhkit check`: mechanics against Pinocchio's, a URDF against a table, a program against an arm."""
 
 from __future__ import annotations
 
 import json as jsons
+import os
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.arm import Arm
@@ -10,6 +13,7 @@ from dhkit.cli.extract import chain_words
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
+from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check, protect_from_children
 from dhkit.verification import VerificationReport, verify_urdf
 
 
@@ -54,3 +58,40 @@ def _text(report: VerificationReport, suffix: str) -> str:
     if suffix == ".json":
         return jsons.dumps(finite(report.json()), indent=2) + "\n"
     return report.markdown() if suffix == ".md" else report.latex()
+
+
+def check_program(
+    arm: Arm,
+    source: Path | Sequence[str],
+    rubric: Path | None = None,
+    seed: int | None = None,
+    samples: int = 200,
+    sandbox: str | None = None,
+    seconds: float = 5.0,
+    json: bool = False,
+) -> int:
+    """Check a program and print its score.
+
+    Returns
+    -------
+    int
+        0 for full marks, 1 for fewer, 2 where it cannot be loaded.
+    """
+    protect_from_children()
+    points = None if rubric is None else CheckRubric.read(rubric)
+    with Program(source, Limits(seconds=seconds), sandbox) as program:
+        try:
+            report = check(arm, program, points, seed, samples)
+        except ProgramError as error:
+            printed = program.output.strip()
+            if json:
+                print_json({"error": str(error), "line": error.line, "output": printed[-2000:]})
+            else:
+                said = str(error) if str(error).startswith(f"{source}") else f"{program.name}: {error}"
+                sys.stderr.write(f"dhkit: {said}{os.linesep}")
+            return 2
+    if json:
+        print_json(report.to_dict(), indent=2)
+    else:
+        sys.stdout.write(f"{report}\n")
+    return 0 if report.full else 1

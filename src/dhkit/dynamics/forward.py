@@ -103,7 +103,7 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
 
 
 def _failing(M: Array) -> Array:
-    """Return for each matrix (N, n, n) the last joint without inertia, found as ``solve_for_acceleration`` does; -1: none."""
+    """Return the last joint without inertia for each matrix (N, n, n), as ``solve_for_acceleration``; -1: none."""
     A, least = M.copy(), SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
     failing = np.full(len(M), -1)
     for k in reversed(range(M.shape[-1])):

@@ -51,9 +51,8 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     carriers = carrying(description.convention, frames)
     prismatic = description.numbers.prismatic
     omega, rate = np.zeros((2, *q.shape[:-1], 3))
-    a = np.broadcast_to(
-        -description.numbers.gravity, omega.shape
-    )  # gravity acts like an acceleration of the base upwards
+    # Gravity acts like an acceleration of the base upwards.
+    a = np.broadcast_to(-description.numbers.gravity, omega.shape)
     Y = np.zeros((*q.shape, 10 * n))
     for i in range(n):
         axis, at = carriers[i][..., :3, 2], carriers[i][..., :3, 3]

@@ -1,0 +1,38 @@
+"""Arguments and options that several commands have."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from dhkit.arm import Arm
+from dhkit.description.joint_words import DEGREES
+
+Robot = Annotated[
+    str, typer.Argument(help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP.")
+]
+
+
+def _use_degrees(wanted: bool) -> bool:
+    """Make messages give angles in the unit of the command's arguments."""
+    DEGREES.set(wanted)
+    return wanted
+
+
+def degrees_option(text: str) -> Any:
+    """Return the option ``--degrees`` with its help; messages then give angles in degrees too."""
+    return typer.Option("--degrees", callback=_use_degrees, help=text)
+
+
+Degrees = Annotated[bool, degrees_option("Angles in and out are in degrees.")]
+Uniform = Annotated[
+    bool, typer.Option("--uniform-links", help="Thin uniform rods of 1 kg each for links, in place of their bodies.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def load_arm(robot: str, uniform: bool) -> Arm:
+    """Return a robot by name or file, with uniform rods for links if wanted."""
+    arm = Arm.load(robot)
+    return arm.with_uniform_links() if uniform else arm
