@@ -316,7 +316,7 @@ def _largest_jerk(trajectory: Trajectory, limit: Array) -> Check:
     """Return where a motion's jerk uses most of its limit: at an end of an interval, or inside one of high degree."""
     pieces = trajectory.pieces.differentiated(3)
     degree = pieces.coefficients.shape[1] - 1
-    t, values = pieces.inside(2) if degree < 2 else pieces.turning(SPREAD * (degree + 1))
+    t, values = pieces.inside(2) if degree < 2 else pieces.extremes(SPREAD * (degree + 1))
     use = np.abs(values) / limit
     k, p, i = np.unravel_index(int(np.argmax(use)), use.shape)
     return Check("jerk", float(use[k, p, i] - 1), int(i), float(t[k, p] if t.ndim == 2 else t[k, p, i]))
@@ -327,7 +327,7 @@ def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
     found = []
     size = position_sizes(limits)
     for order, what in enumerate(("position", "velocity", "acceleration")):
-        t, values = motion.pieces.differentiated(order).turning(points)
+        t, values = motion.pieces.differentiated(order).extremes(points)
         if order == 0:
             excess = np.maximum(limits.lower - values, values - limits.upper) / size
         else:

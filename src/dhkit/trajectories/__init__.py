@@ -1,4 +1,4 @@
-"""Motions over time: exact piecewise polynomials, their limits, files, and the classical ones of textbooks."""
+"""Motions over time: exact piecewise polynomials, limits, files, and the classical motions of textbooks."""
 
 from dhkit.formats import register_formats
 from dhkit.trajectories.cartesian import circle, straight_line

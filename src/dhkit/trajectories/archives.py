@@ -1,4 +1,4 @@
-"""Archives of NumPy and MATLAB: every number as it is, and the robot with them."""
+"""Archives of NumPy and MATLAB, which hold every number without rounding, and the robot."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ SAVED = "expected one that dhkit saved"
 
 
 def archive_bytes(suffix: str, values: Mapping[str, Any]) -> bytes:
-    """Return an archive of texts and arrays, in the format that its suffix names."""
+    """Return the bytes of an archive of texts and arrays, in the format of its suffix."""
     return npz_bytes(values) if suffix == ".npz" else mat_bytes(values)
 
 
 def read_archive(suffix: str, content: bytes, kind: FileKind) -> dict[str, Any]:
-    """Return an archive's texts and arrays by name, in the format that its suffix names.
+    """Return an archive's texts and arrays by name, read in the format of its suffix.
 
     From a ``.mat`` file arrays have two axes or more, and a trailing axis of length 1 may be missing.
 
@@ -40,14 +40,14 @@ def read_archive(suffix: str, content: bytes, kind: FileKind) -> dict[str, Any]:
 
 
 def archive_format(suffix: str, content: bytes, most: int) -> str:
-    """Return the text ``format`` of an archive, which says what dhkit wrote; empty in archives from elsewhere.
+    """Return the text ``format`` that dhkit writes into its archives; empty for archives of other programs.
 
     Parameters
     ----------
     suffix, content
         The file.
     most
-        Bytes that its variables may take unpacked.
+        Largest size of its unpacked variables, bytes.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def mat_bytes(values: Mapping[str, Any]) -> bytes:
 
 
 def read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
-    """Return texts and arrays by name; nothing is unpickled, and nothing unpacked beyond a bound."""
+    """Return texts and arrays by name; nothing is unpickled, and the unpacked size is bounded."""
     keys = (*TEXTS, *kind.arrays)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -99,7 +99,7 @@ def read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
 
 
 def _npy(data: bytes, key: str) -> Any:
-    """Return one member, whose header has to say exactly what follows."""
+    """Return one member; its header must describe its bytes exactly."""
     file = io.BytesIO(data)
     version = npy.read_magic(file)
     if version not in ((1, 0), (2, 0)):

@@ -25,9 +25,9 @@ def straight_line(
     limits: Limits | None = None,
     torques: Torques | None = None,
 ) -> Trajectory:
-    """Return the motion that leads the tool straight from one pose to another, its orientation turning evenly.
+    """Return the motion of the tool along the straight line between two poses, its orientation turning evenly.
 
-    The way along it is s(t) = 10 t^3 - 15 t^4 + 6 t^5: velocity and acceleration begin and end with 0.
+    The time law is s(t) = 10 t^3 - 15 t^4 + 6 t^5: velocity and acceleration begin and end with 0.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def straight_line(
     T0, T1
         Poses of the tool in the world, shape (4, 4).
     q0
-        Near which joint values it begins, shape (n,), rad and m; see :func:`dhkit.trajectories.joint_path`.
+        Joint values near which it begins, shape (n,), rad and m; see :func:`dhkit.trajectories.joint_path`.
     duration, limits, torques
         As for :func:`dhkit.trajectories.cubic`.
 
@@ -74,7 +74,7 @@ def circle(
     turning: bool = False,
     torques: Torques | None = None,
 ) -> Trajectory:
-    """Return the motion that leads the tool along a circle or an arc; the time law is that of :func:`straight_line`.
+    """Return the motion of the tool along a circle or an arc, with the time law of :func:`straight_line`.
 
     Parameters
     ----------

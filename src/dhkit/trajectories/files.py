@@ -22,7 +22,7 @@ from dhkit.trajectories.trajectory import Trajectory
 
 TABLES = (".csv", ".yaml", ".yml")
 SAMPLES = (*TABLES, ".mat")
-"""What samples from elsewhere may come in."""
+"""Suffixes of files with samples from other programs."""
 TRAJECTORY = FileKind(
     "trajectory",
     arrays=("breaks", "coefficients"),
@@ -31,36 +31,36 @@ TRAJECTORY = FileKind(
     otherwise="; Trajectory.read takes samples from elsewhere, the command files without dhkit's first line",
 )
 COMMENTS_LENGTH = 2_000
-"""Characters in which a table's payload and friction are searched: 11 numbers of 25 characters, and the label."""
+"""Number of characters that hold a table's comments: label, and payload and friction as 11 numbers of 25 characters."""
 BESIDE = re.compile(r"^\s*#\s*(payload|friction)\s*:(.*)$", re.MULTILINE)
 FIRST_LINE = 200
-"""Bytes in which the first line of a table is looked for."""
-MOST_COEFFICIENTS = 65
-"""Of a joint's polynomial on an interval: the time that one of a motion takes grows with them."""
-RATE = 1000.0
-"""Samples a second where none are asked for."""
-JUMP = 1e-6
-"""How far joint values, rad or m, and speeds may jump between pieces of a motion, absolute and relative."""
-SECOND = 1_000_000_000
-"""In ns."""
+"""Number of bytes that hold the first line of a table."""
+MAX_COEFFICIENTS = 65
+"""Largest number of coefficients of a polynomial; evaluating a motion takes time in proportion."""
+DEFAULT_RATE = 1000.0
+"""Samples per second if no rate is given."""
+MAX_JUMP = 1e-6
+"""Largest jump of joint values, rad or m, and speeds between pieces of a motion, absolute and relative."""
+NANOSECONDS = 1_000_000_000
+"""Nanoseconds per second."""
 LEFT_OUT: tuple[object, ...] = (None, "", [])
-"""What stands for a row that a message's point does not have."""
-MOST_DIGITS = 20
-"""Of whole seconds or nanoseconds."""
+"""Values of a row that a message's point leaves out."""
+MAX_DIGITS = 20
+"""Largest number of digits of seconds or nanoseconds."""
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None = None) -> Path:
-    """Write a trajectory and return its path; the file is there whole, or not at all.
+    """Write a trajectory and return its path; after a failure there is no file, or the old one.
 
     Parameters
     ----------
     trajectory
         The motion, with its payload and friction. Its report is not written.
     path
-        The suffix decides: ``.npz`` and ``.mat`` hold every number and the robot; ``.csv`` holds samples
+        The suffix chooses the format: ``.npz`` and ``.mat`` hold every number and the robot; ``.csv`` holds samples
         ``t, q1 ..., qd1 ..., qdd1 ...``, and ``.yaml`` or ``.yml`` those of a ROS JointTrajectory, times in whole ns.
     rate
-        Samples a second, 1000 if not given; only for ``.csv`` and ``.yaml``.
+        Samples per second, 1000 if not given; only for ``.csv`` and ``.yaml``.
 
     Raises
     ------
@@ -74,13 +74,14 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
     if suffix in ARCHIVES:
         if rate is not None:
             raise ValueError(f"rate is {rate!r}: {suffix} holds no samples; expected no rate")
-        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _beside(trajectory)
+        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _load_numbers(trajectory)
         write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
         return path
     comments = tuple(
-        f"{name}: {' '.join(f'{x:.17g}' for x in numbers.tolist())}" for name, numbers in _beside(trajectory).items()
+        f"{name}: {' '.join(f'{x:.17g}' for x in numbers.tolist())}"
+        for name, numbers in _load_numbers(trajectory).items()
     )
-    times = trajectory.sample_times(RATE if rate is None else rate)
+    times = trajectory.sample_times(DEFAULT_RATE if rate is None else rate)
     text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments)
     write_atomically(path, TRAJECTORY.labelled(trajectory.description, text))
     return path
@@ -89,15 +90,15 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
 def load_trajectory(path: str | Path, description: Description | None = None) -> Trajectory:
     """Read a trajectory that :func:`save_trajectory` wrote.
 
-    Archives give the same motion to the last bit; samples give one of degree 5 between them, which meets their
-    values, rates and accelerations.
+    Archives give the same motion to the last bit; samples give polynomials of degree 5 through their values, rates and
+    accelerations.
 
     Parameters
     ----------
     path
         The file. It may come from anywhere: nothing in it is executed, and at most 200 MB are read.
     description
-        The robot. If not given, that of the file: the library's, or for an archive the one it holds.
+        The robot. If not given, the file's: the library's of that name, or for an archive the one that it contains.
 
     Raises
     ------
@@ -120,7 +121,7 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
 
 
 def written_by_dhkit(path: str | Path) -> str:
-    """Return what a file says that dhkit wrote, such as ``dhkit trajectory``; empty where it came from elsewhere.
+    """Return the kind of a file that dhkit wrote, such as ``dhkit trajectory``; empty for files of other programs.
 
     Raises
     ------
@@ -145,16 +146,16 @@ def read_motion(
     degrees: bool = False,
     columns: Mapping[str, str] | None = None,
 ) -> Trajectory:
-    """Read a motion of a robot: one that dhkit wrote, or samples from elsewhere, as the file itself says.
+    """Read a motion of a robot: a file that dhkit wrote, or samples from another program, as the file's label tells.
 
     Parameters
     ----------
     path
         As for :func:`load_trajectory` and :func:`read_samples`.
     description
-        The robot that moves so.
+        The robot.
     degrees, columns
-        Of samples from elsewhere, as for :func:`read_samples`.
+        For samples from other programs, as for :func:`read_samples`.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def read_samples(
     degrees: bool = False,
     columns: Mapping[str, str] | None = None,
 ) -> Trajectory:
-    """Read samples that something else wrote, as :meth:`Trajectory.from_samples` takes them.
+    """Read samples that another program wrote; see :meth:`Trajectory.from_samples`.
 
     Parameters
     ----------
@@ -188,11 +189,11 @@ def read_samples(
         ``t``, ``time`` or ``tout``, and either vectors of the same names as columns or a matrix ``q``, shape (N, n),
         with ``qd`` and ``qdd`` if they are there; a matrix of n+1 columns has the times in its first.
     description
-        The robot that moves so.
+        The robot.
     degrees
         Whether angles are in degrees.
     columns
-        What the file calls its columns or variables, by our names: ``t``, ``q1``, ``qd1``, ``qdd1`` and so on, a
+        The file's names of columns or variables, by our names: ``t``, ``q1``, ``qd1``, ``qdd1`` and so on, a
         joint's name for its values, and in a ``.mat`` ``q``, ``qd`` and ``qdd`` for matrices. Others keep their names.
 
     Raises
@@ -221,42 +222,42 @@ def read_samples(
 
 
 @dataclass(frozen=True, eq=False)
-class _Read:
-    """Samples of a file."""
+class _FileSamples:
+    """Samples of a file, with payload and friction."""
 
     times: Array
-    """Shape (N,), s."""
+    """Times, shape (N,), s."""
     arrays: list[Array]
-    """One to three, shape (N, n): values, rates, accelerations."""
-    beside: Mapping[str, Any] = field(default_factory=dict)
+    """One to three arrays, shape (N, n): values, rates, accelerations."""
+    load: Mapping[str, Any] = field(default_factory=dict)
     """Payload and friction."""
 
-    def in_radians(self, description: Description) -> _Read:
+    def in_radians(self, description: Description) -> _FileSamples:
         unit = np.where(description.numbers.prismatic, 1.0, np.pi / 180)
         return replace(self, arrays=[array * unit for array in self.arrays])
 
     def trajectory(self, description: Description) -> Trajectory:
-        return replace(Trajectory.from_samples(description, self.times, *self.arrays), **self.beside)
+        return replace(Trajectory.from_samples(description, self.times, *self.arrays), **self.load)
 
 
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
     robot = TRAJECTORY.robot_of_archive(values, description)
     breaks, coefficients = values["breaks"], values["coefficients"]
-    if coefficients.ndim > 1 and coefficients.shape[1] > MOST_COEFFICIENTS:
+    if coefficients.ndim > 1 and coefficients.shape[1] > MAX_COEFFICIENTS:
         found = f"polynomials of degree {coefficients.shape[1] - 1}"
-        raise ValueError(f"{found}; expected at most {MOST_COEFFICIENTS - 1}")
+        raise ValueError(f"{found}; expected at most {MAX_COEFFICIENTS - 1}")
     if robot.n == 1 and coefficients.ndim == 2:
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
         breaks = breaks.ravel()
-    motion = Trajectory(robot, breaks, coefficients, **_carried(values))
+    motion = Trajectory(robot, breaks, coefficients, **_load(values))
     _require_continuous(motion)
     TRAJECTORY.require_whole(values)
     return motion
 
 
-def _beside(motion: Trajectory) -> dict[str, Array]:
-    """Return what a motion has beside its robot, as numbers: payload (10,), and friction's width (1,)."""
+def _load_numbers(motion: Trajectory) -> dict[str, Array]:
+    """Return a motion's payload, shape (10,), and width of friction, shape (1,), by name."""
     found = {}
     if motion.payload is not None:
         found["payload"] = motion.payload.numbers
@@ -265,13 +266,13 @@ def _beside(motion: Trajectory) -> dict[str, Array]:
     return found
 
 
-def _carried(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return payload and friction of the numbers of :func:`_beside`.
+def _load(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return payload and friction from the numbers of :func:`_load_numbers`.
 
     Raises
     ------
     DescriptionError, ValueError
-        Other numbers.
+        The numbers are no payload or no friction.
     """
     found: dict[str, Any] = {}
     if "payload" in values:
@@ -285,7 +286,7 @@ def _carried(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _commented(text: str) -> dict[str, Array]:
-    """Return the numbers of :func:`_beside` that a table's comments name."""
+    """Return the numbers of :func:`_load_numbers` that a table's comments name."""
     found: dict[str, Array] = {}
     for name, numbers in BESIDE.findall(text[:COMMENTS_LENGTH]):
         if name in found:
@@ -298,12 +299,12 @@ def _commented(text: str) -> dict[str, Array]:
 
 
 def _require_continuous(motion: Trajectory) -> None:
-    """Refuse a motion whose joint values or speeds jump between its pieces: no arm can follow it.
+    """Check that joint values and speeds of a motion do not jump between its pieces, so that an arm can follow it.
 
     Raises
     ------
     DescriptionError
-        It jumps; names joint and time.
+        A value jumps; names joint and time.
     """
     inner = motion.breaks[1:-1]
     for what, values in (("value", motion.q), ("speed", motion.qd)):
@@ -312,7 +313,7 @@ def _require_continuous(motion: Trajectory) -> None:
             return
         jumps = np.abs(after - before) / (1 + np.abs(before))
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
-        if jumps[k, i] > JUMP:
+        if jumps[k, i] > MAX_JUMP:
             jump = f"jumps from {before[k, i]:.6g} to {after[k, i]:.6g} at {inner[k]:.6g} s"
             raise DescriptionError(f"joint {i + 1}: its {what} {jump}; the file is damaged")
 
@@ -325,30 +326,30 @@ def _csv(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str
 
 
 def _yaml(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
-    nanoseconds = [round(time * SECOND) for time in times.tolist()]
+    nanoseconds = [round(time * NANOSECONDS) for time in times.tolist()]
     kept = [k for k, time in enumerate(nanoseconds) if not k or time > nanoseconds[k - 1]]
     nanoseconds = [nanoseconds[k] for k in kept]
-    t = np.minimum(np.array(nanoseconds) / SECOND, trajectory.duration)
+    t = np.minimum(np.array(nanoseconds) / NANOSECONDS, trajectory.duration)
     names = tuple(joint.name for joint in trajectory.description.joints)
     return trajectory_text(names, nanoseconds, trajectory.q(t), trajectory.qd(t), trajectory.qdd(t), comments)
 
 
-def _samples(suffix: str, content: bytes, description: Description, columns: Mapping[str, str]) -> _Read:
-    """Return the samples of a file from elsewhere; a table of dhkit's own has to be one of the robot."""
+def _samples(suffix: str, content: bytes, description: Description, columns: Mapping[str, str]) -> _FileSamples:
+    """Return the samples of a file of another program; a table that dhkit wrote must be of this robot."""
     if suffix == ".mat":
         table = matlab_table(description, content, TRAJECTORY.most, columns)
-        return _Read(*select_columns(description, table))
+        return _FileSamples(*select_columns(description, table))
     text = decoded(content)
     if text.startswith(f"# {TRAJECTORY.title}"):
         TRAJECTORY.robot_of_table(text, description)
     return _table_samples(text, description, columns) if suffix == ".csv" else _message_samples(text, description)
 
 
-def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _Read:
-    return _Read(*select_columns(description, read_table(text), columns), _carried(_commented(text)))
+def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _FileSamples:
+    return _FileSamples(*select_columns(description, read_table(text), columns), _load(_commented(text)))
 
 
-def _message_samples(text: str, description: Description) -> _Read:
+def _message_samples(text: str, description: Description) -> _FileSamples:
     message = parse_message(text)
     if unknown := next((key for key in message if key not in MESSAGE), None):
         raise DescriptionError(f"unknown key {unknown[:40]!r}; expected {', '.join(MESSAGE)}")
@@ -374,7 +375,7 @@ def _message_samples(text: str, description: Description) -> _Read:
             raise DescriptionError(f"points[{k}]: expected positions, and velocities and accelerations as in points[0]")
     arrays = np.array(columns)[:, :, order]
     listed = [arrays[:, i] for i in range(arrays.shape[1])]
-    return _Read(np.array(times), listed, _carried(_commented(text)))
+    return _FileSamples(np.array(times), listed, _load(_commented(text)))
 
 
 def _seconds(value: Any, k: int) -> float:
@@ -382,13 +383,13 @@ def _seconds(value: Any, k: int) -> float:
     if isinstance(value, dict):
         for whole, part in TIMES:
             if whole in value and part in value:
-                # Seconds and a fraction that is rounded once, so that what was written in ns comes back.
-                return (_whole(value[whole], k) * SECOND + _whole(value[part], k)) / SECOND
+                # Added as integers and rounded once, so that whole nanoseconds come back unchanged.
+                return (_whole(value[whole], k) * NANOSECONDS + _whole(value[part], k)) / NANOSECONDS
     raise DescriptionError(f"points[{k}].time_from_start: expected sec and nanosec")
 
 
 def _whole(text: Any, k: int) -> int:
-    if not isinstance(text, str) or len(text) > MOST_DIGITS or not text.isascii() or not text.isdigit():
+    if not isinstance(text, str) or len(text) > MAX_DIGITS or not text.isascii() or not text.isdigit():
         raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
     return int(text)
 

@@ -1,4 +1,4 @@
-"""From a path of the tool to one of the joints: followed step by step, and refined until the tool keeps to it."""
+"""Joint paths for paths of the tool: followed step by step, then refined until the tool stays on its path."""
 
 from __future__ import annotations
 
@@ -20,61 +20,60 @@ from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.tool_paths import ToolPath
 
-ACCURATE = 5e-8
-"""m and rad: how far the tool may be off the path between knots, half of what is promised."""
-CHECKS = 9
-"""Places between two knots at which that is checked."""
-CLOSES = 1e-12
-"""What may be missing at a knot, rad and shares of the reach; rounding leaves 1e-15."""
+MAX_DEVIATION = 5e-8
+"""Largest deviation of the tool from its path between knots, m and rad: half of what :func:`joint_path` promises."""
+CHECKED_POINTS = 9
+"""Number of points between two knots at which the deviation is checked."""
+KNOT_ERROR = 1e-12
+"""Largest error at a knot, rad and shares of the reach; rounding leaves 1e-15."""
 NEWTON_STEPS, DAMPING = 8, 1e-13
-FIRST_STEP, SHORTEST_STEP = 1 / 16, 1e-9
-"""Of the path, when it is first followed."""
-TAME = 0.25
-"""How much of a step may be its second order, or an error: beside a singularity another branch is near, but no nearer
-than that makes it."""
-FARTHEST = 0.02
-"""rad and shares of the reach: how far Newton's method may lead from where a knot was expected."""
+FIRST_STEP, MIN_STEP = 1 / 16, 1e-9
+"""First and smallest step of s along the path."""
+MAX_SECOND_ORDER = 0.25
+"""Largest share of a step's second-order part, or of its error, in the step: near a singularity, where another branch
+is close, this share grows, and steps become short enough to stay on the branch."""
+MAX_CORRECTION = 0.02
+"""Largest distance of a knot from its prediction, rad and shares of the reach."""
 SINGULAR = 1e-6
-"""A singular value of the Jacobian, lengths over the reach, below which a direction counts as lost."""
+"""A direction counts as lost where its singular value of the Jacobian, lengths over the reach, is below this."""
 NEAR_SINGULAR = 0.05
-"""A singular value below which a singularity is what a followed path has come to."""
-BEYOND = np.array([0.0, 0.01, 0.03])
-"""Of the path: where it is looked for what lies beyond a place that cannot be passed."""
-WHOLE = 6
-"""Coordinates of a pose."""
+"""A path that cannot be followed further has met a singularity if a singular value is below this."""
+LOOK_AHEAD = np.array([0.0, 0.01, 0.03])
+"""Distances of s ahead of a point that cannot be passed at which reachability is tested, to name the cause."""
+POSE_COORDINATES = 6
 MOST_KNOTS = 4097
-OUTSIDE = 1e-9
-"""rad and m: how far rounding may lead out of the joint limits."""
+LIMIT_SLACK = 1e-9
+"""Distance by which rounding may exceed joint limits, rad and m."""
 
 
 @takes_robot
 def joint_path(
     description: Description, tool: ToolPath, q0: ArrayLike | None = None, limits: Limits | None = None
 ) -> JointPath:
-    """Return the joints' path that leads the tool along a path: on it to 1e-7 m and 1e-7 rad everywhere.
+    """Return the joint path along which the tool follows a path, everywhere within 1e-7 m and 1e-7 rad.
 
-    From its beginning the path is followed by Newton's method, in steps short enough that no branch is changed. At
-    knots q, q' = J^-1 v and q'' = J^-1 (v' - J' q') are exact, and a quintic goes between; knots are added where the
-    tool leaves its path. A redundant arm moves by the least norm of joint rates, q' = J^+ v. Arms whose tool turns
-    only as its position asks for (planar2r, say) follow the positions alone.
+    Newton's method follows the path from its beginning in steps short enough to stay on one branch. At knots q,
+    q' = J^-1 v and q'' = J^-1 (v' - J' q') are exact, with quintic polynomials between them; knots are added where the
+    tool leaves its path. A redundant arm moves with the least norm of joint rates, q' = J^+ v. Arms whose orientation
+    is determined by the position (planar2r, say) follow the positions alone.
 
     Parameters
     ----------
     description
-        The robot: any joints, with or without closed form.
+        The robot, with any joints, with or without closed form.
     tool
-        Of :func:`tool_line` or :func:`tool_circle`, or what has their methods.
+        The path: :func:`tool_line`, :func:`tool_circle`, or an object with their methods.
     q0
-        Near which joint values the path begins, shape (n,), rad and m. If not given, the branches that reach the
-        first pose are tried in turn.
+        Joint values near which the path begins, shape (n,), rad and m. If not given, the branches that reach the first
+        pose are tried in turn.
     limits
-        Whose joint limits are kept; the robot's own if not given.
+        Limits whose joint ranges are kept; the robot's own if not given.
 
     Raises
     ------
     PlanningError
         The first pose is not reached, or the path leaves the workspace, meets a singularity or the end of its branch,
-        or leaves the joint limits: says where.
+        or leaves the joint limits; says where.
     ValueError
         q0 has another shape.
     """
@@ -99,7 +98,7 @@ class _Follower:
     tool: ToolPath
     newton: Newton
     rank: int
-    """How many independent coordinates of the pose the arm moves."""
+    """Number of independent coordinates of the pose that the arm moves."""
 
     @classmethod
     def of(cls, description: Description, tool: ToolPath) -> _Follower:
@@ -109,11 +108,11 @@ class _Follower:
 
     def path(self, start: Array) -> JointPath:
         """Return the path from joint values at its beginning, shape (n,)."""
-        s, q = self._crept(start)
+        s, q = self._follow(start)
         while True:
             qs, qss = self.derivatives(s, q)
             pieces = Pieces(s, quintic_hermite(s, q, qs, qss))
-            wrong = np.flatnonzero(self._misses(pieces) > ACCURATE)
+            wrong = np.flatnonzero(self._deviations(pieces) > MAX_DEVIATION)
             if not len(wrong):
                 return JointPath(self.newton.description, s, pieces.coefficients)
             if len(s) + len(wrong) > MOST_KNOTS:
@@ -149,7 +148,7 @@ class _Follower:
 
     @property
     def _rows(self) -> Array:
-        """What coordinates of a pose are multiplied by, shape (size, 1): metres are measured by the reach."""
+        """Factors of the coordinates of a pose, shape (size, 1): 1 / reach for positions, 1 for rotations."""
         return np.repeat([1 / self.newton.length, 1.0], 3)[: self.newton.size, None]
 
     def _jacobian(self, q: Array) -> Array:
@@ -158,22 +157,22 @@ class _Follower:
         return J
 
     def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return joint values that meet the path, from near ones (N, n), and which do without having jumped."""
+        """Return joint values on the path, (N, n), from nearby ones q, and whether each was reached without a jump."""
         goals = self.tool.poses(s).reshape(-1, 16)
         found, damping = np.ascontiguousarray(q), np.full(len(s), DAMPING)
         error = self.newton.error(found, goals)
         for _ in range(NEWTON_STEPS):
             step = self.newton.step(found, error, damping)
             step_error = self.newton.error(step, goals)
-            # The last step is the one that rounding makes no better.
+            # Stop when rounding prevents a further improvement.
             better = np.linalg.norm(step_error, axis=1) < np.linalg.norm(error, axis=1)
             if not better.any():
                 break
             found, error = np.where(better[:, None], step, found), np.where(better[:, None], step_error, error)
         moved = np.abs((found - q) / self.newton.units).max(axis=1)
-        return found, (np.abs(error).max(axis=1) < CLOSES) & (moved < FARTHEST)
+        return found, (np.abs(error).max(axis=1) < KNOT_ERROR) & (moved < MAX_CORRECTION)
 
-    def _crept(self, start: Array) -> tuple[Array, Array]:
+    def _follow(self, start: Array) -> tuple[Array, Array]:
         """Return knots (K,) and joint values (K, n), followed from the beginning to the end."""
         s, q, step = [0.0], [start], FIRST_STEP
         while s[-1] < 1.0:
@@ -182,24 +181,27 @@ class _Follower:
             there = min(s[-1] + step, 1.0)
             h = there - s[-1]
             first, second = (h * qs)[0], (h**2 / 2 * qss)[0]
-            if self._largest(second) <= TAME * self._largest(first):
+            if self._largest(second) <= MAX_SECOND_ORDER * self._largest(first):
                 expected = at + first + second
                 found, closed = self.closed(np.array([there]), expected)
-                if closed[0] and self._largest(found - expected) <= TAME * self._largest(first) + CLOSES:
+                if (
+                    closed[0]
+                    and self._largest(found - expected) <= MAX_SECOND_ORDER * self._largest(first) + KNOT_ERROR
+                ):
                     s, q, step = [*s, there], [*q, found[0]], min(2 * step, FIRST_STEP)
                     continue
             step = h / 2
-            if step < SHORTEST_STEP:
+            if step < MIN_STEP:
                 raise self._lost(there, q[-1])
         return np.array(s), np.array(q)
 
     def _largest(self, moves: Array) -> float:
-        """Return the largest joint's move, rad or shares of the reach."""
+        """Return the largest motion of a joint, rad or shares of the reach."""
         return float(np.abs(moves / self.newton.units).max())
 
-    def _misses(self, pieces: Pieces) -> Array:
-        """Return how far the tool is off the path in each interval, m or rad, shape (K,)."""
-        shares = np.arange(1, CHECKS + 1) / (CHECKS + 1)
+    def _deviations(self, pieces: Pieces) -> Array:
+        """Return the largest deviation of the tool from its path in each interval, m or rad, shape (K,)."""
+        shares = np.arange(1, CHECKED_POINTS + 1) / (CHECKED_POINTS + 1)
         s = pieces.breaks[:-1, None] + np.diff(pieces.breaks)[:, None] * shares
         q = pieces.at(s - pieces.breaks[:-1, None]).reshape(-1, self.newton.description.n)
         error = self.newton.error(q, self.tool.poses(s.ravel()).reshape(-1, 16))
@@ -208,21 +210,21 @@ class _Follower:
         return np.asarray(norms.reshape(s.shape).max(axis=1))
 
     def _lost(self, s: float, q: Array) -> PlanningError:
-        """Say why the path does not go on from joint values near s."""
+        """Return the error that explains why the path ends at joint values near s."""
         position_only = self.newton.size == 3
         if self._reached(s, q, position_only=position_only):
             near = np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1] < NEAR_SINGULAR
             met = "the path meets a singularity" if near else "the branch of joint values ends"
             why = f"{met}, and only a jump leads on,"
-        elif not position_only and self.rank < WHOLE and self._reached(s, q, position_only=True):
+        elif not position_only and self.rank < POSE_COORDINATES and self._reached(s, q, position_only=True):
             why = "the arm cannot turn its tool as the path asks"
         else:
             why = "the path leaves the workspace"
         return PlanningError(f"{why} {self._where(s, q)}")
 
     def _reached(self, s: float, q: Array, *, position_only: bool) -> bool:
-        """Return whether the path stays within reach from s on, as far as a few poses tell."""
-        T = self.tool.poses(np.minimum(s + BEYOND, 1.0))
+        """Return whether a few poses ahead of s are within reach."""
+        T = self.tool.poses(np.minimum(s + LOOK_AHEAD, 1.0))
         found = solve_numerically(self.newton.description, T, q, position_only=position_only, limits=False)
         return bool(found.valid.all())
 
@@ -231,13 +233,13 @@ class _Follower:
 
 
 def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> Iterator[Array]:
-    """Yield joint values at the path's beginning: that near q0, or those of all branches, the middle ones first."""
+    """Yield joint values for the path's beginning: nearest to q0, or of all branches, nearest to the middle first."""
     T = tool.poses(np.array([0.0]))[0]
     position_only = _aims_position(description)
     if q0 is not None:
         near = configuration(description, q0, "q0")
         found = solve_numerically(description, T, near, position_only=position_only, restarts=0, limits=False)
-        yield from _wound(found.q[found.valid], near, description)
+        yield from _wind_near(found.q[found.valid], near, description)
         if found.valid.any():
             return
     fit = classify(description).fit
@@ -245,14 +247,14 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
         solutions = inverse_kinematics(description, T)
         near = configuration(description, q0, "q0") if q0 is not None else _middle(description)
         usable = solutions.q[solutions.allowed if q0 is None else solutions.valid]
-        yield from sorted(_wound(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
+        yield from sorted(_wind_near(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
         return
     found = solve_numerically(description, T, q0, position_only=position_only)
     yield from found.q[found.valid]
 
 
-def _wound(q: Array, near: Array, description: Description) -> list[Array]:
-    """Return joint values (N, n) with whole turns added that bring them nearest."""
+def _wind_near(q: Array, near: Array, description: Description) -> list[Array]:
+    """Return joint values (N, n) with the whole turns added that bring them nearest to ``near``."""
     turns = np.where(description.numbers.prismatic, 0.0, 2 * np.pi * np.rint((near - q) / (2 * np.pi)))
     return list(q + turns)
 
@@ -262,15 +264,15 @@ def _middle(description: Description) -> Array:
 
 
 def _aims_position(description: Description) -> bool:
-    """Return whether the arm turns its tool only as the position asks for."""
+    """Return whether the tool's position determines its orientation."""
     return freedoms(description, "translational") == freedoms(description, "whole")
 
 
 def _require_inside(path: JointPath, limits: Limits) -> None:
-    s, q = path.pieces.turning()
+    s, q = path.pieces.extremes()
     s, q = s.reshape(-1, q.shape[-1]), q.reshape(-1, q.shape[-1])
     excess = np.maximum(limits.lower - q, q - limits.upper)
-    if excess.max() <= OUTSIDE:
+    if excess.max() <= LIMIT_SLACK:
         return
     i = int(np.argmax(excess.max(axis=0)))
     row = int(np.argmax(excess[:, i]))

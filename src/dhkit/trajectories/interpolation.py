@@ -1,4 +1,4 @@
-"""Polynomials through samples: a spline, or those that meet values and derivatives at both ends of each interval."""
+"""Polynomials through samples: a spline, or Hermite polynomials from values and derivatives."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def cubic_hermite(times: Array, q: Array, qd: Array) -> Array:
     times
         Shape (K+1,), increasing.
     q, qd
-        Values and derivatives there, shape (K+1, m).
+        Values and derivatives at these times, shape (K+1, m).
     """
     h = np.diff(times)[:, None]
     slope = np.diff(q, axis=0) / h
@@ -78,9 +78,9 @@ def cubic_hermite(times: Array, q: Array, qd: Array) -> Array:
 
 
 def quintic_hermite(times: Array, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return coefficients (K, 6, m), as :func:`cubic_hermite`, that meet second derivatives too."""
+    """Return coefficients (K, 6, m) as :func:`cubic_hermite`, from second derivatives too."""
     h = np.diff(times)[:, None]
-    # What the parabola of the beginning lacks at the end, in units of the interval.
+    # Differences at the end from the parabola at the beginning, in units of the interval.
     gap = np.diff(q, axis=0) - h * qd[:-1] - h**2 * qdd[:-1] / 2
     rate = h * (qd[1:] - qd[:-1] - h * qdd[:-1])
     bend = h**2 * (qdd[1:] - qdd[:-1])

@@ -1,4 +1,4 @@
-"""What a file of dhkit says about itself, in an archive's texts or a table's first comments: kind, robot and digest."""
+"""Labels of the files that dhkit writes: kind, robot and digest, in an archive's texts or a table's first comments."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from dhkit.errors import DescriptionError
 
 TEXTS = ("format", "robot", "digest", "toml", "content")
 """Names of an archive's texts: its kind and version, the robot's name, digest and whole file, the arrays' digest."""
-DIGITS = 16
-"""Of a digest of content: enough against damage and changes by hand, which is all that it is for."""
+DIGEST_DIGITS = 16
+"""Length of digests of content; they detect damage and changes by hand, not forgery."""
 CONTENT = "# content: "
-"""What a table's third line begins with."""
+"""Beginning of a table's third line."""
 LABEL_LENGTH = 1000
-"""Characters in which a table's first two lines are searched."""
+"""Number of characters that hold a table's first two lines."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,15 @@ class FileKind:
     """A kind of file that dhkit writes for one robot."""
 
     noun: str
-    """What the file holds, in messages, such as ``trajectory``."""
+    """Name of the content in messages, such as ``trajectory``."""
     arrays: tuple[str, ...]
     """Names of an archive's arrays of numbers."""
     most: int
-    """Bytes that are read of a file, and that its content may take unpacked."""
+    """Largest size of a file, and of its unpacked content, bytes."""
     optional: tuple[str, ...] = ()
-    """Names of arrays that an archive may have too."""
+    """Names of further arrays that an archive may have."""
     otherwise: str = ""
-    """What reads a table that does not name its robot, for messages."""
+    """For messages: how to read a table that does not name its robot."""
 
     @property
     def title(self) -> str:
@@ -64,7 +64,7 @@ class FileKind:
         return suffix, read_bounded(path, self.most, f"a {self.noun}")
 
     def archived(self, description: Description, arrays: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what an archive holds: the robot as texts, and arrays by name."""
+        """Return the content of an archive: the robot as texts, and arrays by name."""
         texts = (
             self.version,
             description.name,
@@ -75,7 +75,7 @@ class FileKind:
         return dict(zip(TEXTS, texts, strict=True)) | dict(arrays)
 
     def require_whole(self, values: Mapping[str, Any]) -> None:
-        """Refuse an archive whose arrays are not those that were written.
+        """Check that an archive's arrays are unchanged since dhkit wrote them.
 
         Raises
         ------
@@ -92,10 +92,10 @@ class FileKind:
             if name in arrays:
                 numbers = np.ascontiguousarray(arrays[name], dtype="<f8")
                 found.update(f"{name} {numbers.size}\n".encode() + numbers.tobytes())
-        return found.hexdigest()[:DIGITS]
+        return found.hexdigest()[:DIGEST_DIGITS]
 
     def robot_of_archive(self, values: Mapping[str, Any], description: Description | None) -> Description:
-        """Return the robot of an archive: the one given, the library's where it is equal, or the archive's own.
+        """Return the robot of an archive: the one given, the library's if it is equal, or the archive's own.
 
         Raises
         ------
@@ -109,16 +109,16 @@ class FileKind:
             raise DescriptionError(f"its robot is not the {values['robot'][:40]!r} that it names; the file is damaged")
         if description is not None:
             return self._same_robot(own.name, own.digest, description)
-        # The library's robot knows where its meshes are.
+        # The library's robot has the folder of its meshes.
         return library_robot(own.name) if _in_library(own.name, own.digest) else own
 
     def labelled(self, description: Description, text: str) -> str:
-        """Return a table behind the comments that say what it is: kind, robot, digest of robot and lines."""
+        """Return a table behind its label: comments with kind, robot, and digest of robot and lines."""
         robot = f"# robot: {description.name} {description.digest}"
         return f"# {self.title}\n{robot}\n{CONTENT}{_digest_of_lines([robot, *text.splitlines()])}\n{text}"
 
     def require_unchanged(self, text: str) -> None:
-        """Refuse a table whose lines are not those that were written.
+        """Check that a table's lines are unchanged since dhkit wrote them.
 
         Raises
         ------
@@ -163,12 +163,12 @@ class FileKind:
 
 
 def checked_suffix(path: Path, known: tuple[str, ...]) -> str:
-    """Return a path's suffix in small letters.
+    """Return a path's suffix in lower case.
 
     Raises
     ------
     ValueError
-        None of the known ones.
+        The suffix is none of ``known``.
     """
     suffix = path.suffix.lower()
     if suffix not in known:
@@ -182,7 +182,7 @@ def decoded(content: bytes) -> str:
     Raises
     ------
     DescriptionError
-        Not UTF-8; names the byte.
+        The file is not UTF-8; names the byte.
     """
     try:
         return content.decode("utf-8-sig")
@@ -191,8 +191,8 @@ def decoded(content: bytes) -> str:
 
 
 def _digest_of_lines(lines: Sequence[str]) -> str:
-    # Line by line: mail and version control change how lines end.
-    return hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()[:DIGITS]
+    # Independent of line ends, which mail and version control change.
+    return hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()[:DIGEST_DIGITS]
 
 
 def _in_library(name: str, digest: str) -> bool:

@@ -1,4 +1,4 @@
-"""What an arm's joints may do: limits of position, velocity, acceleration, jerk and torque."""
+"""Limits of joint position, velocity, acceleration, jerk and torque."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class Limits:
     """
 
     lower: Array
-    """rad or m."""
+    """Lowest joint values, rad or m; ``upper`` likewise."""
     upper: Array
     velocity: Array
-    """Of absolute values, rad/s or m/s."""
+    """Largest absolute velocities, rad/s or m/s."""
     acceleration: Array
-    """rad/s^2 or m/s^2."""
+    """Largest absolute accelerations, rad/s^2 or m/s^2."""
     jerk: Array
-    """rad/s^3 or m/s^3."""
+    """Largest absolute jerks, rad/s^3 or m/s^3."""
     torque: Array
-    """N m or N."""
+    """Largest absolute torques or forces, N m or N."""
 
     def __post_init__(self) -> None:
         n = np.size(self.lower)
@@ -56,7 +56,7 @@ class Limits:
 
     @property
     def unlimited(self) -> tuple[str, ...]:
-        """What is not limited: ``acceleration`` if it is of no joint, ``torque of joint 2`` if not of that one."""
+        """Quantities without limit: ``acceleration`` if no joint has one, else such as ``torque of joint 2``."""
         found = []
         for name in ("velocity", "acceleration", "jerk", "torque"):
             free = np.flatnonzero(np.isinf(getattr(self, name)))
@@ -119,7 +119,7 @@ class Limits:
     def scaled(
         self, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
     ) -> Limits:
-        """Return shares of the limits; those of position stay.
+        """Return the limits times factors; those of position stay.
 
         Raises
         ------
@@ -146,10 +146,10 @@ class Limits:
     def _repr_html_(self) -> str:
         names = [item.name for item in fields(self)]
         columns = [getattr(self, name) for name in names]
-        rows = [(str(i), *map(_told, row)) for i, row in enumerate(zip(*columns, strict=True), start=1)]
+        rows = [(str(i), *map(_limit_text, row)) for i, row in enumerate(zip(*columns, strict=True), start=1)]
         caption = "Limits: rad or m, over s, s² and s³; torques N m or N"
         return html_table(("joint", *names), rows, caption, align="r")
 
 
-def _told(limit: float) -> str:
+def _limit_text(limit: float) -> str:
     return f"{limit:.4g}" if np.isfinite(limit) else "unlimited"

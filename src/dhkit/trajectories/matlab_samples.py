@@ -1,4 +1,4 @@
-"""Samples of a motion out of a .mat file of plain arrays, as MATLAB and Simulink users save them."""
+"""Samples of a motion from a .mat file of plain arrays, as MATLAB and Simulink users save them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dhkit.errors import DescriptionError
 from dhkit.trajectories.tables import PREFIXES, TIMES, Table, joint_columns, place_of_name
 
 ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
-"""How to save in MATLAB what is not read."""
+"""Advice for variables that are not read."""
 MATRICES = tuple(prefixes[0] for prefixes in PREFIXES)
 """Our names of matrices with a column for each joint: values, rates, accelerations."""
 
@@ -29,9 +29,9 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
         ``q1`` ... or of the joints' names, and rates and accelerations likewise. A matrix of n+1 columns has the times
         in its first. Variables of other names are left out.
     most
-        Bytes that may be unpacked.
+        Largest size of the unpacked variables, bytes.
     columns
-        For our names those of the file.
+        The file's names by our names.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def _chosen(
 ) -> dict[str, MatVariable]:
     """Return variables by our names: times first, then matrices, then the joints' vectors that no matrix has.
 
-    Capitals count as small letters but in the names of matrices: beside q, Q is often a weight.
+    Case is ignored except in names of matrices: beside q, Q is often a weight.
     """
     lower = {name.lower(): name for name in variables} | {name: name for name in variables}
     candidates: dict[str, list[str]] = {"t": list(TIMES)}

@@ -1,4 +1,4 @@
-"""Joint paths: where an arm goes, without when; and their exact composition with a time law."""
+"""Joint paths without timing, and their exact composition with a time law."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, description_of
 from dhkit.display import counted, repr_line
-from dhkit.trajectories.pieces import Pieces, shifted
+from dhkit.trajectories.pieces import Pieces, shift
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
 
 BISECTIONS = 60
-"""Halve an interval down to rounding."""
-CLOSE = 1e-12
-"""Of the duration: breaks nearer to each other than this are one."""
-OUTSIDE = 1e-9
-"""How far a time law may leave [0, 1], or go back: rounding."""
+"""Number of bisections that reduce an interval to rounding."""
+SAME_BREAK = 1e-12
+"""Breaks closer to each other than this share of the duration are merged."""
+LAW_SLACK = 1e-9
+"""Distance by which rounding may take a time law out of [0, 1], or back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +89,12 @@ class JointPath:
         return self.pieces.derivative.derivative(s)
 
     def timed(self, breaks: ArrayLike, coefficients: ArrayLike) -> Trajectory:
-        """Return the motion q(s(t)), exactly: degrees multiply, and breaks of both are breaks.
+        """Return the motion q(s(t)) exactly: degrees multiply, and the breaks of both are breaks of the motion.
 
         Parameters
         ----------
         breaks
-            Of s(t), shape (K+1,), s, from 0, increasing.
+            Breaks of s(t), shape (K+1,), s, from 0, increasing.
         coefficients
             Shape (K, p+1), ascending powers from each break: s(t) goes from 0 to 1 and never back.
 
@@ -113,18 +113,18 @@ class JointPath:
         merged = self._merged_breaks(law)
         starts, middles = merged[:-1], (merged[:-1] + merged[1:]) / 2
         k = np.searchsorted(law.breaks, middles) - 1
-        inner = shifted(law.coefficients[k], starts - law.breaks[k])[..., 0]
+        inner = shift(law.coefficients[k], starts - law.breaks[k])[..., 0]
         m = np.clip(np.searchsorted(self.breaks, law(middles)[..., 0]) - 1, 0, len(self.breaks) - 2)
-        outer = shifted(self.coefficients[m], inner[:, 0] - self.breaks[m])
-        inner[:, 0] = 0.0  # the path is expanded about where s is at each start
-        return Trajectory(self.description, merged, _composed(outer, inner))
+        outer = shift(self.coefficients[m], inner[:, 0] - self.breaks[m])
+        inner[:, 0] = 0.0  # the path is expanded about the value of s at the beginning of each piece
+        return Trajectory(self.description, merged, _compose(outer, inner))
 
     def __repr__(self) -> str:
         pieces, powers = self.coefficients.shape[:2]
         return repr_line("JointPath", self.description.name, f"{counted(pieces, 'piece')} of degree {powers - 1}")
 
     def _merged_breaks(self, law: Pieces) -> Array:
-        """Return the law's breaks, and the times at which s passes the path's."""
+        """Return the law's breaks together with the times at which s passes breaks of the path."""
         low, high = np.zeros(len(self.breaks) - 2), np.full(len(self.breaks) - 2, law.end)
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
@@ -132,7 +132,7 @@ class JointPath:
             low, high = np.where(below, middle, low), np.where(below, high, middle)
         crossings = (low + high) / 2
         gaps = np.abs(crossings[:, None] - law.breaks).min(axis=1, initial=np.inf)
-        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > CLOSE * law.end]]))
+        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > SAME_BREAK * law.end]]))
         distinct: Array = merged[np.concatenate([[True], np.diff(merged) > 0])]
         return distinct
 
@@ -144,19 +144,19 @@ def quintic_law() -> tuple[Array, Array]:
 
 def _check_law(law: Pieces) -> None:
     start, end = float(law(0.0)[0]), float(law(law.end)[0])
-    if max(abs(start), abs(end - 1.0)) > OUTSIDE:
+    if max(abs(start), abs(end - 1.0)) > LAW_SLACK:
         raise ValueError(f"s goes from {start:.9g} to {end:.9g}; expected from 0 to 1")
     inside = law.breaks[1:-1]
     jump = np.abs(law(inside) - law(inside, "left")).max(initial=0.0)
-    if jump > OUTSIDE:
+    if jump > LAW_SLACK:
         raise ValueError(f"s jumps by {jump:.3g} at a break; expected a continuous s(t)")
-    t, rate = law.derivative.turning()
+    t, rate = law.derivative.extremes()
     k = np.unravel_index(int(np.argmin(rate)), rate.shape)
-    if rate[k] * law.end < -OUTSIDE:
+    if rate[k] * law.end < -LAW_SLACK:
         raise ValueError(f"s goes back at {t[k]:.4g} s; expected an s(t) that never does")
 
 
-def _composed(outer: Array, inner: Array) -> Array:
+def _compose(outer: Array, inner: Array) -> Array:
     """Return the coefficients of outer(inner(u)), by Horner's rule, shape (K, p r + 1, n).
 
     Parameters

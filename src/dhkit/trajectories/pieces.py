@@ -1,4 +1,4 @@
-"""Piecewise polynomials in several columns: what trajectories, joint paths and time laws are made of."""
+"""Piecewise polynomials with several columns, for trajectories, joint paths and time laws."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from dhkit.description.arrays import number_array
 from dhkit.display import counted, repr_line
 
 Side: TypeAlias = Literal["right", "left"]
-"""Which piece counts at a break."""
+"""The piece that is evaluated at a break: the one that begins there (right) or ends there (left)."""
 REFINEMENTS = 6
-"""Newton steps to a turning point: from a twentieth of a piece away four reach rounding."""
+"""Number of Newton steps to an extreme; from a twentieth of a piece away, four reach rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Pieces:
 
     @classmethod
     def of(cls, breaks: ArrayLike, coefficients: ArrayLike, columns: int) -> Pieces:
-        """Check what a caller gave, and copy it.
+        """Return pieces from copies of checked arrays.
 
         Raises
         ------
@@ -76,7 +76,7 @@ class Pieces:
         return self.derivative.differentiated(order - 1) if order else self
 
     def __call__(self, x: ArrayLike, side: Side = "right") -> Array:
-        """Return values, shape (..., m), for x of shape (...); the first and last polynomial go on outside."""
+        """Return values, shape (..., m), for x of shape (...); outside, the first and last polynomials continue."""
         x = np.asarray(x, dtype=float)
         if side not in ("right", "left"):
             raise ValueError(f"side is {side!r}; expected 'right' or 'left'")
@@ -86,7 +86,7 @@ class Pieces:
         return values
 
     def on(self, piece: NDArray[np.intp], u: Array) -> Array:
-        """Return values, shape (..., m), at u behind the beginning of given pieces, shapes (...)."""
+        """Return values, shape (..., m), of given pieces at u after their beginnings, shapes (...)."""
         value: Array = self.coefficients[piece, -1] + 0.0 * u[..., None]
         for power in range(self.coefficients.shape[1] - 2, -1, -1):
             value = value * u[..., None] + self.coefficients[piece, power]
@@ -94,7 +94,7 @@ class Pieces:
 
     def backwards(self) -> Pieces:
         """Return f(end - x)."""
-        turned = shifted(self.coefficients, np.diff(self.breaks))[::-1]
+        turned = shift(self.coefficients, np.diff(self.breaks))[::-1]
         signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
         return Pieces(self.end - self.breaks[::-1], turned * signs)
 
@@ -105,15 +105,15 @@ class Pieces:
         return self.breaks[:-1, None] + u, self.at(u)
 
     def at(self, u: Array) -> Array:
-        """Return values, shape (K, P, m), at u (K, P) or (K, P, m) behind each piece's beginning."""
+        """Return values, shape (K, P, m), at u (K, P) or (K, P, m) after each piece's beginning."""
         u = u if u.ndim == 3 else u[..., None]
         value: Array = self.coefficients[:, None, -1] + 0.0 * u
         for power in range(self.coefficients.shape[1] - 2, -1, -1):
             value = value * u + self.coefficients[:, None, power]
         return value
 
-    def turning(self, points: int = 20) -> tuple[Array, Array]:
-        """Return where each column is extreme: places and values (K, P, m), among them each piece's ends.
+    def extremes(self, points: int = 20) -> tuple[Array, Array]:
+        """Return candidates for the extremes of each column: u and values (K, P, m), with each piece's ends.
 
         Local extremes are refined by Newton's method from evenly spread points; two in one cell may be missed.
         """
@@ -135,16 +135,16 @@ class Pieces:
         return repr_line("Pieces", said=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
 
 
-def joined(first: Pieces, second: Pieces) -> tuple[Array, Array]:
-    """Return breaks and coefficients of one function that goes on with another's pieces."""
+def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:
+    """Return breaks and coefficients of a function followed by another."""
     both = (first.coefficients, second.coefficients)
     degrees = max(c.shape[1] for c in both)
     padded = [np.pad(c, ((0, 0), (0, degrees - c.shape[1]), (0, 0))) for c in both]
     return np.concatenate([first.breaks, first.end + second.breaks[1:]]), np.concatenate(padded)
 
 
-def shifted(coefficients: Array, u: Array) -> Array:
-    """Return the polynomials (K, p+1, m) about another place: of x - u instead of x, u of shape (K,)."""
+def shift(coefficients: Array, u: Array) -> Array:
+    """Return the coefficients (K, p+1, m) of polynomials in x - u in place of x, u of shape (K,)."""
     degrees = coefficients.shape[1]
     matrix = np.zeros((len(coefficients), degrees, degrees))
     for i in range(degrees):

@@ -12,10 +12,10 @@ from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
 from dhkit.trajectories.timing import check_duration, configuration, default_limits, timed
 from dhkit.trajectories.trajectory import Trajectory
 
-LEAST_BLEND = 0.01
-"""Of the duration: shorter blends are not looked for, since accelerations grow without end."""
-GRID, ZOOMED, ZOOMS = 50, 15, 4
-"""Blends that are tried, then those between the best one's neighbours, so many times: to 2e-6 of the duration."""
+MIN_BLEND = 0.01
+"""Smallest share of the duration for a blend: accelerations grow without bound as it goes to 0."""
+GRID, FINER_GRID, REFINEMENTS = 50, 15, 4
+"""Number of blends tried first, then between the neighbours of the best one, and how often: to 2e-6 of the duration."""
 
 
 @takes_robot
@@ -40,7 +40,7 @@ def cubic(
     q0, q1
         Start and goal, shape (n,), rad and m.
     duration
-        In s; None for the shortest that the limits allow, from rest to rest.
+        Duration, s; None for the shortest from rest to rest that the limits allow.
     qd0, qd1
         Rates at both ends, shape (n,), rad/s and m/s; 0 if not given.
     limits
@@ -125,8 +125,8 @@ def trapezoidal(
     description, q0, q1, duration, limits, torques
         As for :func:`cubic`.
     blend
-        The share of the duration that accelerating takes, and braking again, in (0, 0.5]; None for the one that the
-        limits allow the shortest duration with.
+        Share of the duration for accelerating, and again for braking, in (0, 0.5]; None for the one with the shortest
+        duration that the limits allow.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def trapezoidal(
 
 
 def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
-    """Return the duration that a motion is first made for: another changes what rates and accelerations mean."""
+    """Return the duration for which the polynomial is made first; rates and accelerations need the final one."""
     check_duration(duration)
     if duration is None and any(np.any(np.asarray(end)) for end in ends if end is not None):
         raise ValueError("rates or accelerations at the ends are given, but no duration; expected a duration")
@@ -174,11 +174,11 @@ def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Tr
 
 
 def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
-    # The duration need not have one minimum alone in the blend: all are tried on a grid before one is refined.
-    low, high, count = LEAST_BLEND, 0.5, GRID
-    for _ in range(ZOOMS + 1):
+    # The duration may have several minima in the blend: a grid is searched before one is refined.
+    low, high, count = MIN_BLEND, 0.5, GRID
+    for _ in range(REFINEMENTS + 1):
         blends = np.linspace(low, high, count)
         motions = [_blended(description, q0, q1, float(blend)) for blend in blends]
         best = int(np.argmin(least_slowdowns(motions, limits, torques)))
-        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], ZOOMED
+        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], FINER_GRID
     return float(blends[best])

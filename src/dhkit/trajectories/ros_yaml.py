@@ -22,7 +22,7 @@ TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
 """Keys of a duration, whole seconds and nanoseconds: of ROS 2, which is written, and of ROS 1."""
 
 MAX_DEPTH = 12
-"""Lists and mappings inside one another."""
+"""Deepest nesting of lists and mappings."""
 PLAIN = re.compile(r"[A-Za-z][\w.-]*")
 NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
 """Plain scalars that YAML does not read as text."""
@@ -51,7 +51,7 @@ def parse_message(text: str) -> dict[str, Any]:
         raise _wrong(text, error.event.start_mark, error.expected) from None
     except yaml.MarkedYAMLError as error:
         problem = " ".join(filter(None, (error.context, error.problem)))
-        # A text in quotes that does not end is noticed at the end of the file: where it begins is more use.
+        # For a quoted text that does not end, the line where it begins is more useful than the end of the file.
         begin = error.context_mark if isinstance(error, yaml.scanner.ScannerError) else None
         raise _wrong(text, begin or error.problem_mark, f"YAML ({problem})") from None
     except yaml.YAMLError as error:
@@ -103,13 +103,13 @@ def trajectory_text(
     Parameters
     ----------
     names
-        Of n joints.
+        Names of the n joints.
     nanoseconds
-        N times from the start.
+        N times from the start, ns.
     q, qd, qdd
-        Shape (N, n).
+        Joint values, rates and accelerations, shape (N, n), rad, m and seconds.
     comments
-        Lines to begin with.
+        First lines of the file.
     """
     lines = [f"# {comment}" for comment in comments]
     lines += ["header:", "  stamp:", "    sec: 0", "    nanosec: 0", "  frame_id: ''", "joint_names:"]

@@ -1,4 +1,4 @@
-"""A motion at points in time: what is plotted, written into tables and compared."""
+"""A motion at points in time, for plots, tables and comparisons."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from dhkit.description import Array, Description, Payload
 from dhkit.display import counted, html_table, repr_line
 from dhkit.symbolic import Friction
 
-FIRST = 5
-"""Times that a notebook shows."""
+SHOWN_TIMES = 5
+"""Number of times that a notebook shows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Joint values, rates and accelerations at N times; where an acceleration jumps, the one from then on."""
+    """Joint values, rates and accelerations at N times; where an acceleration jumps, the later one."""
 
     description: Description
     times: Array
-    """Shape (N,), s."""
+    """Times, shape (N,), s."""
     q: Array
-    """Shape (N, n), rad and m."""
+    """Joint values, shape (N, n), rad and m."""
     qd: Array
-    """Shape (N, n), per second."""
+    """Joint rates, shape (N, n), rad/s and m/s."""
     qdd: Array
-    """Shape (N, n), per second squared."""
+    """Joint accelerations, shape (N, n), rad/s^2 and m/s^2."""
     payload: Payload | None = None
-    """What the tool carries."""
+    """The load that the tool carries; None: none."""
     friction: Friction | None = None
     """Friction that the torques overcome; None: none."""
 
@@ -52,7 +52,10 @@ class Samples:
         units = ["m" if slides else "rad" for slides in self.description.numbers.prismatic]
         joints = zip(self.description.joints, units, strict=True)
         headings = ("t [s]", *(f"{joint.name} [{unit}]" for joint, unit in joints))
-        rows = [(f"{t:.4g}", *(f"{x:.4f}" for x in q)) for t, q in zip(self.times[:FIRST], self.q[:FIRST], strict=True)]
+        rows = [
+            (f"{t:.4g}", *(f"{x:.4f}" for x in q))
+            for t, q in zip(self.times[:SHOWN_TIMES], self.q[:SHOWN_TIMES], strict=True)
+        ]
         caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
         return html_table(headings, rows, caption, align="r", count=len(self.times))
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from dhkit.description.schema import titled_schema
-from dhkit.trajectories.files import LEFT_OUT, MOST_DIGITS
+from dhkit.trajectories.files import LEFT_OUT, MAX_DIGITS
 from dhkit.trajectories.ros_yaml import ROWS, TIMES
 
 NUMBER = {
     "type": ["number", "string"],
     "pattern": r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$",
 }
-"""A number, or its text: YAML 1.1 takes 1e-05 for text."""
+"""A number, or its text: YAML 1.1 reads 1e-05 as text."""
 WHOLE = {
     "type": ["integer", "string"],
     "minimum": 0,
-    "maximum": 10**MOST_DIGITS - 1,
-    "pattern": f"^[0-9]{{1,{MOST_DIGITS}}}$",
+    "maximum": 10**MAX_DIGITS - 1,
+    "pattern": f"^[0-9]{{1,{MAX_DIGITS}}}$",
 }
 ROW = {"type": "array", "items": NUMBER, "minItems": 1}
 ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}
@@ -26,8 +26,8 @@ ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}
 def motion_schema() -> dict[str, Any]:
     """Return the JSON Schema of motion files that end in .yaml or .yml.
 
-    JSON Schema cannot say that all rows have one number a joint, that times increase, that all points have the same
-    rows, nor which joints a robot has; the reader checks these too.
+    JSON Schema cannot express that rows have one number a joint, that times increase, that all points have the same
+    rows, or which joints a robot has; the reader checks these too.
     """
     description = (
         "A motion as samples: a ROS message trajectory_msgs/JointTrajectory, in rad, m and s. A file that dhkit wrote"
@@ -72,6 +72,6 @@ def _duration() -> dict[str, Any]:
 
 
 def _closed(properties: dict[str, Any], description: str, required: list[str] | None = None) -> dict[str, Any]:
-    """Return the schema of a mapping that has no other keys."""
+    """Return the schema of a mapping without other keys."""
     known = {"type": "object", "description": description, "properties": properties, "additionalProperties": False}
     return known | ({"required": required} if required else {})

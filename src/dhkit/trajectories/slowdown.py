@@ -1,4 +1,4 @@
-"""How much a motion has to be slowed down, or may be sped up, to just keep its limits."""
+"""The factor by which a motion must be slowed down, or may be sped up, to just keep its limits."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.trajectory import Trajectory
 
 Torques: TypeAlias = Callable[[Array, Array, Array], Array]
-"""From q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n)."""
+"""Function from q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n), N m and N."""
 
 ROUNDING = 1e-12
-"""Of the largest torque: a difference below this is rounding, and limits nothing."""
-JUMP = 1e-6
-"""Of the largest value: what a velocity or an acceleration jumps by at a break, if it is more than rounding."""
-OUTSIDE = 1e-9
-"""rad and m: how far rounding may lead out of the joint limits."""
-FINER, DIPS = 2, 3
-"""How often the neighbourhoods of each joint's tightest samples are sampled again, and how many of them."""
+"""Differences of torque below this share of the largest torque are rounding and limit nothing."""
+MIN_JUMP = 1e-6
+"""A velocity or acceleration jumps at a break if it changes by more than this share of its largest value."""
+LIMIT_SLACK = 1e-9
+"""Distance by which rounding may exceed joint limits, rad and m."""
+REFINEMENTS, TIGHTEST_SAMPLES = 2, 3
+"""How often the neighbourhoods of each joint's tightest samples are sampled more finely, and number of such samples."""
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
 def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | None = None, points: int = 20) -> float:
-    """Return the smallest c for which ``trajectory.slowed(c)`` keeps its limits; below 1 it may be sped up.
+    """Return the smallest c for which ``trajectory.slowed(c)`` keeps its limits; for c < 1 it may be sped up.
 
     A motion c times as slow has velocities over c, accelerations over c^2 and jerks over c^3, and torques
-    g + (tau - g) / c^2 where g are those that hold the arm (Hollerbach 1984, Dynamic scaling of manipulator
-    trajectories). That is exact without friction. It is meant for motions from rest to rest: how accelerations begin
-    and end is no jump, but one at a break inside is.
+    g + (tau - g) / c^2, where g are the torques that hold the arm (Hollerbach 1984, Dynamic scaling of manipulator
+    trajectories). This is exact without friction. Motions are assumed to go from rest to rest: accelerations at both
+    ends are no jumps, those at breaks inside are.
 
     Parameters
     ----------
     trajectory
         The motion.
     limits
-        Those of velocity, acceleration, jerk and torque are kept; positions do not change.
+        Limits of velocity, acceleration, jerk and torque to keep; positions do not change.
     torques
         From q, qd and qdd, shape (N, n) each, to torques (N, n), without friction; inverse dynamics if not given. Not
         called where no torque is limited.
     points
-        Torques are checked at so many times an interval, both its ends included, and more finely about the tightest;
-        velocities, accelerations and jerks at their extremes.
+        Number of times per interval, both ends included, at which torques are checked, and more finely about the
+        tightest; velocities, accelerations and jerks are checked at their extremes.
 
     Returns
     -------
@@ -60,8 +60,8 @@ def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | No
     Raises
     ------
     PlanningError
-        The arm cannot hold itself somewhere, or not while it moves; something jumps whose derivative is limited; or
-        nothing limits the motion.
+        The arm cannot hold itself at some state, or not while it moves; a quantity jumps whose derivative is limited;
+        or nothing limits the motion.
     DescriptionError
         Torques are limited, and a link has no body.
     ValueError
@@ -98,21 +98,21 @@ def least_slowdowns(
 
 
 def require_inside(trajectory: Trajectory, limits: Limits) -> None:
-    """Refuse a motion that leaves the joint limits.
+    """Check that a motion stays inside the joint limits.
 
     Raises
     ------
     PlanningError
-        Names the joint, the limit and when.
+        It leaves them; names the joint, the limit and the time.
     ValueError
         The limits are of another number of joints.
     """
     _check_joints(trajectory, limits)
-    t, q = trajectory.pieces.turning()
+    t, q = trajectory.pieces.extremes()
     n = trajectory.n
     t, q = t.reshape(-1, n), q.reshape(-1, n)
     excess = np.maximum(limits.lower - q, q - limits.upper)
-    if excess.max() <= OUTSIDE:
+    if excess.max() <= LIMIT_SLACK:
         return
     row, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     below = q[row, i] < limits.lower[i]
@@ -137,20 +137,20 @@ def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:
         if np.isinf(limit).all():
             continue
         _refuse_jumps(trajectory, order - 1, name, limit)
-        _, values = trajectory.pieces.differentiated(order).turning()
+        _, values = trajectory.pieces.differentiated(order).extremes()
         slowest = max(slowest, float((np.abs(values).max(axis=(0, 1)) / limit).max() ** (1 / order)))
     return slowest
 
 
 def _refuse_jumps(trajectory: Trajectory, order: int, limited: str, limit: Array) -> None:
-    """Refuse a limit of a derivative where what it is the derivative of jumps."""
+    """Raise an error if a derivative of this order jumps while the next one is limited."""
     if not order:
         return
     values = trajectory.pieces.differentiated(order)
     inside = trajectory.breaks[1:-1]
     jumps = np.abs(values(inside) - values(inside, "left"))
     largest = np.abs(values.inside(2)[1]).max()
-    wrong = (jumps > JUMP * largest) & np.isfinite(limit)
+    wrong = (jumps > MIN_JUMP * largest) & np.isfinite(limit)
     if wrong.any():
         row, i = np.argwhere(wrong)[0]
         what = {1: "velocity", 2: "acceleration"}[order]
@@ -161,23 +161,23 @@ def _refuse_jumps(trajectory: Trajectory, order: int, limited: str, limit: Array
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
-    """Samples of several motions, one below the other; N rows, those of a motion together."""
+class _SamplePoints:
+    """Sample points of several motions; N rows, those of a motion together."""
 
     owner: NDArray[np.intp]
-    """The motion each sample belongs to, shape (N,)."""
+    """Index of each sample's motion, shape (N,)."""
     piece: NDArray[np.intp]
-    """... and the interval of it."""
+    """Index of its interval, shape (N,)."""
     u: Array
-    """How far into the interval, s."""
+    """Time since the beginning of the interval, s, shape (N,)."""
     step: Array
-    """How far apart samples are there, s."""
+    """Distance of samples in the interval, s, shape (N,)."""
     width: Array
-    """How long the interval is, s."""
+    """Length of the interval, s, shape (N,)."""
 
     @classmethod
-    def spread(cls, trajectories: Sequence[Trajectory], points: int) -> _Places:
-        """Return samples at both ends of every interval and between."""
+    def spread(cls, trajectories: Sequence[Trajectory], points: int) -> _SamplePoints:
+        """Return sample points at both ends of every interval and between."""
         pieces = [len(trajectory.breaks) - 1 for trajectory in trajectories]
         owner = np.repeat(np.arange(len(trajectories)), pieces)
         piece = np.concatenate([np.arange(count) for count in pieces])
@@ -185,12 +185,12 @@ class _Places:
         each = [np.repeat(array, points) for array in (owner, piece, width / (points - 1), width)]
         return cls(each[0], each[1], np.outer(width, np.linspace(0, 1, points)).ravel(), each[2], each[3])
 
-    def around(self, rows: NDArray[np.intp], points: int) -> _Places:
-        """Return samples between the neighbours of some rows, which come motion by motion."""
+    def around(self, rows: NDArray[np.intp], points: int) -> _SamplePoints:
+        """Return sample points between the neighbours of some rows; rows are sorted by motion."""
         r = np.repeat(rows, points)
         u = self.u[r] + np.tile(np.linspace(-1, 1, points), len(rows)) * self.step[r]
         finer = self.step[r] * 2 / (points - 1)
-        return _Places(self.owner[r], self.piece[r], np.clip(u, 0.0, self.width[r]), finer, self.width[r])
+        return _SamplePoints(self.owner[r], self.piece[r], np.clip(u, 0.0, self.width[r]), finer, self.width[r])
 
     def states(self, trajectories: Sequence[Trajectory]) -> tuple[Array, Array, Array]:
         """Return q, qd and qdd, shape (N, n) each."""
@@ -210,8 +210,8 @@ class _Places:
 def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
     """Return the least slowdown by torques, shape (m,)."""
     description = trajectories[0].description
-    places, most = _Places.spread(trajectories, points), np.full(len(trajectories), np.inf)
-    for _ in range(FINER + 1):
+    places, most = _SamplePoints.spread(trajectories, points), np.full(len(trajectories), np.inf)
+    for _ in range(REFINEMENTS + 1):
         q, qd, qdd = places.states(trajectories)
         if torques is None:
             tau, g = inverse_dynamics(description, q, qd, qdd), gravity_torque(description, q)
@@ -231,11 +231,11 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
 
 
 def _tightest(owner: NDArray[np.intp], room: Array, count: int) -> NDArray[np.intp]:
-    """Return the rows of each joint's least rooms in each motion, those with no less beside them."""
+    """Return the rows of the ``count`` smallest local minima of each joint's room in each motion."""
     beside = np.pad(room, ((1, 1), (0, 0)), constant_values=np.inf)
     dips = np.where((room <= beside[:-2]) & (room <= beside[2:]), room, np.inf)
     bounds = np.searchsorted(owner, np.arange(count + 1))
-    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:DIPS].ravel() for a, b in pairwise(bounds)]
+    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:TIGHTEST_SAMPLES].ravel() for a, b in pairwise(bounds)]
     return np.asarray(np.concatenate(rows), dtype=np.intp)
 
 

@@ -32,9 +32,9 @@ def spline(
     points
         Shape (m, n), m >= 2, rad and m.
     times
-        When it comes to each, shape (m,), s, increasing; the motion begins with the first, which becomes 0. If not
-        given, intervals are in proportion to how long each takes at the joints' limits of velocity (or, where a joint
-        has none, to its way), and as short together as the limits allow.
+        Times of the points, shape (m,), s, increasing; the motion begins with the first, which becomes 0. If not given,
+        intervals are in proportion to their times at the joints' velocity limits (for a joint without one, to its
+        distance), and as short together as the limits allow.
     limits, torques
         As for :func:`dhkit.trajectories.cubic`.
 

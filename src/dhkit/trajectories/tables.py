@@ -33,7 +33,7 @@ def read_table(text: str) -> Table:
     Raises
     ------
     DescriptionError
-        No header, a row of another length, or what is no finite number: names line and column.
+        No header, a row of another length, or an entry that is no finite number; names line and column.
     """
     names: tuple[str, ...] | None = None
     rows: list[list[float]] = []
@@ -102,12 +102,12 @@ def check_columns(
 
 
 def place_of_name(wanted: str, names: Collection[str], what: str = "column") -> str:
-    """Return that of a file's names that is the wanted one; capitals count as small letters if none is equal.
+    """Return the file's name that equals the wanted one, or equals it up to case.
 
     Raises
     ------
     DescriptionError
-        There is none; says what was found.
+        There is no such name; lists those found.
     """
     alike = [name for name in names if name.lower() == wanted.lower()]
     if wanted not in alike and len(alike) != 1:
@@ -129,7 +129,7 @@ def select_columns(
     DescriptionError
         A column is missing; names it.
     """
-    # Capitals count as small letters, but a name that is there as it is goes first.
+    # Case is ignored, but a name that is equal goes first.
     names = {name.lower(): k for k, name in reversed(list(enumerate(table[0])))}
     names |= {name: k for k, name in enumerate(table[0])}
     names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}

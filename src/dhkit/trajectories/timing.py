@@ -1,4 +1,4 @@
-"""How long a motion takes: as long as is asked for, or as its limits demand."""
+"""The duration of a motion: a given one, or the shortest that its limits allow."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
 from dhkit.trajectories.trajectory import Trajectory
 
-SHORTEST, LONGEST = 1e-6, 1e6
-"""s: durations beyond these are slips, and their powers leave the range of doubles."""
-SLACK = 1e-9
-"""By what share a duration may be shorter than its limits demand: rounding."""
+MIN_DURATION, MAX_DURATION = 1e-6, 1e6
+"""Range of durations, s; others are typing errors, and their powers leave the range of doubles."""
+DURATION_SLACK = 1e-9
+"""Share by which rounding may make a duration shorter than the limits allow."""
 
 
 def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torques: Torques | None) -> Trajectory:
@@ -28,9 +28,9 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
     shape
         The motion, over any duration.
     duration
-        In s; None for the shortest that the limits allow.
+        Duration, s; None for the shortest that the limits allow.
     limits
-        The robot's own if not given, which a given duration is not held against.
+        The limits; the robot's own if not given. A given duration is checked against given limits only.
     torques
         As for :func:`dhkit.trajectories.least_slowdown`.
 
@@ -51,7 +51,7 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
         if c == 0:
             raise ValueError("the motion ends where it begins; expected a duration")
         return shape.slowed(c)
-    if c * shape.duration > duration * (1 + SLACK):
+    if c * shape.duration > duration * (1 + DURATION_SLACK):
         raise PlanningError(
             f"{duration:.6g} s are too short: the limits allow the motion in {c * shape.duration:.6g} s"
         )
@@ -59,7 +59,7 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
 
 
 def default_limits(description: Description) -> Limits:
-    """Return a robot's own limits; those of torque only where every link has a body, so that torques are known."""
+    """Return a robot's own limits; torques are limited only if every link has a body, so that they are known."""
     limits = Limits.of(description)
     if np.isfinite(description.numbers.mass).all():
         return limits
@@ -67,17 +67,17 @@ def default_limits(description: Description) -> Limits:
 
 
 def check_duration(duration: float | None) -> None:
-    """Refuse a duration that is not positive, or too long for what is computed with it.
+    """Check that a duration is from 1e-6 to 1e6 s.
 
     Raises
     ------
     ValueError
-        Not a number from 1e-6 to 1e6 s.
+        It is not.
     """
     if duration is None:
         return
-    if not isinstance(duration, Real) or not SHORTEST <= duration <= LONGEST:
-        raise ValueError(f"duration is {duration!r}; expected {SHORTEST:g} to {LONGEST:g} s")
+    if not isinstance(duration, Real) or not MIN_DURATION <= duration <= MAX_DURATION:
+        raise ValueError(f"duration is {duration!r}; expected {MIN_DURATION:g} to {MAX_DURATION:g} s")
 
 
 def configuration(description: Description, value: ArrayLike | None, name: str) -> Array:

@@ -1,4 +1,4 @@
-"""Paths of the tool in space: a straight line and a circle, with their exact derivatives."""
+"""Paths of the tool: straight line and circle, with exact derivatives."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class ToolPath(Protocol):
         """Return T_world_tool, shape (N, 4, 4), for s of shape (N,)."""
 
     def twists(self, s: Array) -> Array:
-        """Return velocities by s of the tool's origin and angular ones, world axes, shape (N, 6), m and rad."""
+        """Return derivatives by s, shape (N, 6), world axes: of the tool's origin, m, and angular, rad."""
 
     def twist_rates(self, s: Array) -> Array:
-        """Return the derivatives of the twists by s, shape (N, 6)."""
+        """Return the derivatives of the twists by s, shape (N, 6), m and rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class ToolLine:
     T0: Array
     """The first pose, shape (4, 4)."""
     way: Array
-    """Shape (3,), m."""
+    """Vector from the first to the last position, shape (3,), m."""
     turn: Array
     """Rotation vector from the first to the last pose, world axes, shape (3,), rad."""
 
@@ -78,7 +78,7 @@ class ToolCircle:
         return np.asarray(np.concatenate([velocity, np.broadcast_to(self.turn * self.turning, velocity.shape)], axis=1))
 
     def twist_rates(self, s: Array) -> Array:
-        """Return how the twists change: towards the axis, shape (N, 6)."""
+        """Return the derivatives of the twists, which point towards the axis, shape (N, 6)."""
         towards = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
         return np.asarray(np.concatenate([towards, np.zeros_like(towards)], axis=1))
 
@@ -125,9 +125,9 @@ def tool_circle(
     centre
         A point of the axis, shape (3,), m: the arc lies in the plane across the axis through the first position.
     axis
-        The axis' direction, shape (3,), of any length but 0; it turns about it by the right hand.
+        Direction of the axis, shape (3,), of any length but 0; angles follow the right-hand rule.
     angle
-        How far, rad.
+        Angle of the arc, rad.
     turning
         Whether the tool turns with the arc; else its orientation stays.
 

@@ -1,4 +1,4 @@
-"""A motion of an arm, exactly: piecewise polynomials of time, their derivatives and their torques."""
+"""A motion of an arm as piecewise polynomials of time, with exact derivatives, and torques."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from dhkit.formats import format_function
 from dhkit.kernels import check_whole
 from dhkit.symbolic import Friction
 from dhkit.trajectories.interpolation import interpolated
-from dhkit.trajectories.pieces import Pieces, Side, joined
+from dhkit.trajectories.pieces import Pieces, Side, join
 from dhkit.trajectories.samples import Samples
 
-MEETS = 1e-9
-"""rad and m: two motions whose ends are nearer to each other are joined."""
-SLOWEST = 1e12
-"""By what factor a motion may be slowed down, or its inverse: powers of larger ones leave the range of doubles."""
+JOIN_TOLERANCE = 1e-9
+"""Largest distance of the ends of two motions that may follow one another, rad and m."""
+MAX_SLOWDOWN = 1e12
+"""Largest factor by which a motion is slowed down or sped up: powers of larger ones leave the range of doubles."""
 MOST_SAMPLES = 1e8
 SAME_TIME = 1e-9
-"""Of a sample's interval: a last sample nearer to the end than this is the end."""
+"""A last sample closer to the end than this share of the sampling interval is the end."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,11 +45,11 @@ class Trajectory:
     coefficients
         Shape (K, p+1, n), ascending powers, rad and m.
     report
-        What its planner has to say; no part of equality.
+        Report of its planner; ignored by equality.
     payload
-        What the tool carries, beside the robot: torques count it.
+        Load that the tool carries in addition to the robot; included in torques.
     friction
-        Friction that the drives overcome, beside the robot: torques count it.
+        Friction that the drives overcome; included in torques.
 
     Raises
     ------
@@ -96,26 +96,26 @@ class Trajectory:
         Raises
         ------
         DescriptionError
-            Its last link has no body to join it to.
+            The last link has no body that the payload could be added to.
         """
         return self.description if self.payload is None else self.payload.carried(self.description)
 
     @property
     def duration(self) -> float:
-        """In s."""
+        """Duration, s."""
         return self.pieces.end
 
     def q(self, t: ArrayLike, side: Side = "right") -> Array:
         """Return joint values, shape (..., n), rad and m, for times of shape (...), s.
 
-        Before the beginning and after the end the arm stands still there. NaN times give NaN rows.
+        Before the beginning and after the end the arm stands still at these. NaN times give NaN rows.
 
         Parameters
         ----------
         t
             Times, any shape.
         side
-            Which piece counts at a break: the one that begins (``"right"``) or the one that ends there.
+            The piece that is evaluated at a break: the one that begins (``"right"``) or ends there (``"left"``).
 
         Raises
         ------
@@ -147,7 +147,7 @@ class Trajectory:
         t
             Times, any shape, s.
         friction
-            In place of the motion's own; False: none.
+            Replaces the motion's own; False: none.
         side
             As for :meth:`q`.
 
@@ -178,14 +178,14 @@ class Trajectory:
         Parameters
         ----------
         rate
-            Samples a second, from 0 on, and the very end.
+            Samples per second from 0 on, and the end.
         n
-            Or how many, evenly spread, both ends among them.
+            Or number of samples, evenly spread, both ends included.
 
         Raises
         ------
         ValueError
-            Not exactly one of both, a rate that is not positive and finite, or fewer than two samples.
+            Not exactly one of both is given, the rate is not positive and finite, or n is below 2.
         """
         times = self.sample_times(rate, n)
         values = self.q(times), self.qd(times), self.qdd(times)
@@ -205,20 +205,20 @@ class Trajectory:
         return np.append(np.arange(max(int(np.ceil(self.duration * rate - SAME_TIME)), 1)) / rate, self.duration)
 
     def slowed(self, c: float) -> Trajectory:
-        """Return the same path c times as slow, q(t / c); without the report, which is about this motion.
+        """Return the same path c times as slow, q(t / c), without the report.
 
         Raises
         ------
         ValueError
             c is not positive and finite.
         """
-        if not isinstance(c, Real) or not 1 / SLOWEST <= c <= SLOWEST:
+        if not isinstance(c, Real) or not 1 / MAX_SLOWDOWN <= c <= MAX_SLOWDOWN:
             raise ValueError(f"c is {c!r}; expected a positive number")
         powers = np.arange(self.coefficients.shape[1])[:, None]
         return self._moved(self.breaks * c, self.coefficients / float(c) ** powers)
 
     def reversed(self) -> Trajectory:
-        """Return the motion back, q(duration - t)."""
+        """Return the reversed motion, q(duration - t)."""
         back = self.pieces.backwards()
         return self._moved(back.breaks, back.coefficients)
 
@@ -227,12 +227,12 @@ class Trajectory:
         return replace(self, breaks=breaks, coefficients=coefficients, report=None)
 
     def then(self, other: Trajectory) -> Trajectory:
-        """Return this motion with another behind it.
+        """Return this motion followed by another.
 
         Raises
         ------
         DescriptionError
-            The other is another robot's.
+            The other is a motion of another robot.
         ValueError
             The other does not begin where this one ends, to 1e-9 rad or m; names the joint. Or it has another payload
             or friction; see :meth:`carrying`.
@@ -245,13 +245,13 @@ class Trajectory:
             if own != theirs:
                 raise ValueError(f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it")
         end, start = self.q(self.duration), other.q(0.0)
-        apart = np.flatnonzero(np.abs(end - start) > MEETS)
+        apart = np.flatnonzero(np.abs(end - start) > JOIN_TOLERANCE)
         if len(apart):
             i = int(apart[0])
             name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])
             here, there = (joint_words(x, slides=slides, digits=9) for x in (end[i], start[i]))
             raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
-        return self._moved(*joined(self.pieces, other.pieces))
+        return self._moved(*join(self.pieces, other.pieces))
 
     @classmethod
     def from_samples(
@@ -264,18 +264,18 @@ class Trajectory:
     ) -> Trajectory:
         """Return a motion through samples.
 
-        Through joint values alone goes a cubic spline with continuous accelerations and not-a-knot ends (de Boor
-        1978, A Practical Guide to Splines, chapter IV), a line through two and a parabola through three; with rates
-        it is piecewise cubic, and with accelerations piecewise quintic, each interval by its own ends.
+        From joint values alone it is a cubic spline with continuous accelerations and not-a-knot ends (de Boor 1978, A
+        Practical Guide to Splines, chapter IV), a line for two and a parabola for three samples. With rates it is
+        piecewise cubic, with accelerations piecewise quintic, each interval determined by its ends.
 
         Parameters
         ----------
         description
             The robot.
         times
-            Shape (N,), s, N >= 2, increasing; the motion begins with the first, which becomes 0.
+            Times, shape (N,), s, N >= 2, increasing; the motion begins with the first, which becomes 0.
         q, qd, qdd
-            Shape (N, n) each, rad, m and seconds.
+            Joint values, rates and accelerations, shape (N, n) each, rad, m and seconds.
 
         Raises
         ------
@@ -286,15 +286,15 @@ class Trajectory:
         """
         return cls(description, *interpolated(description, times, q, qd, qdd))
 
-    # Whose motion it is
+    # Robot
 
     def matches(self, description: Description) -> bool:
-        """Return whether it is a motion of this robot."""
+        """Return whether this is a motion of a robot."""
         description = description_of(description)
         return self.description == description or self.description.digest == description.digest
 
     def require(self, description: Description) -> None:
-        """Refuse another robot.
+        """Check that this is a motion of a robot.
 
         Raises
         ------

@@ -30,7 +30,7 @@ def require_path(description: Description, path: JointPath, limits: Limits) -> N
     """
     if np.isfinite(limits.jerk).any():
         raise PlanningError("jerk is limited: along a path accelerations jump; give limits without those of jerk")
-    s, q = (array.reshape(-1, description.n) for array in path.pieces.turning())
+    s, q = (array.reshape(-1, description.n) for array in path.pieces.extremes())
     k, i = np.unravel_index(int(np.argmax(np.maximum(limits.lower - q, q - limits.upper))), q.shape)
     require_inside_limits(description, limits, q[k], f"the path at s = {s[k, i]:.4g}")
     _require_no_corner(path)
