@@ -31,7 +31,7 @@ from dhkit.planning.certificate import Check
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces
-from dhkit.verification import Agreement, Motion, VerificationReport, random_motions
+from dhkit.verification import Agreement, JointStates, VerificationReport, random_motions
 
 LARGEST = 20_000
 """Bytes of HTML: a notebook keeps them with every cell."""
@@ -422,7 +422,7 @@ VALUES = {
     Pieces: lambda: quintic().pieces,
     # verification
     Agreement: lambda: verification().agreements[0],
-    Motion: lambda: random_motions(puma().description, 10),
+    JointStates: lambda: random_motions(puma().description, 10),
     VerificationReport: verification,
 }
 """A value of every class that somebody gets from the public API, and of some that these hold."""

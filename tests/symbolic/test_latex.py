@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 import pytest
 
 from conftest import require
-from dhkit.cli.equations_page import mathml
 from dhkit.description import library_robot
 from dhkit.expressions import parse
+from dhkit.grading.reports.mathml import equation_mathml
 from dhkit.symbolic.equations import displays, equations_latex, latex_document, latex_text, quantities
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.latex_width import latex_width
@@ -153,10 +153,10 @@ def mathml_tokens(text):
 )
 def test_mathml_has_every_symbol_and_number(name, symbols, what):
     for display in displays(quantities(lagrangian(library_robot(name), symbols), what.split())):
-        assert mathml_tokens(mathml(display)) == latex_tokens(display)
+        assert mathml_tokens(equation_mathml(display)) == latex_tokens(display)
 
 
 def test_mathml_of_names():
     for latex in latex_names(["m_tool", "l_c1", "lc1", "payload", "MX3", "theta1", "Ixx2", "Jm2"]).values():
         letters = latex_tokens(latex.replace(r"\_", " "))
-        assert letters - mathml_tokens(mathml(latex)) == Counter()
+        assert letters - mathml_tokens(equation_mathml(latex)) == Counter()

@@ -9,6 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from dhkit.description import DHTable
+from dhkit.grading.reports.mathml import equation_mathml
 from dhkit.symbolic.equations import (
     QUANTITIES,
     Quantity,
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
-MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
 UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m", "d": "m", "g": "m/s²"} | {
     "M": "kg",
     "MX": "kg m",
@@ -62,17 +61,6 @@ th { color: #57606a; } td.number { text-align: right; font-variant-numeric: tabu
 """
 
 
-def mathml(latex: str) -> str:
-    """Return displayed LaTeX, of the kind that we print, as MathML."""
-    from latex2mathml.converter import convert
-
-    inner = EQUATION.fullmatch(latex)
-    converted: str = convert(inner[1] if inner else latex, display="block")
-    return MATRIX.sub(
-        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>', converted
-    )
-
-
 def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
     """Return a page: the robot's table, quantities, what the constants are worth, and notes."""
     description = lag.description
@@ -81,7 +69,7 @@ def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Qu
     body = [
         f"<h1>{escape(description.name)}: {subject}</h1>",
         f'<p class="source">{escape(description.source)}</p>' if description.source else "",
-        f'<div class="display">{mathml(LAW if moving else PRODUCT)}</div>',
+        f'<div class="display">{equation_mathml(LAW if moving else PRODUCT)}</div>',
         "<h2>Denavit-Hartenberg table</h2>",
         DHTable.of(description)._repr_html_(),
         *_sections(quantities),
@@ -101,9 +89,9 @@ def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
     shown = displays(quantities)
     for quantity, latex in zip(quantities, shown, strict=False):
         yield f"<h2>{escape(quantity.title.capitalize())}</h2>"
-        yield f'<div class="display">{mathml(latex)}</div>'
+        yield f'<div class="display">{equation_mathml(latex)}</div>'
     for latex in shown[len(quantities) :]:
-        yield f'<h2>Sines and cosines</h2>\n<div class="display">{mathml(latex)}</div>'
+        yield f'<h2>Sines and cosines</h2>\n<div class="display">{equation_mathml(latex)}</div>'
 
 
 def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> Iterator[str]:
@@ -118,7 +106,7 @@ def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quanti
     yield "<h2>Constants</h2>\n<table>\n<tr><th></th><th>name</th><th>value</th><th>unit</th></tr>"
     for name in names:
         value = float(values.get(name, math.nan))
-        cells = f"<td>{mathml(constant_latex(rings[name], name))}</td><td>{escape(name)}</td>"
+        cells = f"<td>{equation_mathml(constant_latex(rings[name], name))}</td><td>{escape(name)}</td>"
         yield f'<tr>{cells}<td class="number">{value:.6g}</td><td>{_unit(lag, name)}</td></tr>'
     yield "</table>"
 

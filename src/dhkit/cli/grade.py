@@ -16,16 +16,15 @@ from dhkit.description import write_atomically
 from dhkit.errors import AnswerError
 from dhkit.grading import LIBRARY, grade
 from dhkit.grading.answers.sheet import read_sheet, read_task
-from dhkit.grading.batch import GIGABYTE, grade_all
+from dhkit.grading.batch import GIGABYTE, Judge, grade_all
+from dhkit.grading.entry_points import prepare, robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
-from dhkit.grading.isolation import Judge
-from dhkit.grading.judgement import prepare, robot_of
 from dhkit.grading.marks import marks
 from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Feedback, Rubric
+from dhkit.grading.schema import template
 from dhkit.grading.sheets import find_sheets
-from dhkit.grading.template import template
 
 
 def rubric_of(path: Path | None) -> Rubric:

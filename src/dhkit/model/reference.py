@@ -1,4 +1,4 @@
-"""Descriptions as Pinocchio models: the reference path, by way of the URDF."""
+"""Descriptions as Pinocchio models, built from their URDF: the reference path."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dhkit.description import Description, takes_robot
 from dhkit.errors import ModelError
-from dhkit.model.urdf import urdf_text
+from dhkit.model.urdf import mechanics_urdf_text
 
 if TYPE_CHECKING:
     import pinocchio
@@ -42,11 +42,11 @@ def import_pinocchio() -> Any:
 
 @takes_robot
 def pinocchio_model(description: Description) -> PinocchioModel:
-    """Return a Pinocchio model of a description, made from its URDF.
+    """Return a Pinocchio model of a description, built from its URDF.
 
-    What a URDF cannot say is set on it: gravity, ``armature`` (gear^2 rotor inertia, which rnea, crba and aba use;
-    setting rotorInertia and rotorGearRatio alone would change nothing), dry friction by direction, unlimited effort
-    and velocity as inf. Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
+    Values that a URDF lacks are set on the model: gravity, ``armature`` (gear^2 rotor inertia, which rnea, crba and aba
+    use; setting rotorInertia and rotorGearRatio alone would change nothing), dry friction by direction, unlimited
+    effort and velocity as inf. Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def pinocchio_model(description: Description) -> PinocchioModel:
         Pinocchio is not installed (there is no wheel of it for Windows), or refuses the model.
     """
     pin = import_pinocchio()
-    text = urdf_text(description)
+    text = mechanics_urdf_text(description)
     try:
         model = pin.buildModelFromXML(text)
     except ValueError as error:

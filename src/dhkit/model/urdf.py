@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -70,10 +70,19 @@ def urdf_text(
     """
     name_mesh = mesh_path or (lambda path: f"{MESHES}/{path}")
     names = {"visual": name_mesh, "collision": collision_path or name_mesh}
+    return _urdf(description, link_parts(description), names)
+
+
+def mechanics_urdf_text(description: Description) -> str:
+    """Return a description as URDF text without visual and collision elements: what a Pinocchio model needs."""
+    return _urdf(description, (), {})
+
+
+def _urdf(description: Description, drawn: Iterable[Part], names: Mapping[str, Callable[[str], str]]) -> str:
     robot = ElementTree.Element("robot", name=description.name)
     robot.append(ElementTree.Comment(_what_a_urdf_cannot_say(description)))
     parts: dict[int, list[Part]] = {}
-    for part in link_parts(description):
+    for part in drawn:
         parts.setdefault(part.link, []).append(part)
 
     ElementTree.SubElement(robot, "link", name="world")

@@ -23,6 +23,7 @@ from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, exact_
 from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
+from dhkit.symbolic.ring.elements import PolynomialRing
 
 HALF = Fraction(1, 2)
 
@@ -161,7 +162,9 @@ class TextbookDerivation:
         return has(self.mistakes, mistake, i)
 
 
-def velocity_torques(ring: Ring, K: Element, momenta: Elements, mistakes: frozenset[MadeAt] = frozenset()) -> Elements:
+def velocity_torques(
+    ring: PolynomialRing, K: Element, momenta: Elements, mistakes: frozenset[MadeAt] = frozenset()
+) -> Elements:
     """Return d/dt dK/dqd - dK/dq without accelerations, shape (n,): linear in K.
 
     Parameters

@@ -1,8 +1,8 @@
-"""The two paths from a table, our own mechanics and Pinocchio's, held against each other."""
+"""Comparison of our mechanics with Pinocchio's, and of URDFs of other sources with a table."""
 
 from dhkit.verification.comparison import verify
 from dhkit.verification.foreign import verify_urdf
 from dhkit.verification.report import Agreement, VerificationReport
-from dhkit.verification.states import Motion, random_motions, random_states
+from dhkit.verification.states import JointStates, random_motions, random_states
 
-__all__ = ["Agreement", "Motion", "VerificationReport", "random_motions", "random_states", "verify", "verify_urdf"]
+__all__ = ["Agreement", "JointStates", "VerificationReport", "random_motions", "random_states", "verify", "verify_urdf"]

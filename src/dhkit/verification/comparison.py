@@ -1,4 +1,4 @@
-"""Our own kinematics and dynamics against Pinocchio's, over random states."""
+"""Our kinematics and dynamics compared with Pinocchio's at random states."""
 
 from __future__ import annotations
 
@@ -14,42 +14,44 @@ from dhkit.model import pinocchio_model
 from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error
 from dhkit.verification.reference import Reference
 from dhkit.verification.report import Agreement, VerificationReport
-from dhkit.verification.states import Motion, random_motions
+from dhkit.verification.states import JointStates, random_motions
 
 FRAME_TOLERANCE = 1e-13
-"""Of positions over the reach (at least 1 m) and of rotation entries: some hundred roundings."""
+"""Tolerance for positions over the reach (at least 1 m) and for rotation entries: some hundred roundings."""
 JACOBIAN_TOLERANCE = 1e-12
-"""Of Jacobian entries, the linear ones over the reach (at least 1 m)."""
+"""Tolerance for Jacobian entries, linear ones over the reach (at least 1 m)."""
 
 
 class Comparison(NamedTuple):
-    """A quantity, its error at each state, shape (N,), what is tolerated there, and how much of the state it takes."""
+    """A quantity with errors and tolerances at N states, shape (N,), and the vectors of the state that it needs."""
 
     quantity: str
     errors: Array
     tolerance: Array | float
     vectors: int = 1
-    """1: q alone; 2: qd too; 3: qdd too."""
+    """1: q; 2: q and qd; 3: q, qd and qdd."""
 
 
 @takes_robot
 def verify(description: Description, samples: int = 1000, seed: int = 0) -> VerificationReport:
-    """Hold our kinematics and dynamics against Pinocchio's, computed from the URDF that dhkit writes.
+    """Compare our kinematics and dynamics with Pinocchio's, computed from the URDF that dhkit writes.
 
-    Frames, Jacobians, M, C, C qd, g, inverse and forward dynamics, energies and the regressor, on random states inside
-    the limits. Dynamics need a body on every link; forward dynamics an M that is not singular.
+    Compared are frames, Jacobians, M, C, C qd, g, inverse and forward dynamics, energies and the regressor at random
+    states inside the limits. Dynamics need a body on every link, forward dynamics a regular M. Both sides start from
+    ``description.numbers``: an error in the rounding of the table, in a link's body or in the armature gear^2 J is the
+    same on both sides and is not found here; the tests compare those with the robot files.
 
     Parameters
     ----------
     description
         The robot.
     samples, seed
-        How many random states, from which seed.
+        Number and seed of random states.
 
     Returns
     -------
     VerificationReport
-        The worst error of each quantity, and where; ``.ok``.
+        The worst error of each quantity, with its state; ``.ok``.
 
     Raises
     ------
@@ -79,8 +81,8 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     )
 
 
-def worst(comparison: Comparison, motion: Motion) -> Agreement:
-    """Return the state where the error is largest, measured by what is tolerated there; NaN is the largest."""
+def worst(comparison: Comparison, motion: JointStates) -> Agreement:
+    """Return the state with the largest error relative to its tolerance; NaN counts as largest."""
     quantity, errors, tolerance, vectors = comparison
     tolerances = np.broadcast_to(tolerance, errors.shape)
     k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors / tolerances)))

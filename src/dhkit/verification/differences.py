@@ -1,4 +1,4 @@
-"""Where two arms differ: axes, zero positions and bodies, joint by joint and link by link, in words."""
+"""Differences of two arms in words: axes, zero positions and bodies, joint by joint and link by link."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from dhkit.description.frames import carrying, world_to_frames
 from dhkit.model import PinocchioModel, pinocchio_model
 
 STEPS = 360
-"""Angles that are tried for a zero position, before the best is refined."""
+"""Number of angles tried for a zero position before the best is refined."""
 DIGITS = 6
 
 
 def differences(description: Description, model: PinocchioModel, tolerance: float) -> Iterator[str]:
-    """Yield how a Pinocchio model of as many joints differs from a description.
+    """Yield sentences about the differences of a Pinocchio model from a description with as many joints.
 
-    Axes are compared with all joints at zero. A joint whose zero position differs turns all axes behind it; bodies are
-    compared where axes agree.
+    Axes are compared with all joints at zero. A joint whose zero position differs moves all axes after it. Bodies are
+    compared if the axes agree.
 
     Parameters
     ----------
     description, model
         The two arms.
     tolerance
-        Of directions, of positions over the reach, and of masses and moments over the largest: what is below is equal.
+        Largest difference that counts as equal: of directions, positions over the reach, and masses and moments over
+        the largest.
     """
     least = max(tolerance, 1e-9)
     reach = max(1.0, description.reach)
@@ -64,7 +65,7 @@ def _distance(a: Array, b: Array, reach: float) -> float:
 def _axes(
     description: Description, ours: Array, theirs: Array, first: int, reach: float, least: float
 ) -> Iterator[str]:
-    """Say how the first axis that differs lies, or which zero position explains all that differ."""
+    """Yield the difference of the first differing axis, or the zero position that explains all differing axes."""
     name = f"joint {first + 1} ({description.joints[first].name})"
     a, b = ours[first], theirs[first]
     direction = slice(0, 3) if description.numbers.prismatic[first] else slice(3, 6)
@@ -88,11 +89,11 @@ def _axes(
 
 
 def _zero_offset(ours: Array, theirs: Array, k: int, reach: float) -> tuple[float, float] | None:
-    """Return the turn about axis k that takes our axes behind it nearest to theirs, and how far they then are."""
+    """Return the rotation about axis k, rad, that best aligns our later axes with theirs, and what remains."""
     from scipy.optimize import minimize_scalar
 
     def apart(angle: float) -> float:
-        turned = _turned(ours[k], ours[k + 1 :], angle)
+        turned = _rotate_screws(ours[k], ours[k + 1 :], angle)
         return max(_distance(a, b, reach) for a, b in zip(turned, theirs[k + 1 :], strict=True))
 
     grid = np.linspace(-np.pi, np.pi, STEPS)
@@ -102,8 +103,8 @@ def _zero_offset(ours: Array, theirs: Array, k: int, reach: float) -> tuple[floa
     return float(found.x), float(found.fun)
 
 
-def _turned(axis: Array, screws: Array, angle: float) -> Array:
-    """Return screws turned about a revolute axis."""
+def _rotate_screws(axis: Array, screws: Array, angle: float) -> Array:
+    """Return screws, shape (k, 6), rotated about a revolute axis by an angle, rad."""
     from scipy.spatial.transform import Rotation
 
     z = axis[3:]
@@ -115,7 +116,7 @@ def _turned(axis: Array, screws: Array, angle: float) -> Array:
 
 
 def _bodies(description: Description, table: PinocchioModel, urdf: PinocchioModel, least: float) -> Iterator[str]:
-    """Say which links' masses, centres of mass and inertias differ."""
+    """Yield a sentence for each difference of masses, centres of mass and inertias."""
     reach = max(1.0, description.reach)
     pairs = list(zip(_world_bodies(table), _world_bodies(urdf), strict=True))
     heaviest = max(max(a[0], b[0]) for a, b in pairs) or 1.0

@@ -1,8 +1,10 @@
-"""A URDF that somebody else wrote against a table."""
+"""A URDF of another source compared with a table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +21,32 @@ from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
 
-BASE_MOVED = "the arms differ by a constant base"
 ROUNDING = 1e-12
-"""m and rotation entries: what is below is no difference of two arms."""
-CLOSE = 1e-6
-"""m and rotation entries: poses that differ by less from state to state differ by a constant transform."""
+"""Differences of positions, m, and rotation entries up to this are rounding."""
+CONSTANT = 1e-6
+"""Two tools differ by a constant transform if it varies by less than this between states, m and rotation entries."""
+
+
+class OffsetFrame(Enum):
+    """The frame by which two arms differ, with the beginning of the sentence that says so."""
+
+    TOOL = "tool: the URDF's stands in the table's"
+    BASE = "base: the URDF's arm stands, in the table's world,"
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantOffset:
+    """A transform by which the tools of two arms differ at all states."""
+
+    frame: OffsetFrame
+    T: Array
+    """Shape (4, 4): the URDF's frame in the table's."""
+
+    def __str__(self) -> str:
+        xyz, rpy = pose_parts(self.T, order="xyz", degrees=True)
+        place = ", ".join(f"{x + 0.0:.6g}" for x in np.round(xyz, 9))
+        angles = ", ".join(f"{x + 0.0:.6g}" for x in np.round(rpy, 7))
+        return f"the arms differ by a constant {self.frame.value} at xyz ({place}) m, rpy ({angles}) degrees"
 
 
 @takes_robot
@@ -37,10 +60,10 @@ def verify_urdf(
     *,
     base: str | None = None,
 ) -> VerificationReport:
-    """Hold somebody's URDF against a table: the same tool, the same mass matrix and torques at the same joint values.
+    """Compare a URDF with a table: tool poses, mass matrices and torques at the same joint values.
 
-    The URDF is computed by Pinocchio, the table by dhkit. Joints are taken in their order along the chain, whatever
-    they are called. Gravity and rotor inertias, which a URDF has not, are the table's.
+    Pinocchio computes the URDF, dhkit the table. Joints are matched by their order along the chain, not by name.
+    Gravity and rotor inertias, which a URDF does not contain, are the table's.
 
     Parameters
     ----------
@@ -51,7 +74,7 @@ def verify_urdf(
     tip
         The link whose frame is the tool; the end of the only chain if not given.
     samples, seed
-        How many random states inside the table's limits, from which seed.
+        Number and seed of random states inside the table's limits.
     tolerance
         The largest error that still counts as agreement; files often carry few digits.
     base
@@ -79,9 +102,9 @@ def verify_urdf(
     reference = Reference(model, motion)
     notes = [f"joints in order: {', '.join(chain.names)}; tool: {chain.tip}", *chain.notes]
     notes += _limits(description, chain)
-    comparisons = list(_tool(description, reference, tolerance, notes))
-    notes += second_opinion(chain, motion.q, _tools(reference))
-    if not any(note.startswith(BASE_MOVED) for note in notes):
+    comparisons, offsets = _tool(description, reference, tolerance)
+    notes += [*map(str, offsets), *second_opinion(chain, motion.q, _tools(reference))]
+    if not any(offset.frame is OffsetFrame.BASE for offset in offsets):
         notes += differences(description, model, tolerance)
     if all(joint.bodies for joint in description.joints):
         comparisons += _dynamics(description, reference, tolerance)
@@ -99,16 +122,18 @@ def verify_urdf(
     )
 
 
-def _tool(description: Description, reference: Reference, tolerance: float, notes: list[str]) -> Iterator[Comparison]:
+def _tool(
+    description: Description, reference: Reference, tolerance: float
+) -> tuple[list[Comparison], list[ConstantOffset]]:
+    """Return the comparisons of the tool's pose, and the constant transforms that explain a difference."""
     ours = kinematics.forward_kinematics(description, reference.motion.q)
     theirs = _tools(reference)
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
-    if max(position.max(), rotation.max()) > max(tolerance, ROUNDING):
-        notes += _constant_offset(ours, theirs)
-    yield Comparison("tool position", position, tolerance)
-    yield Comparison("tool rotation", rotation, tolerance)
+    differs = max(position.max(), rotation.max()) > max(tolerance, ROUNDING)
+    comparisons = [Comparison("tool position", position, tolerance), Comparison("tool rotation", rotation, tolerance)]
+    return comparisons, list(_constant_offsets(ours, theirs)) if differs else []
 
 
 def _tools(reference: Reference) -> Array:
@@ -117,18 +142,12 @@ def _tools(reference: Reference) -> Array:
     return np.asarray(np.linalg.inv(frames[:, 0]) @ frames[:, 1])
 
 
-def _constant_offset(ours: Array, theirs: Array) -> Iterator[str]:
-    """Say where two tools differ only by where the base or the tool's frame was put."""
+def _constant_offsets(ours: Array, theirs: Array) -> Iterator[ConstantOffset]:
+    """Yield the constant transforms at the tool and at the base between two tools, shape (N, 4, 4) each."""
     inverse = np.linalg.inv(ours)
-    for what, offsets in (
-        ("tool: the URDF's stands in the table's", inverse @ theirs),
-        ("base: the URDF's arm stands, in the table's world,", theirs @ inverse),
-    ):
-        if np.abs(offsets - offsets[0]).max() < CLOSE:
-            xyz, rpy = pose_parts(offsets[0], order="xyz", degrees=True)
-            place = ", ".join(f"{x + 0.0:.6g}" for x in np.round(xyz, 9))
-            angles = ", ".join(f"{x + 0.0:.6g}" for x in np.round(rpy, 7))
-            yield f"the arms differ by a constant {what} at xyz ({place}) m, rpy ({angles}) degrees"
+    for frame, offsets in ((OffsetFrame.TOOL, inverse @ theirs), (OffsetFrame.BASE, theirs @ inverse)):
+        if np.abs(offsets - offsets[0]).max() < CONSTANT:
+            yield ConstantOffset(frame, offsets[0])
 
 
 def _dynamics(description: Description, reference: Reference, tolerance: float) -> Iterator[Comparison]:
@@ -143,7 +162,7 @@ def _dynamics(description: Description, reference: Reference, tolerance: float) 
 
 
 def _limits(description: Description, chain: Chain) -> Iterator[str]:
-    """Say which limits are others."""
+    """Yield a sentence for each joint whose limits differ."""
     numbers = description.numbers
     for i, (joint, name) in enumerate(zip(description.joints, chain.names, strict=True)):
         own = (numbers.lower[i], numbers.upper[i])

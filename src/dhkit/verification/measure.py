@@ -1,4 +1,4 @@
-"""How far two paths' dynamics are apart: differences over the size of what is compared, state by state."""
+"""Error measure for dynamics: differences relative to the size of a quantity, state by state."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ import numpy as np
 from dhkit.description import Array, Description
 
 TOLERANCE = 1e-12
-"""Of every quantity of dynamics: some thousand roundings."""
+"""Tolerance for every quantity of dynamics: some thousand roundings."""
 
 
 def relative_error(ours: Array, reference: Array, floor: Array | float = 0.0) -> Array:
-    """Return, of each state, the largest difference over the reference's largest entry or the floor.
+    """Return for each state the largest difference over the reference's largest entry or the floor.
 
     Parameters
     ----------
     ours, reference
-        Shape (N, ...): a quantity at N states.
+        A quantity at N states, shape (N, ...).
     floor
-        Shape (N,) or a number: what differences are compared with where the reference itself is small, so that noise
-        around 0 is no error.
+        Shape (N,) or a number: size for states where the reference is smaller, so that noise around 0 is no error.
 
     Returns
     -------
     Array
-        Shape (N,); 0 where nothing differs, NaN where one of both is NaN.
+        Shape (N,); 0 where both are equal, NaN where one is NaN.
 
     Raises
     ------
@@ -43,26 +42,26 @@ def relative_error(ours: Array, reference: Array, floor: Array | float = 0.0) ->
 
 @dataclass(frozen=True)
 class Floors:
-    """What the quantities of dynamics are measured by at least, each of shape (N,), for N states."""
+    """Smallest sizes of the quantities of dynamics that errors are relative to, shape (N,) each, for N states."""
 
     g: Array
-    """sum(m) |gravity| reach, N m; of V too."""
+    """sum(m) |gravity| reach, N m; for V too, J."""
     C: Array
     """max|M| max|qd|."""
     h: Array
-    """max|M| max|qd|^2, of C qd and of K."""
+    """max|M| max|qd|^2, for C qd and K."""
     bias: Array
-    """Those of g and h."""
+    """Sum of those of g and h."""
     tau: Array
-    """Those of g and h, and max|M| max|qdd|."""
+    """Sum of those of g and h, and max|M| max|qdd|."""
     qdd: Array
     """max|tau| / min diag M."""
     Y: float
-    """|gravity|, m/s^2: what a kilogram weighs, of which nothing may be left in a joint's direction."""
+    """|gravity|, m/s^2: the weight of a kilogram, whose component along a joint may be 0."""
 
     @classmethod
     def of(cls, description: Description, M: Array, qd: Array, qdd: Array, tau: Array) -> Floors:
-        """Return those of states with mass matrices (N, n, n), rates, accelerations and torques (N, n)."""
+        """Return the sizes for states with mass matrices (N, n, n), rates, accelerations and torques (N, n)."""
         numbers = description.numbers
         weight = float(np.sum(numbers.mass) * np.linalg.norm(numbers.gravity)) * max(1.0, description.reach)
         inertia, rate = _largest(M), _largest(qd)
@@ -75,7 +74,7 @@ class Floors:
 
 
 def forward_tolerance(M: Array) -> Array:
-    """Return how far accelerations may be apart, shape (N,): 1e-12, or 4 eps cond M where M is worse than that."""
+    """Return the tolerance for accelerations, shape (N,): 1e-12, or 4 eps cond(M) where that is larger."""
     tolerance: Array = np.maximum(TOLERANCE, 4 * np.finfo(float).eps * np.linalg.cond(M))
     return tolerance
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from dhkit.description import INERTIA_PLACES, Array
 from dhkit.model import PinocchioModel
-from dhkit.verification.states import Motion
+from dhkit.verification.states import JointStates
 
 
 class Reference:
-    """A Pinocchio model asked at many states; every answer has the states as its first axis."""
+    """A Pinocchio model evaluated at many states, which are the first axis of every result."""
 
-    def __init__(self, model: PinocchioModel, motion: Motion) -> None:
+    def __init__(self, model: PinocchioModel, motion: JointStates) -> None:
         self.model = model
         self.motion = motion
         self._data = model.createData()
@@ -47,7 +47,7 @@ class Reference:
 
         M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
         upper = np.triu(M)
-        symmetric: Array = upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill the upper triangle alone
+        symmetric: Array = upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill only the upper triangle
         return symmetric
 
     def coriolis_matrix(self) -> Array:
@@ -118,7 +118,7 @@ class Reference:
             turned = R @ h
             lever = 2 * (p @ turned) * np.eye(3) - np.outer(p, turned) - np.outer(turned, p)
             second = R @ second @ R.T + lever + m * (p @ p * np.eye(3) - np.outer(p, p))
-            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in THEIRS)]
+            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in PINOCCHIO_ORDER)]
         return matrix
 
     @property
@@ -127,9 +127,9 @@ class Reference:
         return int(self.model.nv)
 
     def _each(self, answer: Callable[[Array, Array, Array], object], shape: tuple[int, ...]) -> Array:
-        # eigenpy hands a matrix of one column over as a vector.
+        # eigenpy returns a matrix of one column as a vector.
         return np.array([np.reshape(np.array(answer(*state)), shape) for state in zip(*self.motion, strict=True)])
 
 
-THEIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+PINOCCHIO_ORDER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Pinocchio's order of second moments."""

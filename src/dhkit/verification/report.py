@@ -1,4 +1,4 @@
-"""What holding the two paths against each other found."""
+"""Reports of comparisons between two computations."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
 
-MOST_SHOWN = 20
-"""Quantities that a notebook shows: all of an arm's own report."""
+MAX_SHOWN = 20
+"""Largest number of quantities that a notebook shows; an arm's own report has fewer."""
 MEASURE = (
     "Errors are largest differences of an entry at one state: of positions and linear Jacobians over the arm's reach "
     "(1 m at least), of rotations as they are, of all else over the reference's largest entry, or where that is small "
@@ -25,13 +25,13 @@ class Agreement:
     Attributes
     ----------
     quantity
-        What was compared.
+        The quantity that was compared.
     error
-        The largest error over the samples, by the quantity's measure; NaN if a value was missing or not finite.
+        Largest error over the samples; NaN if a value was missing or not finite.
     tolerance
-        The largest error that still counts as agreement, at that state.
+        Largest error that counts as agreement at that state.
     q, qd, qdd
-        The state at which it was seen, rad, m and seconds.
+        The state with this error, rad, m and seconds.
     """
 
     quantity: str
@@ -66,13 +66,13 @@ class VerificationReport:
     robot
         Its name.
     reference
-        What it was held against, with its version.
+        What it was compared with, and the version.
     samples, seed
-        How many random states, from which seed.
+        Number and seed of random states.
     agreements
-        The worst of each quantity.
+        Worst error of each quantity.
     notes
-        What was not compared, and why.
+        Sentences about what was not compared, and why.
     """
 
     robot: str
@@ -105,7 +105,7 @@ class VerificationReport:
         return repr_line("VerificationReport", self.robot, f"{said}, {self.samples} states")
 
     def _repr_html_(self) -> str:
-        # Those that disagree first: a table shows so many.
+        # Disagreements first, because the table is bounded.
         worst = sorted(self.agreements, key=lambda agreement: agreement.ok)
         rows = [
             (
@@ -116,7 +116,7 @@ class VerificationReport:
             )
             for one in worst
         ]
-        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=MOST_SHOWN)
+        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=MAX_SHOWN)
         return html_block(self._title, table, html_lines(self.notes))
 
     @property
@@ -124,7 +124,7 @@ class VerificationReport:
         return f"{self.robot} against {self.reference}, {self.samples} states, seed {self.seed}"
 
     def json(self) -> dict[str, Any]:
-        """Return everything as what JSON knows."""
+        """Return everything as plain data for JSON."""
         units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of sliding joints m, m/s, m/s^2
         agreements = [
             {units.get(key, key): value for key, value in vars(agreement).items()} | {"ok": agreement.ok}
@@ -180,7 +180,7 @@ class VerificationReport:
 
 
 def printable(text: str) -> str:
-    """Return text from a file with what would break a line or command a terminal replaced."""
+    """Return text from a file with characters replaced that break lines or control terminals."""
     return "".join(character if character.isprintable() else "?" for character in text)
 
 
@@ -192,12 +192,12 @@ SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
 
 
 def _plain(text: str) -> str:
-    """Return text that Markdown does not take for a table's or HTML's."""
+    """Return text escaped for a Markdown table."""
     return text.replace("|", "\\|").replace("<", "&lt;")
 
 
 def _escaped(text: str) -> str:
-    """Return text for LaTeX: a robot's name may hold anything."""
+    """Return text escaped for LaTeX."""
     return "".join(SPECIAL.get(character, character) for character in text)
 
 

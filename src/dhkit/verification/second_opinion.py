@@ -1,4 +1,4 @@
-"""A URDF in a second reader: what yourdfpy makes of the frames and inertials that Pinocchio and dhkit read."""
+"""A URDF read by yourdfpy, compared with the frames and inertials that Pinocchio and dhkit read."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_text
 
-AGREED = 1e-9
+TOLERANCE = 1e-9
 """Largest difference of a frame's entries, and of masses, centres and moments of inertia, that counts as agreement."""
 STATES = 10
 
 
 def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
-    """Say whether yourdfpy reads the same frames and inertials; its own rules differ on incomplete files.
+    """Yield a sentence on whether yourdfpy reads the same frames and inertials; it reads incomplete files otherwise.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
         import yourdfpy
     except ImportError:
         return
-    # it reports what it does not like through logging, and so do we through what differs
+    # yourdfpy logs its own warnings; our sentences report what differs.
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
     try:
         robot = yourdfpy.URDF.load(io.BytesIO(chain_text(chain).encode()), load_meshes=False, build_scene_graph=True)
@@ -42,9 +42,9 @@ def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
         return
     different = [name for name in _links(chain) if not _same_inertial(robot, chain, name)]
     version = getattr(yourdfpy, "__version__", "")
-    if frames <= AGREED and not different:
+    if frames <= TOLERANCE and not different:
         yield f"yourdfpy {version} reads the same frames (within {frames:.1e}) and inertials"
-    if frames > AGREED:
+    if frames > TOLERANCE:
         yield f"yourdfpy {version} puts the tool {frames:.1e} away from where Pinocchio has it"
     if different:
         yield f"yourdfpy {version} reads other inertials of links {', '.join(different)[:200]}"
@@ -68,7 +68,7 @@ def _same_inertial(robot: object, chain: Chain, name: str) -> bool:
     inertia = T[:3, :3] @ np.asarray(theirs.inertia, dtype=float) @ T[:3, :3].T
     size = max(1.0, float(np.abs(ours.inertia).max()))
     return bool(
-        abs(theirs.mass - ours.mass) <= AGREED * max(1.0, ours.mass)
-        and np.abs(T[:3, 3] - ours.com).max() <= AGREED
-        and np.abs(inertia - ours.inertia).max() <= AGREED * size
+        abs(theirs.mass - ours.mass) <= TOLERANCE * max(1.0, ours.mass)
+        and np.abs(T[:3, 3] - ours.com).max() <= TOLERANCE
+        and np.abs(inertia - ours.inertia).max() <= TOLERANCE * size
     )

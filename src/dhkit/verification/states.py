@@ -1,4 +1,4 @@
-"""Random states to compare at."""
+"""Random states for comparisons."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from dhkit.description import Array, Description, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
-RATE, ACCELERATION = 3.0, 10.0
-"""rad/s or m/s where a joint has no speed limit; rad/s^2 or m/s^2."""
+DEFAULT_SPEED, ACCELERATION = 3.0, 10.0
+"""Largest speed of a joint without speed limit, rad/s or m/s, and largest acceleration, rad/s^2 or m/s^2."""
 
 
-class Motion(NamedTuple):
+class JointStates(NamedTuple):
     """Joint values, rates and accelerations, each of shape (samples, n), rad, m and seconds."""
 
     q: Array
@@ -22,12 +22,12 @@ class Motion(NamedTuple):
     qdd: Array
 
     def __repr__(self) -> str:
-        return repr_line("Motion", counted(len(self.q), "state"), counted(self.q.shape[-1], "joint"))
+        return repr_line("JointStates", counted(len(self.q), "state"), counted(self.q.shape[-1], "joint"))
 
 
 @takes_robot
 def random_states(description: Description, samples: int, seed: int = 0) -> Array:
-    """Return random joint values, shape (samples, n): full turns, and strokes within the limits (1 m where none).
+    """Return random joint values, shape (samples, n): full turns, and strokes inside limits (without limits 1 m).
 
     Raises
     ------
@@ -44,7 +44,7 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
 
 
 @takes_robot
-def random_motions(description: Description, samples: int, seed: int = 0) -> Motion:
+def random_motions(description: Description, samples: int, seed: int = 0) -> JointStates:
     """Return random states inside the limits of position and speed, with accelerations up to 10 rad/s^2 or m/s^2.
 
     Joints without limits make full turns or a metre, at 3 rad/s or m/s.
@@ -60,8 +60,8 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Mot
     limited = np.isfinite(numbers.lower) & np.isfinite(numbers.upper)
     free = np.where(numbers.prismatic, 1.0, np.pi)
     lower, upper = np.where(limited, numbers.lower, -free), np.where(limited, numbers.upper, free)
-    rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, RATE)
-    return Motion(
+    rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, DEFAULT_SPEED)
+    return JointStates(
         rng.uniform(lower, upper, shape),
         rng.uniform(-rate, rate, shape),
         rng.uniform(-ACCELERATION, ACCELERATION, shape),
