@@ -1,4 +1,4 @@
-"""How much work exact arithmetic may take: what bounds the time that hostile text costs."""
+"""Bounded work of exact arithmetic, so that hostile text cannot take long."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from dhkit.display import repr_line
 from dhkit.errors import ExpressionError
 
 DEFAULT_WORK = 100_000
-"""Term products and sums: about half a second. A file of the library takes 1,000 at most, an arm of symbols with a
-joint locked at 60 degrees 20,000."""
+"""Number of products and sums of terms, about half a second. A file of the library needs at most 1,000, an arm of
+symbols with a joint locked at 60 degrees 20,000."""
 
 
 class Budget:
-    """Work that is left to the exact arithmetic inside a ``with`` block, in this thread.
+    """The work that exact arithmetic may do inside a ``with`` block, in this thread.
 
     Examples
     --------
@@ -46,12 +46,12 @@ _ACTIVE: ContextVar[Budget | None] = ContextVar("budget", default=None)
 
 
 def spend(work: int) -> None:
-    """Take from the budget that is in force, if any.
+    """Take work from the current budget, if there is one.
 
     Raises
     ------
     ExpressionError
-        Nothing is left of it.
+        The budget is used up.
     """
     budget = _ACTIVE.get()
     if budget is not None:
@@ -61,5 +61,5 @@ def spend(work: int) -> None:
 
 
 def budgeted() -> Budget:
-    """Return the budget in force, or a fresh one."""
+    """Return the current budget, or a new one."""
     return _ACTIVE.get() or Budget()

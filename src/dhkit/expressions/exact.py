@@ -1,8 +1,8 @@
-"""Exact numbers and the expressions over them: sums of products, with rational coefficients, in a normal form.
+"""Exact expressions: sums of products with rational coefficients, in a normal form.
 
-An :class:`Expression` is a Laurent polynomial with rational coefficients in its *atoms*: pi, parameters, and functions
-such as ``sin(q1)`` or ``sqrt(2)``. Two texts that mean the same sum of products are equal values, so 17 inches equal
-0.4318 m and ``m1*l1^2/12`` equals ``l1^2*m1/12``, whatever was typed. The float is rounded once, at the end.
+An :class:`Expression` is a Laurent polynomial with rational coefficients in *atoms*: pi, parameters, and functions such
+as ``sin(q1)`` or ``sqrt(2)``. Texts of the same sum of products are equal values: 17 inches equal 0.4318 m, and
+``m1*l1^2/12`` equals ``l1^2*m1/12``. ``float()`` rounds once, at the end.
 """
 
 from __future__ import annotations
@@ -13,39 +13,37 @@ from dataclasses import dataclass, field, replace
 from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cached_property
-from numbers import Integral, Rational, Real
 from typing import TypeAlias
 
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.errors import ExpressionError
 from dhkit.expressions.budget import spend
-from dhkit.expressions.syntax import decimal_fraction
+from dhkit.expressions.syntax import decimal_text
 
 MAX_TERMS = 2_000
-"""Terms of a sum: a robot file's longest entry has a few dozen."""
+"""Largest number of terms of a sum; the longest entry of a robot file has a few dozen."""
 MAX_EXPONENT = 64
-"""Largest whole exponent, which keeps a power's expansion and its digits bounded."""
+"""Largest whole exponent; it bounds a power's expansion and digits."""
 MAX_BITS = 8_192
-"""Bits of a coefficient: beyond the range of a double by far, and still fast."""
+"""Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
 PI_DIGITS = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 STEPS_IN_PI = 12
-"""Twists and offsets that are multiples of 15 degrees have exact cosines."""
-MAX_ATOM = 4_000
-"""Characters of a function with its arguments."""
+"""Steps of 15 degrees in pi: multiples of 15 degrees have exact cosines."""
+MAX_ATOM_LENGTH = 4_000
+"""Longest text of a function with its arguments, characters."""
 LARGEST = 10**308
 """Nearly the largest double."""
-SHORT = 16
-"""Fractions of numbers up to this are printed as such (l1/12), others as decimals where they end (0.4318*l1)."""
+MAX_FRACTION_PART = 16
+"""Fractions with parts up to this are printed as fractions (l1/12), others as decimals (0.4318*l1)."""
 
 Scalar: TypeAlias = "Expression | int | Fraction"
 
 
 @dataclass(frozen=True)
 class Atom:
-    """A factor that is taken whole: pi, a parameter, or a function of expressions.
+    """An indivisible factor: pi, a parameter, or a function of expressions.
 
-    Two names are of our own: ``sqrt``, whose even powers are resolved, and ``group``, a sum that stands below a
-    fraction bar.
+    Two names have rules of their own: even powers of ``sqrt`` are resolved, and ``group`` is a sum in a denominator.
     """
 
     name: str
@@ -53,7 +51,7 @@ class Atom:
 
     @cached_property
     def text(self) -> str:
-        """What it is written as; atoms sort by it."""
+        """The atom as text; atoms are sorted by it."""
         if not self.arguments:
             return self.name
         inner = ", ".join(argument.text for argument in self.arguments)
@@ -67,20 +65,20 @@ class Atom:
         return self._hash
 
     def __reduce__(self) -> tuple[type[Atom], tuple[str, tuple[Expression, ...]]]:
-        return Atom, (self.name, self.arguments)  # without the cached hash, which another process does not share
+        return Atom, (self.name, self.arguments)  # without the cached hash, which differs from process to process
 
     @property
     def is_symbol(self) -> bool:
-        """Whether this is a name with a value of its own, and not pi or a function."""
+        """Whether the atom is a parameter, and not pi or a function."""
         return not self.arguments and self.name != "pi"
 
     def value(self) -> Fraction:
-        """Return the number that this stands for, as near as a double (pi: 60 digits).
+        """Return the atom's value, with the precision of a double (pi: 60 digits).
 
         Raises
         ------
         ExpressionError
-            A name without value, or a function outside its domain.
+            A parameter, or a function outside its domain.
         """
         if self.name == "pi":
             return PI_DIGITS
@@ -113,11 +111,11 @@ class Expression:
     terms
         Pairs of a monomial (atoms with their exponents) and its rational coefficient, sorted, none zero.
     written
-        The text that it was read from; not compared.
+        The text that it was read from; ignored by comparison.
 
     Examples
     --------
-    >>> from dhkit.expressions import parse
+    >>> from dhkit.expressions import exact, parse
     >>> parse("17*inch") == exact(0.4318)
     True
     >>> str(parse("m1*l1^2/12", names=["l1", "m1"]) * 2)
@@ -134,22 +132,22 @@ class Expression:
 
     @classmethod
     def symbol(cls, name: str) -> Expression:
-        """Return a name that stands for itself."""
+        """Return a parameter by its name."""
         return cls.of_atom(Atom(name))
 
     @classmethod
     def of_atom(cls, atom: Atom) -> Expression:
-        """Return the expression that is one atom.
+        """Return the expression of a single atom.
 
         Raises
         ------
         ExpressionError
-            Its text would be longer than anybody reads: functions of functions double it with each level.
+            The text is longer than :data:`MAX_ATOM_LENGTH`; nested functions double it with each level.
         """
         if atom.arguments:
             spend(len(atom.text) // 16)
-            if len(atom.text) > MAX_ATOM:
-                raise ExpressionError(f"a function of more than {MAX_ATOM} characters")
+            if len(atom.text) > MAX_ATOM_LENGTH:
+                raise ExpressionError(f"a function of more than {MAX_ATOM_LENGTH} characters")
         return cls(((((atom, 1),), Fraction(1)),))
 
     @classmethod
@@ -165,12 +163,12 @@ class Expression:
 
     @property
     def is_zero(self) -> bool:
-        """Whether this is zero identically."""
+        """Whether the value is identically zero."""
         return not self.terms
 
     @property
     def rational(self) -> Fraction | None:
-        """The rational number that this is, or None."""
+        """The value as a rational number; None if it is not one."""
         if not self.terms:
             return Fraction(0)
         monomial, coefficient = self.terms[0]
@@ -178,7 +176,7 @@ class Expression:
 
     @property
     def half_turns(self) -> Fraction | None:
-        """The rational r for which this is r pi, or None."""
+        """The rational r with value r pi; None if there is none."""
         if not self.terms:
             return Fraction(0)
         monomial, coefficient = self.terms[0]
@@ -186,16 +184,16 @@ class Expression:
 
     @property
     def symbols(self) -> frozenset[str]:
-        """The names that this depends on."""
+        """The parameters that the value depends on."""
         return frozenset(_symbols(self))
 
     def value(self) -> Fraction:
-        """Return the number that this stands for; only pi and functions are rounded.
+        """Return the value as a rational number; only pi and functions are rounded.
 
         Raises
         ------
         ExpressionError
-            A name without value, a function outside its domain, or a division by zero.
+            A parameter, a function outside its domain, or a division by zero.
         """
         total = Fraction(0)
         for monomial, coefficient in self.terms:
@@ -204,7 +202,7 @@ class Expression:
                 base = atom.value()
                 if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
                     raise ExpressionError(
-                        f"{plain(self.text, SHOWN)} divides by zero" + (", to rounding" if base else "")
+                        f"{plain(self.text, SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
                     )
                 value *= _power(base, exponent)
             total += value
@@ -214,7 +212,7 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{plain(self.text, SHOWN)} is no finite double") from None
+            raise ExpressionError(f"{plain(self.text, SHOWN_LENGTH)} is no finite double") from None
 
     @property
     def text(self) -> str:
@@ -231,11 +229,11 @@ class Expression:
         return f"Expression({plain(str(self), LONGEST_LINE - len('Expression()') - 2)!r})"
 
     def as_written(self, text: str) -> Expression:
-        """Return the same value, to be shown as this text."""
+        """Return the same value with another text to show it by."""
         return replace(self, written=text)
 
     def with_digits(self, digits: int) -> Expression:
-        """Return the value with coefficients that are longer than so many digits rounded to them."""
+        """Return the value with longer coefficients rounded to this number of digits."""
         limit, context = 10**digits, Context(prec=digits)
 
         def rounded(c: Fraction) -> Fraction:
@@ -263,7 +261,7 @@ class Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
-        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // WORD))
+        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // BITS_PER_WORK))
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -302,7 +300,7 @@ def _bits(terms: Iterable[tuple[Monomial, Fraction]]) -> int:
 
 
 def _power(base: Fraction, exponent: int) -> Fraction:
-    """Return a power of a number that is rounded itself, rounded to more digits than it has: exact ones grow long."""
+    """Return a power of a rounded number, rounded to more digits than the number has; exact powers would grow long."""
     if exponent < 0:
         return 1 / _power(base, -exponent)
     result = Fraction(1)
@@ -319,57 +317,17 @@ def _shortened(value: Fraction) -> Fraction:
     return Fraction(round(value * scale)) / scale
 
 
-WORD = 256
-"""Bits of two coefficients whose product costs as much again as finding where it goes."""
+BITS_PER_WORK = 256
+"""Size of two coefficients, bits, whose product takes as long as adding a term; a budget counts both."""
 POWER_BITS = 400
-"""Of a power of pi or a function: 120 digits, twice those of pi."""
-SHOWN = 120
-"""Characters of an expression in a message."""
+"""Precision of powers of pi and functions, bits: 120 digits, twice those of pi."""
+SHOWN_LENGTH = 120
+"""Longest expression in a message, characters."""
 CANCELLED = Fraction(1, 10**14)
-"""Share of its terms' sizes below which a sum of rounded values may be zero: each is rounded to 1e-16."""
+"""A sum of rounded values may be zero if it is below this share of its terms' sizes; each is rounded to 1e-16."""
 
 ZERO = Expression()
 PI = Expression.of_atom(Atom("pi"))
-
-
-def exact(value: object) -> Expression:
-    """Return a number as the exact value that it was written for: 0.1 is 1/10, not the double nearest to it.
-
-    Raises
-    ------
-    ExpressionError
-        Not a number, or not finite.
-    """
-    if isinstance(value, Expression):
-        return value
-    if isinstance(value, bool) or not isinstance(value, (Real, Decimal)):
-        raise ExpressionError(f"{value!r} is no number")
-    if isinstance(value, Integral):
-        whole = int(value)
-        if abs(whole) > LARGEST:
-            raise ExpressionError("an integer beyond the range of a double")
-        return Expression.number(whole)
-    if isinstance(value, Rational):
-        return Expression.number(Fraction(int(value.numerator), int(value.denominator)))
-    number = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
-    if not number.is_finite():
-        raise ExpressionError(f"{value} is not finite")
-    sign, digits = ("-", str(number)[1:]) if number.is_signed() else ("", str(number))
-    magnitude = decimal_fraction(digits)
-    return Expression.number(-magnitude if sign else magnitude)
-
-
-def exact_angle(value: Expression) -> Expression:
-    """Return an angle in radians, with a decimal that is the nearest double to k pi/12 taken as k pi/12.
-
-    Nobody writes 1.5707963267948966 and means another number than pi/2; of any other decimal nothing is guessed.
-    """
-    number = value.rational
-    if not number:
-        return value
-    step = round(number * STEPS_IN_PI / PI_DIGITS)
-    candidate = PI * Fraction(step, STEPS_IN_PI)
-    return replace(candidate, written=value.written) if step and float(candidate) == float(number) else value
 
 
 def _expression(value: Scalar) -> Expression:
@@ -404,7 +362,7 @@ def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
 
 
 def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | None]:
-    """Multiply two monomials; what a square root's or a group's power resolves to is a factor of its own."""
+    """Return the product of two monomials, and the factor that powers of square roots and groups resolve to."""
     if not left or not right:
         return left or right, None
     spend((len(left) + len(right)) // 4)
@@ -427,7 +385,7 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
 
 
 def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
-    """Return the rational r with dividend = r divisor, which a group below the bar would not show; None otherwise."""
+    """Return the rational r with dividend = r divisor; None if there is none. Groups in denominators would hide it."""
     if not dividend.terms or not divisor.terms:
         return None
     ratio = dividend.terms[0][1] / divisor.terms[0][1]
@@ -435,7 +393,7 @@ def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
 
 
 def _is_rounding(atom: Atom, value: Fraction) -> bool:
-    """Return whether a group's value is no more than the rounding of its terms, as that of sin^2 + cos^2 - 1 is."""
+    """Return whether a group's value is within the rounding of its terms, as for sin^2 + cos^2 - 1."""
     if atom.name != "group":
         return False
     terms = sum(abs(Expression((term,)).value()) for term in atom.arguments[0].terms)
@@ -464,32 +422,20 @@ def _atom_power(atom: Atom, exponent: int) -> Expression:
 
 
 def _term_text(monomial: Monomial, coefficient: Fraction) -> str:
-    above = [_power_text(atom, exponent) for atom, exponent in monomial if exponent > 0]
-    below = [_power_text(atom, -exponent) for atom, exponent in monomial if exponent < 0]
+    numerator = [_power_text(atom, exponent) for atom, exponent in monomial if exponent > 0]
+    denominator = [_power_text(atom, -exponent) for atom, exponent in monomial if exponent < 0]
     magnitude = abs(coefficient)
     has_pi = any(atom.name == "pi" for atom, _ in monomial)
-    small = max(magnitude.numerator, magnitude.denominator) <= SHORT
-    decimal = None if monomial and (has_pi or small) else _decimal_text(magnitude)
+    small = max(magnitude.numerator, magnitude.denominator) <= MAX_FRACTION_PART
+    decimal = None if monomial and (has_pi or small) else decimal_text(magnitude)
     if decimal is not None:
-        above[:0] = [decimal] if not monomial or magnitude != 1 else []
+        numerator[:0] = [decimal] if not monomial or magnitude != 1 else []
     else:
-        above[:0] = [str(magnitude.numerator)] if magnitude.numerator != 1 or not above else []
-        below[:0] = [str(magnitude.denominator)] if magnitude.denominator != 1 else []
-    text = "*".join(above or ["1"]) + "".join(f"/{factor}" for factor in below)
+        numerator[:0] = [str(magnitude.numerator)] if magnitude.numerator != 1 or not numerator else []
+        denominator[:0] = [str(magnitude.denominator)] if magnitude.denominator != 1 else []
+    text = "*".join(numerator or ["1"]) + "".join(f"/{factor}" for factor in denominator)
     return f"-{text}" if coefficient < 0 else text
 
 
 def _power_text(atom: Atom, exponent: int) -> str:
     return str(atom) if exponent == 1 else f"{atom}^{exponent}"
-
-
-def _decimal_text(value: Fraction) -> str | None:
-    """Return a rational's decimal, exactly, or None where it does not end."""
-    denominator = value.denominator
-    for prime in (2, 5):
-        while denominator % prime == 0:
-            denominator //= prime
-    if denominator != 1:
-        return None
-    digits = Context(prec=max(50, MAX_BITS // 2))
-    return str(digits.divide(Decimal(value.numerator), Decimal(value.denominator))).lower()

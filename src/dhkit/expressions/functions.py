@@ -1,4 +1,4 @@
-"""Elementary functions of exact values: exact at multiples of 15 degrees and at perfect squares, named otherwise."""
+"""Elementary functions of exact values: resolved at multiples of 15 degrees and perfect squares, atoms otherwise."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from fractions import Fraction
 from functools import cache
 
 from dhkit.errors import ExpressionError
-from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression, exact, exact_angle
+from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression
+from dhkit.expressions.numbers import exact, exact_angle
 
-NOTHING = 1e-40
-"""A function's value below this is taken for 0: no length times it is ever seen, and its digits would be many."""
+NEGLIGIBLE = 1e-40
+"""Values of functions below this are replaced by 0: no length makes them count, and their decimals would be long."""
 SETTLED_DIGITS = 30
 """Digits kept of a coefficient that products of decimals have made longer; a double has 17."""
 LARGEST_FACTORED = 10**6
-"""Square roots of numbers below this are split into those of primes, so that sqrt(6) is sqrt(2)*sqrt(3)."""
+"""Square roots of numbers up to this are split into those of primes: sqrt(6) is sqrt(2)*sqrt(3)."""
 
 
 def sqrt(x: Expression) -> Expression:
-    """Return the square root; perfect squares come out as rationals."""
+    """Return the square root; that of a perfect square is rational."""
     number = x.rational
     if number is None:
         return Expression.of_atom(Atom("sqrt", (x,)))
@@ -65,14 +66,14 @@ def tan(x: Expression) -> Expression:
         return Expression.of_atom(Atom("tan", (x,)))
     if steps % STEPS_IN_PI == 0:
         return ZERO
-    # Half angle: the sine below the bar is one term, so that tan(15 deg) comes out as 2 - sqrt(3).
+    # By the half angle the denominator is one term, so that tan(15 deg) becomes 2 - sqrt(3).
     if steps % (STEPS_IN_PI // 2) == 0:
         raise ExpressionError(f"tan({x.text}) is not finite")
     return (1 - cos(x * 2)) / sin(x * 2)
 
 
 def arc_tangent(y: Expression, x: Expression) -> Expression:
-    """Return atan2(y, x), exactly where both are numbers at a multiple of 15 degrees."""
+    """Return atan2(y, x); exact if it is a multiple of 15 degrees of two numbers."""
     if y.symbols or x.symbols:
         return Expression.of_atom(Atom("atan2", (y, x)))
     angle = math.atan2(float(y), float(x))
@@ -114,7 +115,7 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Expression]]] = {
     "sqrt": (1, sqrt),
     "abs": (1, absolute),
 }
-"""The functions that text may use: name -> number of arguments and meaning. Nothing else is ever called."""
+"""The functions that text may use, by name: number of arguments, and function. No others are ever called."""
 
 
 def call(function: str, *arguments: Expression) -> Expression:
@@ -134,7 +135,7 @@ def call(function: str, *arguments: Expression) -> Expression:
 
 
 def substitute(expression: Expression, values: Mapping[str, Expression]) -> Expression:
-    """Return the expression with names replaced by values; names without one stay."""
+    """Return the expression with parameters replaced by their values; parameters without value stay."""
     if values.keys().isdisjoint(expression.symbols):
         return expression
     total = ZERO
@@ -157,7 +158,7 @@ def _replaced(atom: Atom, values: Mapping[str, Expression]) -> Expression:
 
 def _decimal(atom: Atom) -> Expression:
     value = float(atom.value())
-    return exact(value) if abs(value) > NOTHING else ZERO
+    return exact(value) if abs(value) > NEGLIGIBLE else ZERO
 
 
 def decimals(expression: Expression) -> Expression:
@@ -174,7 +175,7 @@ def decimals(expression: Expression) -> Expression:
 
 
 def _steps(angle: Expression) -> int | None:
-    """Return how many 15 degree steps an angle is, or None."""
+    """Return an angle in steps of 15 degrees; None if it is no multiple."""
     half_turns = angle.half_turns
     if half_turns is None or (half_turns * STEPS_IN_PI).denominator != 1:
         return None
@@ -201,7 +202,7 @@ def _sine_of_steps(steps: int) -> Expression:
 def _inverse(
     name: str, x: Expression, approximate: Callable[[float], float], exactly: Callable[[int], Expression]
 ) -> Expression:
-    """Invert a function at the multiples of 15 degrees, and name its inverse elsewhere."""
+    """Return an inverse function: resolved at multiples of 15 degrees, an atom elsewhere."""
     if not x.symbols:
         try:
             angle = approximate(float(x))
@@ -248,9 +249,9 @@ def _prime_factors(number: int) -> list[tuple[int, int]]:
 
 
 def settled(value: Expression, *, angle: bool = False) -> Expression:
-    """Return a value without parameters as a plain number where it is not one already.
+    """Return a value without parameters as a rational number or a multiple of pi; other values as they are.
 
-    ``sin(0.5)`` is a symbol to the exact arithmetic; written into a table it is 0.479425538604203.
+    ``sin(0.5)`` is an atom of exact arithmetic; in a table it is written as 0.479425538604203.
     """
     if value.symbols or value.rational is not None or value.half_turns is not None:
         return value.with_digits(SETTLED_DIGITS)

@@ -1,4 +1,4 @@
-"""From text to an exact value: the syntax tree worked out over names that the caller allows."""
+"""From text to an exact value: the syntax tree evaluated with the names that the caller allows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CONSTANTS = {
     "cm": Expression.number(Fraction(1, 100)),
     "inch": Expression.number(Fraction(254, 10_000)),
 }
-"""What a name means everywhere: lengths in metres, angles in radians."""
+"""Names with a fixed value, in metres and radians."""
 
 
 def parse(text: str, names: Collection[str] = ()) -> Expression:
@@ -31,7 +31,7 @@ def parse(text: str, names: Collection[str] = ()) -> Expression:
     Parameters
     ----------
     text
-        What a person typed.
+        The text of the expression.
     names
         The parameters or variables that may occur.
 
@@ -52,7 +52,7 @@ def parse(text: str, names: Collection[str] = ()) -> Expression:
 
 
 def value_of(tree: Tree, names: Collection[str]) -> Expression:
-    """Work out a syntax tree."""
+    """Return the value of a syntax tree."""
     match tree:
         case Number(value=decimal):
             return Expression.number(decimal)
@@ -69,7 +69,7 @@ def value_of(tree: Tree, names: Collection[str]) -> Expression:
             product = Expression.number(1)
             for multiplied, factor in factors:
                 if not multiplied and isinstance(factor, Power):
-                    # 1/(a + b)^2 is (1/(a + b))^2: a sum below the bar is not multiplied out.
+                    # 1/(a + b)^2 is (1/(a + b))^2: a sum in a denominator is not multiplied out.
                     product = product * _power(value_of(factor.base, names), -value_of(factor.exponent, names))
                     continue
                 value = value_of(factor, names)

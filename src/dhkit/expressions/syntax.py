@@ -17,23 +17,28 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Context, Decimal
 from fractions import Fraction
 from typing import NamedTuple, NoReturn, TypeAlias
 
 from dhkit.errors import ExpressionError
 
 MAX_LENGTH = 10_000
-"""Characters of one expression: longer than any derivation that a person types."""
+"""Longest expression, characters: longer than any derivation that a person types."""
 MAX_DEPTH = 50
-"""Nested brackets, signs and powers."""
+"""Deepest nesting of brackets, signs and powers."""
 MAX_DIGITS = 400
-"""Digits of one number, and the size of its decimal exponent: beyond it no double is finite."""
+"""Largest number of digits, and largest decimal exponent: no finite double has more."""
 
 TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
 
 
+DECIMAL_DIGITS = 4_096
+"""Precision of printed decimals: more than any coefficient of an exact expression needs."""
+
+
 class Token(NamedTuple):
-    """A number, a name or a sign, and where it stands in its text, from 0."""
+    """A number, a name or a sign, with its position in the text, from 0."""
 
     kind: str
     text: str
@@ -42,7 +47,7 @@ class Token(NamedTuple):
 
 @dataclass(frozen=True)
 class Number:
-    """A decimal, as the rational that it is, and as it was written."""
+    """A decimal as a rational, and as it was written."""
 
     value: Fraction
     text: str
@@ -59,7 +64,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Call:
-    """A function of its arguments; which functions there are is not the grammar's business."""
+    """A function call; the grammar accepts any name."""
 
     function: str
     arguments: tuple[Tree, ...]
@@ -111,9 +116,9 @@ def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
     Parameters
     ----------
     tokens
-        What was found in a text; a kind is ``number``, ``name`` or ``sign``.
+        Tokens of kind ``number``, ``name`` or ``sign``.
     text
-        What messages show; positions count from its beginning.
+        The text for messages; positions count from its beginning.
 
     Raises
     ------
@@ -141,6 +146,18 @@ def decimal_fraction(text: str) -> Fraction:
     except OverflowError:
         raise ExpressionError(f"{shown} is beyond the range of a double") from None
     return value
+
+
+def decimal_text(value: Fraction) -> str | None:
+    """Return a rational as an exact decimal; None if its decimal does not end."""
+    denominator = value.denominator
+    for prime in (2, 5):
+        while denominator % prime == 0:
+            denominator //= prime
+    if denominator != 1:
+        return None
+    digits = Context(prec=DECIMAL_DIGITS)
+    return str(digits.divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
 
 
 def _tokens(text: str) -> list[Token]:
@@ -174,7 +191,7 @@ class _Reader:
         if self.index < len(self.tokens):
             kind, found, at = self.tokens[self.index]
             before = self.tokens[self.index - 1] if self.index else None
-            # Somebody who writes "90 deg" needs a sign between.
+            # For "90 deg" the message asks for a sign between number and name.
             product = before is not None and before.kind == "number" and kind == "name"
             hint = f"; write {before.text}*{found}" if product and before is not None else ""
             raise ExpressionError(f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}{hint}")

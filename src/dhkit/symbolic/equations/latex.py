@@ -13,7 +13,7 @@ from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.latex_width import latex_width
 from dhkit.symbolic.equations.quantities import Quantity, check_length
-from dhkit.symbolic.equations.writing import Printer, decimal_text
+from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator, Ring
 from dhkit.symbolic.ring.notation import (
     Angle,
@@ -73,7 +73,7 @@ class LatexWriter:
         return _bracketed(inner)
 
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
-        decimal = decimal_text(coefficient)
+        decimal = readable_decimal(coefficient)
         number = _number(coefficient) if decimal is None else _scientific(decimal)
         factors = list(numerator)
         if denominator:

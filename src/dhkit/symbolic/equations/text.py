@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.quantities import Quantity, check_length
-from dhkit.symbolic.equations.writing import Printer, decimal_text
+from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import Notation, angles_of, generators_of, notation, renamings
 
@@ -46,7 +46,7 @@ class TextWriter:
         return f"({inner})"
 
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
-        decimal = decimal_text(coefficient)
+        decimal = readable_decimal(coefficient)
         if decimal is not None:
             factors, divisors = [decimal, *numerator], list(denominator)
         else:

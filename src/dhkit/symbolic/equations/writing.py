@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Generic, Protocol, TypeVar
 
 from dhkit.expressions import Atom, Expression
+from dhkit.expressions.exact import MAX_FRACTION_PART
+from dhkit.expressions.syntax import decimal_text
 from dhkit.symbolic.equations.collected import Powers, Product, is_reciprocal
 from dhkit.symbolic.ring import Generator
 
 T = TypeVar("T")
-
-MAX_FRACTION_PART = 16
-"""Fractions with numerator and denominator up to this are printed as fractions (1/12), others as decimals (0.4318)."""
-DECIMAL_DIGITS = 1000
-"""Precision with which decimals that end are written; robot files have far fewer digits."""
 
 
 class Writer(Protocol[T]):
@@ -130,15 +126,9 @@ class Printer(Generic[T]):
         return self.writer.brackets(self.expression(meaning))
 
 
-def decimal_text(value: Fraction) -> str | None:
+def readable_decimal(value: Fraction) -> str | None:
     """Return a rational as an exact decimal; None for a short fraction, or where the decimal does not end."""
-    denominator = value.denominator
-    for prime in (2, 5):
-        while denominator % prime == 0:
-            denominator //= prime
-    if denominator != 1 or max(value.numerator, value.denominator) <= MAX_FRACTION_PART:
-        return None
-    return str(Context(prec=DECIMAL_DIGITS).divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
+    return None if max(value.numerator, value.denominator) <= MAX_FRACTION_PART else decimal_text(value)
 
 
 def is_name(generator: Generator) -> bool:
