@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dhkit.control.complementarity import bounded_forces
+from dhkit.control.plant import bounded_forces
 
 ROUNDING = 1e-12
 

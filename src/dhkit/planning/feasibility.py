@@ -13,7 +13,8 @@ from dhkit.planning.constraints import Constraint
 from dhkit.planning.goals import Place
 from dhkit.planning.objectives import Objective
 from dhkit.planning.states import States
-from dhkit.trajectories import Limits
+from dhkit.planning.task import Task
+from dhkit.trajectories import Limits, quintic, trapezoidal
 
 BARELY = 1e-6
 """By what share of a constraint rounding may exceed it."""
@@ -118,3 +119,30 @@ def require_bounded(description: Description, limits: Limits, objective: Objecti
             f"joint {name} has neither a torque, nor an acceleration, nor a jerk limit: in least time it would jump; "
             "give one (effort in the robot file, or limits=)"
         )
+
+
+def classical(task: Task) -> tuple[tuple[str, float], ...]:
+    """Return the durations of a quintic and of the best trapezoid along the straight joint path, under its limits, s.
+
+    None for what they cannot do: with configurations on the way, other ends than rest, obstacles, or friction.
+    """
+    if (
+        len(task.points) > 2
+        or not task.rests
+        or task.friction is not None
+        or task.surroundings
+        or task.checker.constraints
+    ):
+        return ()
+
+    def torques(q: Array, qd: Array, qdd: Array) -> Array:
+        return States(task.description, np.zeros(len(q)), q, qd, qdd).tau
+
+    found = []
+    for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
+        try:
+            motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
+        except PlanningError:
+            continue  # the straight way may lead through where the arm is too weak
+        found.append((name, motion.duration))
+    return tuple(found)

@@ -17,9 +17,9 @@ from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
 from dhkit.planning.clear import Clear, Surroundings
-from dhkit.planning.comparison import classical, coarser
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
+    classical,
     require_bounded,
     require_holdable,
     require_inside_limits,
@@ -33,7 +33,7 @@ from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
-from dhkit.planning.search import Found, Program, Search
+from dhkit.planning.search import Found, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.states import prepare
 from dhkit.planning.task import FEW, Task, curve_for

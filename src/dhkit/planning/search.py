@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -288,3 +289,14 @@ class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)
 SMALLEST = 1e-9
 ROWS_OF_JOINTS = (*JOINTWISE, "joint positions", "joint velocities")
 """What has a row for each joint."""
+
+
+def coarser(search: Search, motion: Trajectory) -> tuple[int, float] | None:
+    """Return the intervals of a coarser program and a motion's cost on it; nothing where the time is over."""
+    if time.perf_counter() > search.deadline:
+        return None
+    try:
+        found = search(motion)
+    except PlanningError:
+        return None
+    return len(found.trajectory.breaks) - 1, found.cost

@@ -9,12 +9,12 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.along.checks import refuse
-from dhkit.planning.along.excesses import excesses
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.costs import cost_of
 from dhkit.planning.search import FEASIBLE, SLACK, WIDER
 from dhkit.planning.solver import Progress, ProgressCall, Solution, Stopped
+from dhkit.planning.states import States
 from dhkit.trajectories import Trajectory
 
 MOST = 2000
@@ -153,3 +153,15 @@ def _wider(
         total = np.minimum(task.shares(reserved, what, share.shape[1]) + more, MOST_RESERVED)
         wider[what] = np.repeat(total, copies, axis=0)
     return task.halved(much) if much.any() else task, wider
+
+
+def excesses(task: TimingTask, states: States, breaks: Array, ends: Array) -> dict[str, Array]:
+    """Return by what share each kind of limit is exceeded in each interval of the grid, shape (K, rows)."""
+    # Breaks of the path lie between those of the grid.
+    interval = np.clip(np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1, 0, task.intervals - 1)
+    found = {}
+    for what, use in task.checker.peaks(states):
+        over = use.reshape(len(interval), -1, use.shape[1]).max(axis=1) - 1
+        found[what] = np.zeros((task.intervals, use.shape[1]))
+        np.maximum.at(found[what], interval, over)
+    return found
