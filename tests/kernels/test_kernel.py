@@ -14,7 +14,7 @@ import dhkit
 from dhkit.description import library_robot, robots, world_to_tool
 from dhkit.errors import DhkitError
 from dhkit.kernels import Kernel, kernel, machine_code
-from dhkit.kernels.kernel import COMPILE_AFTER, SHARE, SMALL
+from dhkit.kernels.kernel import COMPILE_AFTER, MIN_ITEMS_PER_THREAD, SMALL_BATCH
 from dhkit.kernels.llvm_source import BLOCK, llvm_source
 from dhkit.kernels.threads import all_in_threads, in_threads
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, jacobian
@@ -51,7 +51,7 @@ def cache(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("mode", ["auto", "on", "off"])
-@pytest.mark.parametrize("count", [0, 1, 7, 16, 17, 63, 64, 65, 100, 200, 2 * SHARE + 5])
+@pytest.mark.parametrize("count", [0, 1, 7, 16, 17, 63, 64, 65, 100, 200, 2 * MIN_ITEMS_PER_THREAD + 5])
 def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkeypatch):
     monkeypatch.setenv("DHKIT_KERNELS", mode)
     x = np.random.default_rng(count).normal(size=(count, 3))
@@ -98,17 +98,17 @@ def is_compiled(run):
 def test_small_batches_never_start_a_compilation():
     run = product_kernel()
     for _ in range(COMPILE_AFTER // 16):
-        run_product(run, np.ones((SMALL - 1, 3)))
+        run_product(run, np.ones((SMALL_BATCH - 1, 3)))
     assert not is_compiled(run)
 
 
 def test_items_of_larger_batches_do_by_their_number():
     run = product_kernel()
-    run_product(run, np.ones((COMPILE_AFTER - SMALL - 1, 3)))
+    run_product(run, np.ones((COMPILE_AFTER - SMALL_BATCH - 1, 3)))
     assert not is_compiled(run)
-    run_product(run, np.ones((SMALL, 3)))
+    run_product(run, np.ones((SMALL_BATCH, 3)))
     assert not is_compiled(run)
-    run_product(run, np.ones((SMALL, 3)))
+    run_product(run, np.ones((SMALL_BATCH, 3)))
     assert is_compiled(run)
 
 
@@ -161,7 +161,7 @@ def test_a_machine_that_cannot_compile_interprets(monkeypatch, caplog):
     def refuse(source):
         raise RuntimeError("no such processor")
 
-    monkeypatch.setattr(machine_code, "compiled", refuse)
+    monkeypatch.setattr(machine_code, "compile_module", refuse)
     run = product_kernel()
     for _ in range(2):
         y, _ = run_product(run, np.ones((COMPILE_AFTER, 3)))
@@ -248,7 +248,7 @@ def test_a_kernel_can_be_compiled_for_other_processors(processor):
     triple, _, features = machine_code.processor()
     if not triple.startswith("x86_64"):
         pytest.skip("names processors of that kind")
-    code = machine_code.compiled(llvm_source(product_graph(), ("float64", "uint8")), (triple, processor, ""))
+    code = machine_code.compile_module(llvm_source(product_graph(), ("float64", "uint8")), (triple, processor, ""))
     if processor == "skylake-avx512" and "+avx512f" not in features:
         return
     if processor == "haswell" and "+avx2" not in features:
@@ -263,9 +263,9 @@ def test_a_kernel_can_be_compiled_for_other_processors(processor):
 
 def test_text_that_is_no_kernel_is_refused():
     with pytest.raises(RuntimeError):
-        machine_code.compiled("define void @kernel(")
+        machine_code.compile_module("define void @kernel(")
     with pytest.raises(RuntimeError, match="without a function"):
-        machine_code.CompiledFunction(machine_code.compiled("define void @other() {\n  ret void\n}"))
+        machine_code.CompiledFunction(machine_code.compile_module("define void @other() {\n  ret void\n}"))
 
 
 @pytest.mark.parametrize("name", robots())

@@ -2,12 +2,12 @@
 
 from dhkit.kernels.batches import check_whole, fill, pose_rows, result_array
 from dhkit.kernels.elementary import EXACT_RANGE
-from dhkit.kernels.kernel import SMALL, Kernel, kernel, kernel_mode, uncounted
+from dhkit.kernels.kernel import SMALL_BATCH, Kernel, kernel, kernel_mode, uncounted
 from dhkit.kernels.threads import all_in_threads, in_threads
 
 __all__ = [
     "EXACT_RANGE",
-    "SMALL",
+    "SMALL_BATCH",
     "Kernel",
     "all_in_threads",
     "check_whole",

@@ -1,4 +1,4 @@
-"""From arrays with any batch axes to a kernel's rows, and back."""
+"""Conversion between arrays with any batch axes and a kernel's rows."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def fill(
     Parameters
     ----------
     kernel, parameters
-        What to compute.
+        The kernel and the arm's values of its parameters.
     states
         Arrays of shape (..., n); their batch axes are broadcast.
     tail
-        The result's axes behind the batch axes.
+        Axes of the result after the batch axes.
     out
-        Where to write: float64, C-contiguous, of the result's shape; a new array if not given.
+        Array to write into: float64, C-contiguous, of the result's shape; a new array if not given.
     threads
-        How many threads share a large batch.
+        Number of threads for a large batch.
 
     Raises
     ------
@@ -68,12 +68,12 @@ def _batch(states: Sequence[Array]) -> tuple[int, ...]:
 
 
 def check_whole(name: str, value: object, least: int) -> None:
-    """Refuse what is no whole number, or too small.
+    """Check that a value is a whole number of at least ``least``.
 
     Raises
     ------
     ValueError
-        Says the name, what was found and what is expected.
+        It is not; gives the name, what was found and what is expected.
     """
     if not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} is {value!r}; expected a whole number, {least} or more")

@@ -1,4 +1,4 @@
-"""Elementary functions of vectors, without branches and without calls: a kernel's body holds their operations.
+"""Elementary functions of vectors without branches and calls: their operations are part of a kernel's body.
 
 Polynomials have the coefficients of fdlibm (Sun Microsystems, 1993; its s_sin.c, k_cos.c and s_atan.c), computed by
 Remez exchange; they are numbers, the code is ours.
@@ -16,10 +16,10 @@ Select: TypeAlias = Callable[[Any, Any, Any], Any]
 Absolute: TypeAlias = Callable[[Any], Any]
 
 EXACT_RANGE = 1e6
-"""rad: sine and cosine are right up to here and NaN beyond, where a double says little about an angle."""
+"""Largest angle, rad, of sine and cosine; beyond it, where a double has few digits of an angle, they are NaN."""
 
-NEAREST = 6755399441055744.0
-"""1.5 x 2^52: adding and subtracting it rounds to the nearest integer."""
+ROUND_TO_INTEGER = 6755399441055744.0
+"""1.5 x 2^52; adding and subtracting it rounds a double to the nearest integer."""
 TWO_OVER_PI = 0.6366197723675814
 # pi/2 in three parts. The first two have 33 bits, so that k times them is exact for k up to 2^20.
 HALF_PI_1, HALF_PI_2, HALF_PI_3 = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
@@ -44,8 +44,8 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     The absolute error is at most 2.3e-16 up to ``EXACT_RANGE``, and 2 units in the last place of results above 1e-5;
     beyond it, and of what is not finite, they are NaN.
     """
-    k = (x * TWO_OVER_PI + NEAREST) - NEAREST
-    # The remainder is r + tail: its rounding is kept, or it would cost half a unit in the last place.
+    k = (x * TWO_OVER_PI + ROUND_TO_INTEGER) - ROUND_TO_INTEGER
+    # The remainder is r + tail; without the tail the result would lose half a unit in the last place.
     t = x - k * HALF_PI_1
     second = k * HALF_PI_2
     r = select(absolute(x) <= EXACT_RANGE, t - second, nan)
@@ -65,9 +65,9 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     p = p * z + 4.16666666666666019037e-02
     near_one = 1.0 - half
     cosine = near_one + ((((1.0 - near_one) - half) + (z * z) * p) - r * tail)
-    # The quadrant: k/4 less its nearest integer is 0, 1/4, ±1/2 or -1/4 for k = 0, 1, 2, 3 modulo 4.
+    # The quadrant: k/4 minus its nearest integer is 0, 1/4, ±1/2 or -1/4 for k = 0, 1, 2, 3 modulo 4.
     quarter = k * 0.25
-    quadrant = quarter - ((quarter + NEAREST) - NEAREST)
+    quadrant = quarter - ((quarter + ROUND_TO_INTEGER) - ROUND_TO_INTEGER)
     opposite = absolute(quadrant) > 0.375
     odd = absolute(absolute(quadrant) - 0.25) < 0.125
     s = select(odd, cosine, sine)
@@ -78,7 +78,7 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
 def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute) -> Any:
     """Return the angle of (x, y) in (-pi, pi], to 4 units in the last place; 0 of (0, 0), NaN of NaN.
 
-    The values are vectors, or what has their operators; ``select`` and ``absolute`` belong to them.
+    The values are vectors, or objects with the same operators and their own ``select`` and ``absolute``.
     """
     width, height = absolute(x), absolute(y)
     steep = height > width
@@ -105,5 +105,5 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
     angle = select(steep, HALF_PI - angle, angle)
     angle = select(x < 0.0, PI - angle, angle)
     angle = select(y < 0.0, -angle, angle)
-    # Whoever is NaN is equal to nothing, and so is the sum.
+    # The comparison is false if y or x is NaN.
     return select(absolute(x) + absolute(y) <= inf, angle, nan)

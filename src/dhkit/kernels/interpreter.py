@@ -1,4 +1,4 @@
-"""A program run by CasADi's virtual machine: ready in milliseconds, and fastest for single items and small batches."""
+"""Programs run by CasADi's virtual machine: ready in milliseconds, fast for single items and small batches."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     import casadi
 
 LANES = 64
-"""Items that one call of the virtual machine works through in a larger batch."""
-FEW = 16
-"""Items at the end of a batch that are quicker one by one than among idle lanes."""
+"""Number of items that one call of the virtual machine computes in a larger batch."""
+MAX_SINGLE_ITEMS = 16
+"""Up to this number, items at the end of a batch are computed one by one, which is faster than idle lanes."""
 
 
 class Interpreter:
-    """A program as a function of batches with the rules of a compiled kernel: what is NaN, what small integers say.
+    """A program as a function of batches, with the rules of a compiled kernel for NaN and small integers.
 
     Elementary functions are the C library's, and products are not fused into sums: results agree with those of a
     compiled kernel to rounding. Programs with small integers are rounded alike in both, so that both decide alike.
@@ -41,7 +41,7 @@ class Interpreter:
         self._stages = Stages(self._staged)
 
     def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
-        """Fill ``outputs``; all are arrays (N, size), as of :class:`dhkit.kernels.Kernel`."""
+        """Fill ``outputs``; all are arrays (N, size), as for :class:`dhkit.kernels.Kernel`."""
         count = len(inputs[0])
         if count == 1:
             self._stages.work(1, parameters, inputs, outputs)
@@ -51,7 +51,7 @@ class Interpreter:
             rows = slice(start, start + LANES)
             self._stages.work(LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
             start += LANES
-        if count - start > FEW:
+        if count - start > MAX_SINGLE_ITEMS:
             rows = slice(start, count)
             padded = [np.concatenate([x[rows], np.zeros((start + LANES - count, x.shape[1]))]) for x in inputs]
             results = [np.empty((LANES, y.shape[1]), y.dtype) for y in outputs]

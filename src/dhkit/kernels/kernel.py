@@ -26,19 +26,19 @@ log = logging.getLogger(__name__)
 
 MODES = ("auto", "on", "off")
 
-SMALL = 64
-"""Items: smaller batches are interpreted and do not count towards compiling, so that no control loop waits for it."""
+SMALL_BATCH = 64
+"""Smaller batches are interpreted and do not count towards compiling, so that no control loop waits for it."""
 COMPILE_AFTER = 65_536
-"""Items that larger batches have asked for when a kernel is compiled: interpreting so many takes about as long as
-compiling (30 to 250 ms)."""
-SHARE = 4_096
-"""Items that a thread must have to itself: below that handing them over costs more than it saves."""
-KEPT = 2_048
-"""Kernels that a process keeps; the oldest goes first."""
+"""A kernel is compiled when larger batches have asked for this number of items: interpreting them takes about as long
+as compiling (30 to 250 ms)."""
+MIN_ITEMS_PER_THREAD = 4_096
+"""Smallest number of items for a thread; for fewer, the transfer takes longer than it saves."""
+MAX_KERNELS = 2_048
+"""Largest number of kernels that a process keeps; the oldest is dropped first."""
 
 
 def kernel_mode() -> str:
-    """Return what ``DHKIT_KERNELS`` asks for: ``auto``, ``on`` (always compiled) or ``off`` (never).
+    """Return the value of ``DHKIT_KERNELS``: ``auto``, ``on`` (always compile) or ``off`` (never).
 
     Raises
     ------
@@ -67,11 +67,11 @@ class Kernel:
         self._interpreter: Interpreter | None = None
         self._function: CompiledFunction | None = None
         self._looked_up = False
-        """Whether the cache has been asked for machine code."""
+        """Whether the cache was searched for machine code."""
         self._failed = False
-        """Whether there will be no machine code on this machine."""
+        """Whether compiling failed, so that this kernel stays interpreted."""
         self._items = 0
-        """What has been asked for in batches that are not small."""
+        """Number of items asked for in batches that are not small."""
 
     def __call__(
         self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]], threads: int = 1
@@ -83,7 +83,7 @@ class Kernel:
             interpreter = self._interpreter or self._interpreted()
             interpreter(parameters, inputs, outputs)
             return
-        shares = max(1, min(threads, count // SHARE))
+        shares = max(1, min(threads, count // MIN_ITEMS_PER_THREAD))
         if shares == 1:
             function(parameters, inputs, outputs)
             return
@@ -95,7 +95,7 @@ class Kernel:
         all_in_threads(work, [slice(begin, end) for begin, end in pairwise(edges)])
 
     def compile(self) -> None:
-        """Have machine code from now on: from the cache, or compiled now; unless ``DHKIT_KERNELS`` is ``off``."""
+        """Load machine code from the cache or compile it now, unless ``DHKIT_KERNELS`` is ``off``."""
         if kernel_mode() == "off":
             return
         with _compiling:
@@ -108,14 +108,14 @@ class Kernel:
         return repr_line(f"Kernel {self.name}", said="interpreted" if self._function is None else "compiled")
 
     def _function_for(self, count: int) -> CompiledFunction | None:
-        """Return the machine code for a batch, or None if it is to be interpreted.
+        """Return the machine code for a batch; None if the batch is to be interpreted.
 
-        Once there, it serves batches of any size; small ones never wait for it to be compiled or loaded.
+        Existing machine code serves batches of any size; small batches never wait for compiling or loading.
         """
         mode = kernel_mode()
         if mode == "off":
             return None
-        if self._function is None and not self._failed and (mode == "on" or (count >= SMALL and _counting())):
+        if self._function is None and not self._failed and (mode == "on" or (count >= SMALL_BATCH and _counting())):
             self._items += count
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()
@@ -125,7 +125,7 @@ class Kernel:
         return self._function
 
     def _look_up(self) -> None:
-        """Take machine code from the cache, if it is there."""
+        """Load machine code from the cache if it is there."""
         if self._looked_up:
             return
         try:
@@ -145,7 +145,7 @@ class Kernel:
             from dhkit.kernels import machine_code, store
             from dhkit.kernels.llvm_source import llvm_source
 
-            code = machine_code.compiled(llvm_source(program, self._types))
+            code = machine_code.compile_module(llvm_source(program, self._types))
             self._function = machine_code.CompiledFunction(code)
         except MACHINE_CODE_ERRORS as error:
             self._give_up(error)
@@ -153,7 +153,7 @@ class Kernel:
         store.write(self.name, store.digest(self.name, self._pattern), code)
 
     def _give_up(self, error: Exception) -> None:
-        """Interpret from now on: a processor that LLVM does not know must never stop a computation."""
+        """Interpret from now on, so that a processor unknown to LLVM stops no computation."""
         self._failed = True
         log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
 
@@ -174,14 +174,14 @@ class Kernel:
 
 
 MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
-"""What llvmlite and the loader raise on a machine that they do not serve."""
+"""Errors of llvmlite and the loader on machines that they do not support."""
 
 _kernels: dict[tuple[str, str], Kernel] = {}
 _compiling = threading.RLock()
-"""Held while kernels are compiled and loaded. Who holds both locks took this one first."""
+"""Held while kernels are compiled and loaded. Of both locks, this one is always taken first."""
 _deriving = threading.RLock()
-"""Held while programs are derived: CasADi's expressions are not for two threads at once. A first answer that is
-interpreted waits for no compilation, only for this."""
+"""Held while programs are derived, because CasADi's expressions are not thread-safe. A first answer that is interpreted
+waits for this lock, not for a compilation."""
 
 
 class _Uncounted(threading.local):
@@ -197,7 +197,7 @@ def _counting() -> bool:
 
 @contextmanager
 def uncounted() -> Iterator[None]:
-    """Let this thread's batches not count towards compiling: those inside a call that a control loop may make."""
+    """Exclude this thread's batches from counting towards compiling, for calls that control loops may make."""
     _uncounted.depth += 1
     try:
         yield
@@ -211,23 +211,23 @@ def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence
     Parameters
     ----------
     name, pattern
-        Together say which program it is: ``derive`` is only called when it is new.
+        Together they identify the program: ``derive`` is called only for a new one.
     derive
         Returns the program; its first input holds the parameters, which all items share.
     types
-        Of each output: float64, or uint8 for whole numbers from 0 to 255.
+        Type of each output: float64, or uint8 for whole numbers from 0 to 255.
     """
     found = _kernels.get((name, pattern))
     if found is None:
         with _deriving:
             found = _kernels.setdefault((name, pattern), Kernel(name, pattern, derive, types))
-            while len(_kernels) > KEPT:
+            while len(_kernels) > MAX_KERNELS:
                 del _kernels[next(iter(_kernels))]
     return found
 
 
 def _before_fork() -> None:
-    """Wait for what is being compiled: LLVM's own locks would stay closed in the child."""
+    """Wait for running compilations: LLVM's own locks would stay locked in the child."""
     _compiling.acquire()
     _deriving.acquire()
 
@@ -238,7 +238,7 @@ def _after_fork_in_parent() -> None:
 
 
 def _after_fork_in_child() -> None:
-    """Make new locks: the child's only thread does not hold what it held in the parent."""
+    """Make new locks: the child's only thread does not hold the parent's."""
     global _compiling, _deriving
     _compiling, _deriving = threading.RLock(), threading.RLock()
 

@@ -26,12 +26,12 @@ from dhkit.kernels.vectors import (
 from dhkit.symbolic import Graph
 
 BLOCK = 64
-"""Items of one block: 8 vectors of 8 doubles; all rows of a block, inverse kinematics included, fit the first cache."""
+"""Number of items of a block: 8 vectors of 8 doubles; all rows of a block fit into the first-level cache."""
 
 FLOAT, SMALL_INTEGER = "float64", "uint8"
 """Types of an output's entries, by NumPy's names."""
 STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
-"""The same by LLVM's names."""
+"""LLVM's names of these types."""
 
 Value: TypeAlias = Vector | Mask
 
@@ -63,18 +63,18 @@ LOGICAL: Mapping[str, Callable[..., Mask]] = {
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the entries of a program's variables lie in the rows of a block, each ``BLOCK`` doubles long."""
+    """Rows of a block for the entries of a program's variables; a row has ``BLOCK`` doubles."""
 
     graph: Graph
 
     @property
     def inputs(self) -> list[int]:
-        """The first row of each input behind the parameters, and the row after the last."""
+        """First row of each input after the parameters, and the row after the last."""
         return [0, *accumulate(variable.size for variable in self.graph.inputs[1:])]
 
     @property
     def outputs(self) -> list[int]:
-        """The first row of each output, and the row after the last."""
+        """First row of each output, and the row after the last."""
         start = self.inputs[-1]
         return [start, *(start + x for x in accumulate(variable.size for variable in self.graph.outputs))]
 
@@ -91,9 +91,9 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     graph
         The program; its first input holds the parameters, which all items share.
     types
-        Of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
+        Type of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
     """
-    # Where small integers are decided, every rounding is that of the interpreter, so that both decide alike.
+    # Programs that decide small integers round every operation as the interpreter does, so that both decide alike.
     layout, body = Layout(graph), Body(EXACT if SMALL_INTEGER in types else FUSING)
     results = _results(graph, layout, body, types)
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
@@ -149,7 +149,7 @@ def _results(graph: Graph, layout: Layout, body: Body, types: Sequence[str]) -> 
         [_loaded(body, start + entry) for entry in range(variable.size)]
         for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False)
     ]
-    values = _computed(graph, body, rows)
+    values = _node_values(graph, body, rows)
     missing: Vector | None = None  # 0, or NaN where an input is not finite
     for x in (entry for row in rows for entry in row):
         missing = x - x if missing is None else missing + (x - x)
@@ -164,7 +164,7 @@ def _results(graph: Graph, layout: Layout, body: Body, types: Sequence[str]) -> 
     return lines
 
 
-def _computed(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[Value]:
+def _node_values(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[Value]:
     """Return the value of every node."""
     values: dict[int, Value] = {}
     pairs = graph.angle_pairs
@@ -179,11 +179,11 @@ def _computed(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> lis
                 angle = node.arguments[0]
                 values |= dict(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
         else:
-            values[k] = _applied(node.operation, [values[j] for j in node.arguments])
+            values[k] = _apply(node.operation, [values[j] for j in node.arguments])
     return [values[k] for k in range(len(graph.nodes))]
 
 
-def _applied(operation: str, arguments: Sequence[Value]) -> Value:
+def _apply(operation: str, arguments: Sequence[Value]) -> Value:
     if operation == "select":
         condition, true, false = arguments
         return select(_mask(condition), _number(true), _number(false))
@@ -193,17 +193,17 @@ def _applied(operation: str, arguments: Sequence[Value]) -> Value:
 
 
 def _number(value: Value) -> Vector:
-    """Return a value as numbers: 1 where a truth value holds, else 0."""
+    """Return a value as numbers: 1 for true, 0 for false."""
     return value if isinstance(value, Vector) else select(value, Vector(value.body, constant(1.0)), 0.0)
 
 
 def _mask(value: Value) -> Mask:
-    """Return a value as truth values: a number other than 0 is true."""
+    """Return a value as truth values: numbers other than 0 are true."""
     return value if isinstance(value, Mask) else value.differs(0.0)
 
 
 def _broadcast(k: int) -> Iterator[str]:
-    """Yield the lines that put a parameter into all lanes of ``%pK``."""
+    """Yield the lines that copy parameter K into all lanes of ``%pK``."""
     yield f"  %p{k}_at = getelementptr double, ptr %parameters, i64 {k}"
     yield f"  %p{k}_value = load double, ptr %p{k}_at"
     yield f"  %p{k}_lane = insertelement {VECTOR} poison, double %p{k}_value, i64 0"
@@ -217,7 +217,7 @@ def _array(k: int, name: str) -> Iterator[str]:
 
 
 def _address(body: Body, row: int) -> str:
-    """Return where a row's entries of the vector that is worked on begin."""
+    """Return the address of the current vector in a row."""
     return body.define(f"getelementptr double, ptr {_row(body, row)}, i64 %item")
 
 
@@ -235,7 +235,7 @@ def _copied(label: str, before: str, array: str, size: int, row: int, kind: str,
     Parameters
     ----------
     label
-        Of the loop; it ends in LABEL_end, which the caller closes by a jump.
+        Label of the loop; it ends in LABEL_end, from where the caller jumps on.
     before
         The label that jumps here.
     array, size
@@ -245,7 +245,7 @@ def _copied(label: str, before: str, array: str, size: int, row: int, kind: str,
     kind
         LLVM's type of the array's entries.
     reading
-        Whether the block is read into; otherwise it is written back.
+        Whether the array is copied into the block; otherwise the block is copied back.
     """
     yield f"{label}:"
     yield f"  %{label}_i = phi i64 [0, %{before}], [%{label}_next, %{label}]"
@@ -259,7 +259,7 @@ def _copied(label: str, before: str, array: str, size: int, row: int, kind: str,
         yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {(row + k) * BLOCK}"
         yield f"  {value} = load double, ptr {outer if reading else inner}"
         if kind != "double":
-            # In two steps: the instruction of the processor is one to 32 bits.
+            # In two steps, because the processor's instruction converts to 32 bits.
             yield f"  {value}_wide = fptosi double {value} to i32"
             value = f"{value}_whole"
             yield f"  {value} = trunc i32 %{label}_value{k}_wide to {kind}"

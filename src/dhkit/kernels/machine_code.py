@@ -16,9 +16,9 @@ from dhkit.kernels.llvm_source import BLOCK
 from dhkit.kernels.stages import Stage, Stages, address, aligned
 
 OPTIMIZATION = 2
-"""Of instruction selection and scheduling; a straight-line body of vectors leaves other passes nothing to do."""
+"""LLVM's level for instruction selection and scheduling; for straight-line code no other passes are useful."""
 ALIGNMENT = 64
-"""Bytes: of a block's rows."""
+"""Alignment of a block's rows, bytes."""
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 
 
@@ -28,7 +28,7 @@ def processor() -> tuple[str, str, str]:
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
-def compiled(source: str, target: tuple[str, str, str] | None = None) -> bytes:
+def compile_module(source: str, target: tuple[str, str, str] | None = None) -> bytes:
     """Return the object code of a module.
 
     Parameters
@@ -36,12 +36,12 @@ def compiled(source: str, target: tuple[str, str, str] | None = None) -> bytes:
     source
         LLVM's text.
     target
-        Triple, processor and features, as of :func:`processor`, which is the default.
+        Triple, processor and features; those of :func:`processor` if not given.
 
     Raises
     ------
     RuntimeError
-        LLVM does not take the text, or does not know the processor.
+        LLVM rejects the text, or does not know the processor.
     """
     _start()
     module = llvm.parse_assembly(source)
@@ -51,9 +51,9 @@ def compiled(source: str, target: tuple[str, str, str] | None = None) -> bytes:
 
 
 class CompiledFunction:
-    """The function ``kernel`` of object code of this processor, called with arrays; it lets go of Python's lock.
+    """The function ``kernel`` of object code of this processor, called with arrays without Python's lock.
 
-    The code is trusted: what is no object code of this processor may end the process.
+    The code is trusted: other bytes may end the process.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class CompiledFunction:
             raise RuntimeError("object code without a function named kernel")
         self._function = SIGNATURE(place)
         self._alone: Stages | None = None
-        """What single items pass through."""
+        """Stages for single items."""
 
     def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Fill ``outputs``; all are arrays (N, size), C-contiguous."""
@@ -81,7 +81,7 @@ class CompiledFunction:
             stages.work(1, parameters, inputs, outputs)
             return
         for array in (*inputs, *outputs):
-            # The machine code trusts its pointers.
+            # The machine code does not check its pointers.
             if not array.flags.c_contiguous or len(array) != count:
                 raise ValueError(f"a kernel was given an array of shape {array.shape} and strides {array.strides}")
         self._call(np.ascontiguousarray(parameters), [*inputs, *outputs])()

@@ -1,4 +1,4 @@
-"""Arrays at fixed places, through which single items and small blocks pass: handing over addresses costs more."""
+"""Arrays at fixed addresses for single items and small blocks; passing new addresses would take longer."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Stage:
     outputs: list[NDArray[Any]]
     run: Callable[[], object]
     kept: tuple[Any, ...] = ()
-    """What ``run`` works with without holding it."""
+    """Objects that ``run`` needs and that must stay alive."""
 
     def work(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
-        """Compute as many items as the arrays have rows."""
+        """Compute one item for each row of the arrays."""
         self.parameters[...] = parameters
         for staged, array in zip(self.inputs, inputs, strict=True):
             staged[...] = array
@@ -35,10 +35,9 @@ class Stage:
 
 
 class Stages(threading.local):
-    """A thread's own stages, by how many items they take.
+    """A thread's own stages, by their number of items.
 
-    A stage is taken out while it works: a signal handler that calls the same kernel in between finds none, and gets one
-    of its own.
+    A stage is taken out while it works, so that a signal handler that calls the same kernel gets another one.
     """
 
     def __init__(self, made: Callable[[int], Stage]) -> None:
@@ -46,7 +45,7 @@ class Stages(threading.local):
         self._idle: dict[int, Stage] = {}
 
     def work(self, items: int, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
-        """Compute so many items; see :meth:`Stage.work`."""
+        """Compute ``items`` items; see :meth:`Stage.work`."""
         stage = self._idle.pop(items, None) or self._made(items)
         try:
             stage.work(parameters, inputs, outputs)
@@ -62,6 +61,6 @@ def aligned(size: int, alignment: int) -> Array:
 
 
 def address(array: NDArray[Any]) -> int:
-    """Return where an array's first entry lies."""
+    """Return the address of an array's first entry."""
     found: int = array.__array_interface__["data"][0]
     return found

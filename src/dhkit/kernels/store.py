@@ -1,4 +1,4 @@
-"""Machine code of kernels on disk: a later process neither derives nor compiles."""
+"""Machine code of kernels on disk, so that a later process neither derives nor compiles them."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from dhkit.kernels.machine_code import processor
 log = logging.getLogger(__name__)
 
 PACKAGES = ("description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
-"""Of dhkit: every source that can decide what a kernel computes."""
+"""Packages of dhkit whose sources determine what a kernel computes."""
 VERSIONS = ("casadi", "llvmlite", "numpy")
-"""Packages that programs and machine code are made with."""
+"""Packages whose versions determine programs and machine code."""
 
 
 def cache_folder() -> Path | None:
     """Return the user's own folder of kernels, made if missing: in ``DHKIT_CACHE_DIR`` or the platform's cache folder.
 
-    None where there is none, or where others could write to it or to a folder above it: what lies in it is run.
+    None if there is none, or if others could write to it or to a folder above it: its content is executed.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def cache_folder() -> Path | None:
         _warn_once(f"kernels are not cached: {error}")
         return None
     try:
-        folder = _made(Path.cwd() / root / "kernels").resolve()
+        folder = _make_folder(Path.cwd() / root / "kernels").resolve()
         levels = ((level, level != folder) for level in (folder, *folder.parents))
         foreign = next((level for level, above in levels if _writable_by_others(level.stat(), sticky=above)), None)
     except OSError as error:
@@ -57,8 +57,8 @@ def cache_folder() -> Path | None:
     return folder
 
 
-def _made(folder: Path) -> Path:
-    """Return a folder, made with those above it for this user alone: the umask may allow others more."""
+def _make_folder(folder: Path) -> Path:
+    """Return a folder, created with those above it for this user alone, whatever the umask allows."""
     missing = [level for level in (folder, *folder.parents) if not level.exists()]
     for level in reversed(missing):
         level.mkdir(mode=0o700, exist_ok=True)
@@ -71,9 +71,9 @@ def _warn_once(message: str) -> None:
 
 
 def _writable_by_others(status: os.stat_result, *, sticky: bool = False) -> bool:
-    """Return whether somebody else than this user and the administrator can change a file, or what is in a folder.
+    """Return whether others than this user and the administrator can change a file or a folder's content.
 
-    With ``sticky`` a sticky folder, such as /tmp, will do: others can add to it, but not move what is ours.
+    With ``sticky`` a sticky folder, such as /tmp, is accepted: others can add to it, but not move our files.
     """
     if not hasattr(os, "geteuid"):
         return False
@@ -87,7 +87,7 @@ def _writable_by_others(status: os.stat_result, *, sticky: bool = False) -> bool
 
 @cache
 def _own_group(gid: int) -> bool:
-    """Return whether a group is this user's alone: many systems make one for each user, and let it write by default."""
+    """Return whether this user is the only member of a group; many systems create such groups, with write access."""
     import grp
     import pwd
 
@@ -99,12 +99,12 @@ def _own_group(gid: int) -> bool:
 
 
 def digest(name: str, pattern: str) -> str:
-    """Return what a kernel is found by: its function and pattern, dhkit's sources, versions and the processor."""
+    """Return a kernel's key: a digest of name, pattern, dhkit's sources, package versions and the processor."""
     return hashlib.sha256("\0".join((name, pattern, *_circumstances())).encode()).hexdigest()[:32]
 
 
 def read(name: str, key: str) -> bytes | None:
-    """Return a kernel's machine code, or None if it is not there, damaged, or not to be trusted."""
+    """Return a kernel's machine code; None if it is missing, damaged, or not to be trusted."""
     folder = cache_folder()
     if folder is None:
         return None
@@ -129,9 +129,9 @@ def _own_file(path: Path) -> bytes:
     Raises
     ------
     OSError
-        There is none, or it is another's, a link, a folder or a pipe.
+        It is missing, another user's, a link, a folder or a pipe.
     """
-    # Without blocking: a pipe would wait for somebody to write.
+    # Non-blocking, because opening a pipe would wait for a writer.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     with os.fdopen(handle, "rb") as file:
         status = os.fstat(handle)
@@ -141,7 +141,7 @@ def _own_file(path: Path) -> bytes:
 
 
 def write(name: str, key: str, code: bytes) -> None:
-    """Keep a kernel's machine code for later processes; without a folder, or with a full disk, do nothing."""
+    """Store a kernel's machine code for later processes; do nothing without a folder or on a full disk."""
     folder = cache_folder()
     if folder is None:
         return
@@ -159,7 +159,7 @@ def _path(folder: Path, name: str, key: str) -> Path:
 
 
 def _seal(code: bytes) -> bytes:
-    """Return what stands before machine code: a full disk or a power cut may have left part of it."""
+    """Return the checksum that is stored before machine code, which detects files cut short."""
     return hashlib.sha256(code).digest()
 
 

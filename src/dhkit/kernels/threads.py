@@ -1,4 +1,4 @@
-"""Work shared among waiting threads."""
+"""Work distributed to waiting threads."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Result = TypeVar("Result")
 
 
 def in_threads(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
-    """Yield a function's results in order, worked out by so many threads; by the caller's own if it is one.
+    """Yield a function's results in order, computed by several threads; with one, by the caller's.
 
-    ``function`` must not call this again with more than one thread: all of them may be waiting. When it raises, or the
-    caller stops, what has not begun is not begun, and what has is waited for.
+    ``function`` must not call this again with more than one thread, because all of them may be waiting. When it raises,
+    or the caller stops, items that have not begun are dropped, and running ones are waited for.
     """
     if threads < 2:
         yield from map(function, items)
@@ -35,9 +35,9 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item], thread
 
 
 def all_in_threads(function: Callable[[Item], object], items: Sequence[Item]) -> None:
-    """Call a function with all items at once, a thread each: with the first in the caller's own.
+    """Call a function with all items at once, one thread each, the first in the caller's.
 
-    When it returns or raises, no thread works on an item any more.
+    When this returns or raises, no thread works on an item any more.
     """
     first, *others = items
     pending: list[Future[object]] = []
@@ -51,14 +51,14 @@ def all_in_threads(function: Callable[[Item], object], items: Sequence[Item]) ->
 
 
 def _end(pending: Iterable[Future[Any]]) -> None:
-    """Cancel what has not begun, and wait for what has: it writes into arrays that the caller may use again."""
+    """Cancel futures that have not begun and wait for the others, which write into arrays of the caller."""
     wait([future for future in pending if not future.cancel()])
 
 
 def _submitted(threads: int, function: Callable[[Item], Result], item: Item) -> Future[Result]:
     try:
         return _pool(threads).submit(function, item)
-    except RuntimeError:  # the interpreter ends, and starts no more threads
+    except RuntimeError:  # the interpreter is ending and starts no more threads
         future: Future[Result] = Future()
         future.set_result(function(item))
         return future
@@ -69,7 +69,7 @@ _lock = threading.Lock()
 
 
 def _pool(threads: int) -> ThreadPoolExecutor:
-    """Return at least so many waiting threads; sizes are powers of two, so that few pools serve all requests."""
+    """Return a pool with at least ``threads`` threads; sizes are powers of two, so that few pools exist."""
     size = 1 << (threads - 1).bit_length()
     with _lock:
         if size not in _pools:
@@ -78,7 +78,7 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 
 def _after_fork() -> None:
-    """Threads do not survive a fork, nor does who held the lock: the child makes its own."""
+    """Make new pools and locks in the child: threads do not survive a fork, nor does the holder of a lock."""
     global _lock
     _lock = threading.Lock()
     _pools.clear()

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 WIDTH = 8
-"""Doubles of one vector: a register of AVX-512, two of AVX, four of SSE and NEON."""
+"""Number of doubles of a vector: one register of AVX-512, two of AVX, four of SSE and NEON."""
 VECTOR, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
 
 FUSING, EXACT = "contract nsz", "nsz"
-"""What LLVM may do: fuse products into sums, and drop the sign of zero; or the latter alone, so that every operation is
-rounded as IEEE 754 says. NaN must survive, so nothing else."""
+"""Liberties for LLVM: fuse products into sums and drop the sign of zero; or the latter alone, so that every operation
+is rounded as in IEEE 754. No others, so that NaN survives."""
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Vector:
 
     body: Body
     name: str
-    """Of the value, or the text of a constant."""
+    """Name of the value, or text of a constant."""
 
     def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
         first, second = self.name, _text(other)
@@ -61,7 +61,7 @@ class Vector:
     def __neg__(self) -> Vector:
         return Vector(self.body, self.body.define(f"fneg {self.body.liberties} {VECTOR} {self.name}"))
 
-    # Ordered comparisons are false of NaN; ``differs`` is true of it.
+    # Ordered comparisons with NaN are false; ``differs`` is true.
 
     def __lt__(self, other: Number) -> Mask:
         return Mask(self.body, self._with("fcmp olt", other))
@@ -73,11 +73,11 @@ class Vector:
         return Mask(self.body, self._with("fcmp ogt", other))
 
     def equals(self, other: Number) -> Mask:
-        """Return where two vectors are equal."""
+        """Return whether two vectors are equal, lane by lane."""
         return Mask(self.body, self._with("fcmp oeq", other))
 
     def differs(self, other: Number) -> Mask:
-        """Return where two vectors are not equal."""
+        """Return whether two vectors differ, lane by lane."""
         return Mask(self.body, self._with("fcmp une", other))
 
     def call(self, intrinsic: str) -> Vector:
@@ -107,7 +107,7 @@ class Mask:
 
 
 def constant(value: float) -> str:
-    """Return a double as LLVM's text: its bits, as the value of all lanes."""
+    """Return a double as LLVM's text, by its bits, for all lanes."""
     (bits,) = struct.unpack("<Q", struct.pack("<d", value))
     return f"splat (double 0x{bits:016X})"
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array, takes_robot
-from dhkit.kernels import SMALL, check_whole, in_threads, pose_rows, uncounted
+from dhkit.kernels import SMALL_BATCH, check_whole, in_threads, pose_rows, uncounted
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.forward import forward_kinematics
@@ -126,7 +126,7 @@ def solve_numerically(
     rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
 
     # Not counted for a few poses, so that their many starts do not start a compilation in a control loop.
-    few = uncounted if posed.size < SMALL else nullcontext
+    few = uncounted if posed.size < SMALL_BATCH else nullcontext
 
     def solve(some: slice) -> int:
         with np.errstate(all="ignore"), few():
