@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from dhkit.errors import AnswerError
-from dhkit.grading.batch import GIGABYTE, Sheet, find_sheets, grade_all
+from dhkit.grading.batch import GIGABYTE, grade_all
 from dhkit.grading.report import Entry, GradeReport, Verdict
+from dhkit.grading.sheets import Sheet, find_sheets
 from grading.judged import REPORT
 
 pytestmark = pytest.mark.slow
@@ -173,7 +174,8 @@ def test_a_parent_without_standard_files():
     program = (
         "import os; os.closerange(0, 3)\n"
         "from pathlib import Path\n"
-        "from dhkit.grading.batch import Sheet, grade_all\n"
+        "from dhkit.grading.batch import grade_all\n"
+        "from dhkit.grading.sheets import Sheet\n"
         "from dhkit.grading.report import GradeReport\n"
         "(report,) = grade_all([Sheet(Path('a'))], lambda path: GradeReport('planar2r'))\n"
         "os._exit(7 if report.robot == 'planar2r' else 1)\n"

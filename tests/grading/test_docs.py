@@ -12,7 +12,7 @@ from dhkit.cli import main
 from dhkit.description import library_robot
 from dhkit.grading import Rubric
 from dhkit.grading.answers.sheet import sheet_of
-from dhkit.grading.judge import judge
+from dhkit.grading.sheet_judge import judge_sheet
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "grading.md").read_text("utf-8")
 TASK, SHEET, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
@@ -20,7 +20,7 @@ COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
 def test_the_sheet_is_right():
-    report = judge(library_robot("planar2r"), sheet_of(tomllib.loads(SHEET, parse_float=Decimal)))
+    report = judge_sheet(library_robot("planar2r"), sheet_of(tomllib.loads(SHEET, parse_float=Decimal)))
     assert report.verdict.value == "correct", str(report)
 
 

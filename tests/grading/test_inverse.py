@@ -333,7 +333,7 @@ def test_verdicts_do_not_depend_on_the_seed(name):
     seeds = range(200 if acceptance.ACCEPTING else 8)
     assert {judge(arm, [formulas], seed=seed).verdict for seed in seeds} == {CORRECT}
     spoiled = [*formulas[:-1], f"1.001*({formulas[-1]})"]
-    assert {judge(arm, [spoiled], seed=seed, explained=False).verdict for seed in seeds} == {WRONG}
+    assert {judge(arm, [spoiled], seed=seed, explain=False).verdict for seed in seeds} == {WRONG}
 
 
 # Several mistakes

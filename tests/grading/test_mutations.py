@@ -44,8 +44,8 @@ def test_every_mistake_is_found_and_named(robot, law):
         answer = element_array(truth.of(quantity) + change)
         report = grade_answers(description, {quantity: written(answer, truth.arm(quantity))})
         found = named(report)
-        if report.verdict.value != "wrong" or not {variant.identity, variant.called} & found:
-            missed.append((variant.called, quantity, str(report)))
+        if report.verdict.value != "wrong" or not {variant.identity, variant.name} & found:
+            missed.append((variant.name, quantity, str(report)))
     law.holds("mistakes that are not found or not named", len(missed), 0, missed[:3])
 
 
@@ -65,5 +65,5 @@ def test_every_kinematic_mistake_is_found_and_named(robot, law):
         answer = kinematic_quantity(truth.kinematics, quantity) + change
         report = grade_answers(description, {quantity: written(answer, truth.arm(quantity))})
         if report.verdict.value != "wrong" or variant.identity not in named(report):
-            missed.append((variant.called, quantity, str(report)))
+            missed.append((variant.name, quantity, str(report)))
     law.holds("mistakes that are not found or not named", len(missed), 0, missed[:3])

@@ -123,7 +123,7 @@ def test_mistakes_at_one_body_are_found(arm):
         if not any(change):
             continue
         answer = written(truth.of("g") + change, truth.arm("g"))
-        assert {variant.identity, variant.called} & named(arm.grade({"g": answer})), variant.called
+        assert {variant.identity, variant.name} & named(arm.grade({"g": answer})), variant.name
         found += 1
     assert found >= 10
 

@@ -9,7 +9,7 @@ from acceptance import only_accepting
 from dhkit.description import Convention, from_dh, library_robot, robots
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
-from dhkit.grading.answers.sheet import Task
+from dhkit.grading.answers.sheet import Requirements
 from dhkit.grading.judging.tables import judge_table
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Note, NoteKind, Verdict
@@ -355,13 +355,15 @@ def test_a_task_may_give_frames_and_the_zero_pose():
     description = library_robot("puma560")
     turned = with_entries(own_table(description), theta2="q2 + pi/2", theta3="q3 - 30*deg")
     trees = [[read(str(entry)) for entry in row] for row in turned]
-    for task in (Task(frames_given=True), Task(zero_given=True)):
+    for task in (Requirements(frames_given=True), Requirements(zero_given=True)):
         judgement = judge_table(description, trees, description.convention, task=task)
         assert judgement.verdict is WRONG
         assert "the task gives the" in judgement.entries[1].statement
         assert [found.mistake for found in judgement.diagnosis] == ["other_frames"]
     trees = [[read(str(entry)) for entry in row] for row in turned_x(own_table(description), 2)]
-    assert judge_table(description, trees, description.convention, task=Task(zero_given=True)).verdict is UNDECIDED
+    assert (
+        judge_table(description, trees, description.convention, task=Requirements(zero_given=True)).verdict is UNDECIDED
+    )
 
 
 def test_one_joint():

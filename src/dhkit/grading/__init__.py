@@ -1,6 +1,6 @@
-"""Judging students' work: answers read as text, decided exactly, explained, marked and reported."""
+"""Grading of students' work: answers are read as text, judged exactly, explained, marked and reported."""
 
-from dhkit.grading.judgement import grade, grade_answers, robot_of
+from dhkit.grading.entry_points import grade, grade_answers, robot_of
 from dhkit.grading.marks import Mark, Marks, marks
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict, Witness

@@ -1,4 +1,4 @@
-"""Judging many sheets, each in a process of its own: what hangs, crashes or eats memory harms no other."""
+"""Judging of many sheets, each in a process of its own: one that hangs, crashes or fills the memory harms no other."""
 
 from __future__ import annotations
 
@@ -8,21 +8,26 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import closing
+from dataclasses import replace
 from functools import partial
-from types import TracebackType
+from pathlib import Path
+from typing import TypeAlias
 
-from dhkit.grading.isolation import PIECE, Judge, Limits, judged, kill, start_worker
+from dhkit.errors import DhkitError
+from dhkit.grading.isolation import Limits, Worker, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
 
 GIGABYTE = 1024**3
-MOST = 20_000_000
-"""Bytes of a report."""
+MAX_REPORT_BYTES = 20_000_000
+"""Longest report that is accepted from a process, bytes."""
 
-Numbered = tuple[int, GradeReport]
-"""A report with its sheet's number, from 0."""
+Judge: TypeAlias = Callable[[Path], GradeReport]
+"""Judges a sheet; an exception that it raises becomes the report's error."""
+Numbered: TypeAlias = tuple[int, GradeReport]
+"""A report with the number of its sheet, from 0."""
 
 
 def grade_all(
@@ -37,28 +42,28 @@ def grade_all(
 ) -> Iterator[GradeReport]:
     """Judge sheets, and yield their reports in the order of the sheets.
 
-    Each sheet is judged in a forked process, which has all that this one has imported and computed; so import and
-    compute first, and run no threads. It sends its report as JSON, of which every field is checked. What goes wrong
-    with a sheet becomes its report's ``error``. Where there is no ``os.fork`` (Windows) sheets are judged in this
-    process, one after the other, without limits.
+    Each sheet is judged in a forked process, which inherits all that this process has imported and computed; so import
+    and compute first, and run no threads. It sends its report as JSON, of which every field is checked. An error in
+    judging a sheet becomes its report's ``error``. Without ``os.fork`` (Windows) sheets are judged in this process, one
+    after the other, without limits.
 
     Parameters
     ----------
     sheets
-        What to judge; those that :func:`find_sheets` refused are reported as they are.
+        Sheets to judge; those that :func:`~dhkit.grading.sheets.find_sheets` refused are reported as they are.
     judge
-        Judges one sheet.
+        Function that judges one sheet.
     jobs
-        How many processes at once.
+        Number of processes at once.
     seconds
-        For each sheet, of the clock.
+        Wall-clock time for each sheet, s.
     memory
-        For each sheet, bytes of addresses beyond those that this process has (Linux; elsewhere of addresses in all).
+        Address space for each sheet beyond what this process has, bytes (Linux; elsewhere address space in all).
     prepare
-        Called here with each report as soon as it is there, in whichever order: to compute what later processes
+        Called in this process with each report as soon as it is complete, in any order, to compute what later processes
         inherit. It has no limits.
     progress
-        Called with how many sheets are done, and of how many.
+        Called with the number of sheets judged so far and the number of all sheets.
 
     Raises
     ------
@@ -68,7 +73,10 @@ def grade_all(
     if jobs < 1 or seconds <= 0 or memory <= 0:
         raise ValueError(f"found jobs {jobs}, seconds {seconds}, memory {memory}; expected positive numbers")
     limits = Limits(seconds, memory)
-    results = _forked(sheets, judge, jobs, limits) if hasattr(os, "fork") else _here(sheets, judge, limits)
+    if hasattr(os, "fork"):
+        results = _judge_in_processes(sheets, judge, jobs, limits)
+    else:
+        results = _judge_here(sheets, judge, limits)
     return _in_order(results, len(sheets), prepare, progress)
 
 
@@ -78,140 +86,137 @@ def _in_order(
     prepare: Callable[[GradeReport], object] | None,
     progress: Callable[[int, int], object] | None,
 ) -> Iterator[GradeReport]:
-    waiting: dict[int, GradeReport] = {}
+    early: dict[int, GradeReport] = {}
     turn = 0
     for done, (number, report) in enumerate(results, start=1):
-        waiting[number] = report
+        early[number] = report
         if prepare is not None and not report.error:
             prepare(report)
         if progress is not None:
             progress(done, total)
-        while turn in waiting:
-            yield waiting.pop(turn)
+        while turn in early:
+            yield early.pop(turn)
             turn += 1
 
 
-def _here(sheets: Sequence[Sheet], judge: Judge, limits: Limits) -> Iterator[Numbered]:
+def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: Limits) -> Iterator[Numbered]:
     for number, sheet in enumerate(sheets):
         begin = time.monotonic()
-        report = GradeReport(error=sheet.error) if sheet.error else report_of(judged(sheet.path, judge, limits))
-        yield number, _of_sheet(report, sheet, time.monotonic() - begin)
+        report = GradeReport(error=sheet.error) if sheet.error else report_of(_judge_to_json(sheet.path, judge, limits))
+        yield number, _with_origin(report, sheet, time.monotonic() - begin)
 
 
-def _forked(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: Limits) -> Iterator[Numbered]:
-    """Yield reports as they come."""
-    ahead = deque(enumerate(sheets))
-    with _Processes(judge, limits) as processes:
-        while ahead or processes.running:
-            while ahead and len(processes.running) < jobs:
-                number, sheet = ahead.popleft()
-                refused = sheet.error or processes.start(number, sheet)
-                if refused:
-                    yield number, _of_sheet(GradeReport(error=refused), sheet, 0.0)
-            yield from processes.finished()
+def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: Limits) -> Iterator[Numbered]:
+    """Yield reports as they are completed; at the end no process is left."""
+    waiting = deque(enumerate(sheets))
+    with closing(_Pool(judge, limits)) as pool:
+        while waiting or pool.running:
+            while waiting and len(pool.running) < jobs:
+                number, sheet = waiting.popleft()
+                error = sheet.error or pool.start(number, sheet)
+                if error:
+                    yield number, _with_origin(GradeReport(error=error), sheet, 0.0)
+            yield from pool.wait()
 
 
-@dataclass(eq=False)
-class _Process:
-    """A sheet that is being judged."""
+def _judge_to_json(path: Path, judge: Judge, limits: Limits) -> bytes:
+    """Return the report of a sheet as JSON; an exception of the judge becomes its error."""
+    starved = _error_json(limits.starved)  # made while there is memory
+    try:
+        return judge(path).to_json().encode("utf-8", "replace")
+    except MemoryError:
+        return starved
+    except DhkitError as error:
+        return _error_json(str(error))
+    except (Exception, SystemExit) as error:
+        if "bad_alloc" in str(error):  # C++'s exception of a lack of memory
+            return starved
+        return _error_json(f"{type(error).__name__}: {str(error)[:500]}; please report this")
 
-    number: int
-    sheet: Sheet
-    pid: int
-    pipe: int
-    begin: float
-    deadline: float
-    received: bytearray = field(default_factory=bytearray)
+
+def _error_json(error: str) -> bytes:
+    return GradeReport(error=" ".join(error.split())).to_json().encode("utf-8", "replace")
 
 
-class _Processes:
-    """The processes that judge; at its end none is left."""
+class _Pool:
+    """The processes that judge sheets at the moment."""
 
     def __init__(self, judge: Judge, limits: Limits) -> None:
         self.judge = judge
         self.limits = limits
-        self.running: list[_Process] = []
+        self.running: dict[int, tuple[Sheet, Worker]] = {}
         self._selector = selectors.DefaultSelector()
-        self._left = time.monotonic()
+        self._waited = time.monotonic()
 
-    def __enter__(self) -> _Processes:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        for process in list(self.running):
-            self._end(process)
+    def close(self) -> None:
+        """End all processes."""
+        for number in list(self.running):
+            self._end(number)
         self._selector.close()
 
     def start(self, number: int, sheet: Sheet) -> str:
-        """Begin with a sheet; return why that cannot be."""
+        """Begin to judge a sheet; return why that is impossible, empty if it is not."""
         try:
-            pid, pipe = start_worker(partial(judged, sheet.path, self.judge, self.limits), self.limits)
+            worker = start_worker(partial(_judge_to_json, sheet.path, self.judge, self.limits), self.limits)
         except OSError as error:
             return f"no process to judge it in: {error.strerror}"
-        now = time.monotonic()
-        process = _Process(number, sheet, pid, pipe, now, now + self.limits.seconds)
-        self.running.append(process)
-        self._selector.register(pipe, selectors.EVENT_READ, process)
+        self.running[number] = sheet, worker
+        self._selector.register(worker.pipe, selectors.EVENT_READ, number)
         return ""
 
-    def finished(self) -> list[Numbered]:
-        """Wait until something comes or a limit passes; return what is then done."""
+    def wait(self) -> list[Numbered]:
+        """Wait until a process writes or exceeds its limit; return the reports that are then complete."""
         if not self.running:
             return []
         now = time.monotonic()
-        for process in self.running:  # while the caller was busy, none could hand in its report
-            process.deadline += max(0.0, now - max(self._left, process.begin))
-        patience = min(process.deadline for process in self.running) - now
-        done = [self._read(key.data) for key, _ in self._selector.select(max(0.0, patience))]
-        self._left = time.monotonic()
-        late = [process for process in self.running if process.deadline <= self._left]
-        done += [self._done(process, self.limits.late) for process in late]
-        return [numbered for numbered in done if numbered is not None]
+        workers = {number: worker for number, (_, worker) in self.running.items()}
+        for worker in workers.values():  # while the caller was busy, no process could hand in its report
+            worker.deadline += max(0.0, now - max(self._waited, worker.begin))
+        patience = min(worker.deadline for worker in workers.values()) - now
+        done = []
+        for key, _ in self._selector.select(max(0.0, patience)):
+            is_complete = workers[key.data].read()
+            if len(workers[key.data].received) > MAX_REPORT_BYTES:
+                done.append(self._finish(key.data, f"the judge wrote more than {MAX_REPORT_BYTES / 1e6:g} MB"))
+            elif is_complete:
+                done.append(self._finish(key.data))
+        self._waited = time.monotonic()
+        late = [number for number, (_, worker) in self.running.items() if worker.deadline <= self._waited]
+        return done + [self._finish(number, self.limits.late) for number in late]
 
-    def _read(self, process: _Process) -> Numbered | None:
-        piece = os.read(process.pipe, PIECE)
-        process.received += piece
-        if len(process.received) > MOST:
-            return self._done(process, f"the judge wrote more than {MOST / 1e6:g} MB")
-        return None if piece else self._done(process)
+    def _finish(self, number: int, error: str = "") -> Numbered:
+        sheet, worker = self.running[number]
+        status = self._end(number)
+        report = GradeReport(error=error) if error else self._report(worker.received, status)
+        return number, _with_origin(report, sheet, time.monotonic() - worker.begin)
 
-    def _done(self, process: _Process, error: str = "") -> Numbered:
-        status = self._end(process)
-        report = GradeReport(error=error) if error else self._report(process, status)
-        return process.number, _of_sheet(report, process.sheet, time.monotonic() - process.begin)
+    def _end(self, number: int) -> int:
+        _, worker = self.running.pop(number)
+        self._selector.unregister(worker.pipe)
+        return worker.end()
 
-    def _end(self, process: _Process) -> int:
-        self.running.remove(process)
-        self._selector.unregister(process.pipe)
-        os.close(process.pipe)
-        return kill(process.pid)
-
-    def _report(self, process: _Process, status: int) -> GradeReport:
-        """Return what a process that has ended sent, or why it sent nothing."""
+    def _report(self, received: bytearray, status: int) -> GradeReport:
+        """Return the report that a process sent before it ended, or why it sent none."""
         try:
-            return report_of(bytes(process.received))
+            return report_of(bytes(received))
         except ValueError:
-            fault = "the judge's answer cannot be read" if process.received else "the judge gave no answer"
-        if status < 0:
-            fault = f"the judge stopped: {_signal(-status)}"
-        elif status > 0:
-            fault = f"the judge stopped: status {status}"
+            fault = "the judge's answer cannot be read" if received else "the judge gave no answer"
         if -status in (signal.SIGXCPU, signal.SIGALRM):
             fault = self.limits.late
+        elif status:
+            fault = f"the judge stopped: {_signal_name(-status) if status < 0 else f'status {status}'}"
         return GradeReport(error=fault)
 
 
-def _signal(number: int) -> str:
+def _signal_name(number: int) -> str:
     try:
         return f"signal {number} ({signal.Signals(number).name})"
     except ValueError:
         return f"signal {number}"
 
 
-def _of_sheet(report: GradeReport, sheet: Sheet, seconds: float) -> GradeReport:
-    """Return a report with what this process knows better than the judge."""
+def _with_origin(report: GradeReport, sheet: Sheet, seconds: float) -> GradeReport:
+    """Return a report with the fields that this process knows better than the judge."""
     return replace(
         report,
         sheet=_printable(str(sheet.path)),

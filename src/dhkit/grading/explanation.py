@@ -1,4 +1,4 @@
-"""A robot's equations of motion worked out step by step, as a student should have done."""
+"""Worked solution: a robot's equations of motion, derived step by step."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description import Description
+from dhkit.grading.reports.html import STYLE
 from dhkit.grading.reports.mathml import mathml
-from dhkit.grading.reports.style import STYLE
 from dhkit.symbolic import Lagrangian, lagrangian
 from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
@@ -26,15 +26,15 @@ class Step:
     Attributes
     ----------
     title
-        What is found.
-    words
-        How.
+        Result of the step.
+    method
+        How the result is derived, in a sentence.
     results
-        Names, the same in LaTeX, and elements in the angles that make them shortest; zeros are left out.
+        Names, the same in LaTeX, and elements in the sums of angles that make them shortest; without zeros.
     """
 
     title: str
-    words: str
+    method: str
     results: tuple[tuple[str, str, Element], ...]
 
 
@@ -53,17 +53,17 @@ def explanation_text(description: Description) -> str:
     """Return the worked solution as text."""
     lines = [f"{description.name}: the equations of motion, step by step", ""]
     for number, step in enumerate(worked_solution(description), start=1):
-        lines += [f"{number}. {step.title}", f"   {step.words}", ""]
+        lines += [f"{number}. {step.title}", f"   {step.method}", ""]
         lines += [f"   {name} = {plain_text(element)}" for name, _, element in step.results] or ["   all zero"]
         lines.append("")
     return "\n".join(lines)
 
 
 def explanation_html(description: Description) -> str:
-    """Return the worked solution as a page that stands alone."""
+    """Return the worked solution as an HTML page without other files."""
     body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
     for number, step in enumerate(worked_solution(description), start=1):
-        body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.words)}</p>"]
+        body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.method)}</p>"]
         for name, head, element in step.results:
             text = f"{name} = {plain_text(element)}"
             body.append(f"<p>{mathml(f'{head} = {latex_text(element)}') or html.escape(text)}</p>")
@@ -132,15 +132,15 @@ class _Solution:
             [(f"K{number}", element_array(body.K)), (f"V{number}", element_array(body.V))],
         )
 
-    def _step(self, title: str, words: str, quantities: Sequence[tuple[str, Elements]]) -> Step:
+    def _step(self, title: str, method: str, quantities: Sequence[tuple[str, Elements]]) -> Step:
         results = []
         for name, array in quantities:
-            for place, element in np.ndenumerate(shortened(self.lag.arm, element_array(array))):
+            stem = name.rstrip("0123456789")
+            letter, number = {"w": r"\omega", "tau": r"\tau"}.get(stem, stem), name[len(stem) :]
+            for index, element in np.ndenumerate(shortened(self.lag.arm, element_array(array))):
                 if element:
-                    index = "".join(str(k + 1) for k in place)
-                    letter = {"w": r"\omega", "tau": r"\tau"}.get(name.rstrip("0123456789"), name.rstrip("0123456789"))
-                    number = name[len(name.rstrip("0123456789")) :]
-                    below = ",".join(x for x in (number, index) if x)
-                    head = f"{letter}_{{{below}}}" if below else letter
-                    results.append((f"{name}[{','.join(str(k + 1) for k in place)}]" if place else name, head, element))
-        return Step(title, words, tuple(results))
+                    indices = [str(k + 1) for k in index]
+                    subscript = ",".join(filter(None, (number, "".join(indices))))
+                    latex = f"{letter}_{{{subscript}}}" if subscript else letter
+                    results.append((f"{name}[{','.join(indices)}]" if index else name, latex, element))
+        return Step(title, method, tuple(results))

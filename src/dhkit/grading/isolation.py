@@ -1,4 +1,10 @@
-"""Work in a forked process that can harm nobody: without files, and with limits of time and memory."""
+"""Work in a forked process without files, with limits of time and memory.
+
+The library pebble (``ProcessPool.schedule(timeout=...)``) cannot replace this module. It limits time alone, not memory
+or the size of a result. The parent unpickles results, so that a worker under the control of an answer could control the
+grader; here results are bytes. Its workers are forked ahead, whereas a process here inherits everything derived before
+its sheet. Processes that a worker started are not ended with it.
+"""
 
 from __future__ import annotations
 
@@ -12,33 +18,28 @@ import sys
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import NoReturn
 
-from dhkit.errors import DhkitError
-from dhkit.grading.report import GradeReport
-
-Judge: TypeAlias = Callable[[Path], GradeReport]
-"""Judges a sheet; what it raises becomes the report's error."""
-
-PIECE = 1 << 18
+PIPE_BYTES = 1 << 18
 """Bytes that are read from a pipe at once."""
-MOST_FILES = 65_536
+MAX_FILES = 65_536
+"""Highest number of a file that is closed in a new process."""
 GRACE = 5.0
-"""Seconds that a process may outlive its limit: then its parent has died and nobody else ends it."""
+"""Time that a process may outlive its limit, s: its parent has died then and does not end it."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What judging a sheet may take.
+    """Limits of a process.
 
     Attributes
     ----------
     seconds
-        Of the clock.
+        Wall-clock time, s.
     memory
-        Bytes.
+        Address space beyond what the parent process has, bytes.
     """
 
     seconds: float
@@ -46,41 +47,62 @@ class Limits:
 
     @property
     def late(self) -> str:
-        """What is said of a sheet that takes longer."""
+        """Message on a process that exceeds its time."""
         return f"took longer than {self.seconds:g} s"
 
     @property
     def starved(self) -> str:
-        """What is said of a sheet that needs more memory."""
+        """Message on a process that exceeds its memory."""
         return f"needed more than {self.memory / 1024**3:.3g} GB"
 
 
-def judged(path: Path, judge: Judge, limits: Limits) -> bytes:
-    """Return a sheet's report as JSON; what the judge raises is its error."""
-    starved = _failed(limits.starved)  # made while there is memory
-    try:
-        return judge(path).to_json().encode("utf-8", "replace")
-    except MemoryError:
-        return starved
-    except DhkitError as error:
-        return _failed(str(error))
-    except (Exception, SystemExit) as error:
-        if "bad_alloc" in str(error):  # what C++ calls it
-            return starved
-        return _failed(f"{type(error).__name__}: {str(error)[:500]}; please report this")
+@dataclass(eq=False)
+class Worker:
+    """A forked process and the pipe from which its result is read.
+
+    Attributes
+    ----------
+    pid
+        Number of the process, and of the process group with all that it starts.
+    pipe
+        File descriptor to read from.
+    begin, deadline
+        Start, and latest end, on the clock of :func:`time.monotonic`, s.
+    received
+        Bytes of the result so far.
+    """
+
+    pid: int
+    pipe: int
+    begin: float
+    deadline: float
+    received: bytearray = field(default_factory=bytearray)
+
+    def read(self) -> bool:
+        """Receive what is in the pipe; return whether the process has closed it, its result being complete."""
+        piece = os.read(self.pipe, PIPE_BYTES)
+        self.received += piece
+        return not piece
+
+    def end(self) -> int:
+        """Kill the process with all that it started, unless it has ended; return its status, -k for signal k."""
+        os.close(self.pipe)
+        for kill in (os.killpg, os.kill):
+            with contextlib.suppress(OSError):
+                kill(self.pid, signal.SIGKILL)
+        try:
+            return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        except ChildProcessError:
+            return 0
 
 
-def _failed(error: str) -> bytes:
-    return GradeReport(error=" ".join(error.split())).to_json().encode("utf-8", "replace")
-
-
-def start_worker(work: Callable[[], bytes], limits: Limits) -> tuple[int, int]:
-    """Fork a process that does some work; return its id and the end of a pipe from which to read its result.
+def start_worker(work: Callable[[], bytes], limits: Limits) -> Worker:
+    """Fork a process that does some work and writes the result into a pipe.
 
     Raises
     ------
     OSError
-        No process, or no pipe, is to be had.
+        The system grants no process or no pipe.
     """
     pipe, end = os.pipe()
     try:
@@ -95,119 +117,93 @@ def start_worker(work: Callable[[], bytes], limits: Limits) -> tuple[int, int]:
     if pid == 0:
         _run(end, work, limits)
     os.close(end)
-    with contextlib.suppress(OSError):  # the child does it too: whoever is first
+    with contextlib.suppress(OSError):  # the child does the same: either may be first
         os.setpgid(pid, pid)
-    return pid, pipe
+    now = time.monotonic()
+    return Worker(pid, pipe, now, now + limits.seconds)
 
 
 def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
-    """Return what work in a process of its own gives; in this process where there is no ``os.fork`` (Windows).
+    """Return the result of work in a process of its own; in this process if there is no ``os.fork`` (Windows).
 
     Raises
     ------
     TimeoutError
-        It took longer than the limit.
+        The work took longer than the limit.
     ChildProcessError
         The process ended without a result.
     OSError
-        No process is to be had.
+        The system grants no process.
     """
     if not hasattr(os, "fork"):
         return work()
-    pid, pipe = start_worker(work, limits)
-    received = bytearray()
-    deadline = time.monotonic() + limits.seconds
+    worker = start_worker(work, limits)
     try:
-        while True:
-            ready, _, _ = select.select([pipe], [], [], max(0.0, deadline - time.monotonic()))
-            if not ready:
+        is_complete = False
+        while not is_complete:
+            if not select.select([worker.pipe], [], [], max(0.0, worker.deadline - time.monotonic()))[0]:
                 raise TimeoutError(limits.late)
-            piece = os.read(pipe, PIECE)
-            if not piece:
-                break
-            received += piece
+            is_complete = worker.read()
     finally:
-        os.close(pipe)
-        kill(pid)
-    if not received:
+        worker.end()
+    if not worker.received:
         raise ChildProcessError("the process ended without a result")
-    return bytes(received)
-
-
-def kill(pid: int) -> int:
-    """End a process with all that it started, unless it has ended; return its status, below 0 a signal's."""
-    with contextlib.suppress(OSError):
-        os.killpg(pid, signal.SIGKILL)
-    with contextlib.suppress(OSError):
-        os.kill(pid, signal.SIGKILL)
-    try:
-        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    except ChildProcessError:
-        return 0
+    return bytes(worker.received)
 
 
 def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
-    """Be the child: work, write the result, and leave without cleaning up what is the parent's."""
+    """Run in the child: work, write the result, and exit without cleaning up what belongs to the parent."""
+    import fcntl
+
     status = 1
     try:
         with contextlib.suppress(OSError):
             os.setpgid(0, 0)
-        end = _above_standard(end)
+        end = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 3)  # a parent without an input gives the pipe the number 0
         _close_files(end)
-        _limit(limits)
-        text = work()
+        _set_limits(limits)
+        text = memoryview(work())
         signal.setitimer(signal.ITIMER_REAL, 0.0)  # the parent may be busy with other reports
-        _write(end, text)
+        while text:
+            text = text[os.write(end, text) :]
         status = 0
     finally:
         os._exit(status)
 
 
-def _above_standard(end: int) -> int:
-    """Return a file's copy above 2: a parent without an input gives the pipe the number 0."""
-    import fcntl
-
-    return fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 3)
-
-
 def _close_files(end: int) -> None:
-    """Close all files but the pipe; input and output lead nowhere."""
-    faulthandler.disable()  # it would write into whatever file is next to get its number
-    nowhere = os.open(os.devnull, os.O_RDWR)
+    """Close all files but the pipe; standard input, output and error lead to the null device."""
+    faulthandler.disable()  # it would write into whatever file gets its number next
+    null = os.open(os.devnull, os.O_RDWR)
     for standard in (0, 1, 2):
-        os.dup2(nowhere, standard)
+        os.dup2(null, standard)
     os.closerange(3, end)
-    os.closerange(end + 1, min(os.sysconf("SC_OPEN_MAX"), MOST_FILES))
+    os.closerange(end + 1, min(os.sysconf("SC_OPEN_MAX"), MAX_FILES))
     sys.stdin = open(0, closefd=False)  # noqa: SIM115
     sys.stdout = sys.stderr = open(1, "w", closefd=False)  # noqa: SIM115
 
 
-def _limit(limits: Limits) -> None:
+def _set_limits(limits: Limits) -> None:
     import resource
 
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.setitimer(signal.ITIMER_REAL, limits.seconds + GRACE)
     seconds = math.ceil(limits.seconds) + 1
-    for kind, least, most in (
+    memory = limits.memory + _address_space()
+    for kind, soft, hard in (
         (resource.RLIMIT_CORE, 0, 0),
         (resource.RLIMIT_CPU, seconds, seconds + 1),
-        (resource.RLIMIT_AS, limits.memory + _addresses(), limits.memory + _addresses()),
+        (resource.RLIMIT_AS, memory, memory),
     ):
-        hard = resource.getrlimit(kind)[1]
-        bound = math.inf if hard == resource.RLIM_INFINITY else hard
-        with contextlib.suppress(OSError, ValueError):  # macOS knows no limit of addresses
-            resource.setrlimit(kind, (int(min(least, bound)), int(min(most, bound))))
+        own = resource.getrlimit(kind)[1]
+        bound = math.inf if own == resource.RLIM_INFINITY else own
+        with contextlib.suppress(OSError, ValueError):  # macOS has no limit of the address space
+            resource.setrlimit(kind, (int(min(soft, bound)), int(min(hard, bound))))
 
 
-def _addresses() -> int:
-    """Return how many bytes of addresses are in use: libraries reserve gigabytes that they never touch."""
+def _address_space() -> int:
+    """Return the size of the address space in use, bytes: libraries reserve gigabytes that they never touch."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
         return 0
-
-
-def _write(end: int, text: bytes) -> None:
-    left = memoryview(text)
-    while left:
-        left = left[os.write(end, left) :]

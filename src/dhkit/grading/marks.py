@@ -1,10 +1,9 @@
-"""The marks that a rubric gives a judgement: a pure function of both, so that a report can be marked again."""
+"""Marks of a report by a rubric: a pure function of both, so that a report can be marked again."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.grading.answers.sheet import QUANTITY
@@ -14,7 +13,7 @@ from dhkit.grading.rubric import Credit, Rubric
 
 @dataclass(frozen=True)
 class Mark:
-    """The points of an entry or of a quantity, of at most so many, and the rule that gave them."""
+    """Points of an entry or a quantity, the points possible, and the rule that gave them."""
 
     name: str
     points: float
@@ -27,16 +26,16 @@ class Mark:
 
 @dataclass(frozen=True)
 class Marks:
-    """The points of a sheet.
+    """Points of a sheet.
 
     Attributes
     ----------
     points, most
-        Of the sheet.
+        Points given, and points possible.
     entries
-        One an entry, in the report's order.
+        Marks of the entries, in the report's order.
     quantities
-        Their sums, and those that are asked for and missing.
+        Sums by quantity, also for quantities that are asked for and missing.
     """
 
     points: float
@@ -44,30 +43,30 @@ class Marks:
     entries: tuple[Mark, ...] = ()
     quantities: tuple[Mark, ...] = ()
 
-    def data(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+    def data(self) -> dict[str, object]:
+        """Return all fields as plain data."""
         return asdict(self)
 
     def without_rules(self) -> Marks:
-        """Return the points alone: a rule may name the mistake that a student is to find."""
+        """Return the marks without rules, which may name the mistake that a student is to find."""
         return replace(self, entries=tuple(replace(mark, rule="") for mark in self.entries))
 
     def __repr__(self) -> str:
-        return repr_line("Marks", said=self._sum)
+        return repr_line("Marks", said=self._points)
 
     def _repr_html_(self) -> str:
         rows = [(mark.name, f"{mark.points:.4g}", f"{mark.most:.4g}", mark.rule) for mark in self.quantities]
-        return html_block(self._sum, html_table(("quantity", "points", "of", "rule"), rows, align="lrrl"))
+        return html_block(self._points, html_table(("quantity", "points", "of", "rule"), rows, align="lrrl"))
 
     @property
-    def _sum(self) -> str:
+    def _points(self) -> str:
         return f"{self.points:.4g} of {self.most:.4g} points"
 
 
 def marks(report: GradeReport, rubric: Rubric) -> Marks:
     """Return the points of a judged sheet; a sheet that could not be judged gets 0.
 
-    The sums are exact before they are made floats, so that what is right throughout gets all points and not nearly all.
+    Sums are exact until they become floats, so that a sheet without errors gets all points and not nearly all.
     """
     if report.error or not report.entries:
         return Marks(0.0, rubric.points)
@@ -89,7 +88,7 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
 
 
 def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction]:
-    """Return the weights of what is on the sheet, and of what should be."""
+    """Return the weights of the quantities on the sheet, and of those that should be on it."""
     named = {name: _exact(weight) for name, weight in rubric.weights.items() if QUANTITY.fullmatch(name)}
     others = Fraction(0 if any(named.values()) else 1)
     weights = {quantity: named.get(quantity, others) for quantity in report.quantities}
@@ -104,13 +103,13 @@ def _entry_weight(entry: Entry, rubric: Rubric) -> Fraction:
 
 
 def _part(entry: Entry, report: GradeReport, rubric: Rubric) -> Fraction:
-    """Return which part of its quantity an entry is."""
+    """Return the share of an entry in the weight of its quantity."""
     total = sum(_entry_weight(other, rubric) for other in report.of(entry.quantity))
     return _entry_weight(entry, rubric) / total if total else Fraction(0)
 
 
 def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction, str]:
-    """Return the share that an entry gets of its points, and why: of several reasons the best."""
+    """Return the share of its points that an entry gets, and the rule: the best of several."""
     simple = {
         Verdict.CORRECT: 1.0,
         Verdict.ROUNDED: credit.rounding,
@@ -127,20 +126,20 @@ def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction,
 
 
 def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> list[tuple[Fraction, str]]:
-    """Return what speaks for a wrong entry."""
-    found = [one for one in diagnosis if one.mistake and entry.name in one.entries]
+    """Return the shares that a wrong entry may get, with their rules."""
+    mistakes = [one for one in diagnosis if one.mistake and entry.name in one.entries]
     reasons = [(_exact(credit.follow_on), f"follows from {entry.follows}")] if entry.follows else []
-    if any(one.mistake == "other_frames" for one in found):
+    if any(one.mistake == "other_frames" for one in mistakes):
         reasons.append((_exact(credit.other_frames), "right in other frames"))
-    elif found:
-        shares = [_mistake_share(one, credit, credit.diagnosed if len(found) == 1 else 0.0) for one in found]
-        reasons.append((_exact(min(shares)), " and ".join(str(one.mistake) for one in found)))
+    elif mistakes:
+        shares = [_mistake_share(one, credit, credit.diagnosed if len(mistakes) == 1 else 0.0) for one in mistakes]
+        reasons.append((_exact(min(shares)), " and ".join(str(one.mistake) for one in mistakes)))
     return reasons
 
 
-def _mistake_share(found: Diagnosis, credit: Credit, otherwise: float) -> float:
-    """Return what the rubric gives for a mistake, or for one that gives the same answers and is worth more."""
-    names = (str(found.mistake), *found.equivalent)
+def _mistake_share(diagnosis: Diagnosis, credit: Credit, otherwise: float) -> float:
+    """Return the rubric's share for a mistake, or for an equivalent one that gets more."""
+    names = (str(diagnosis.mistake), *diagnosis.equivalent)
     bare = [name if name in credit.mistakes else name.partition(" (")[0] for name in names]  # half_forgotten (link 2)
     return max((credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise)
 

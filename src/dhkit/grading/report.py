@@ -1,22 +1,24 @@
-"""What a judgement says: verdicts entry by entry, and which mistakes would give these answers; plain data."""
+"""Reports: the verdict on each entry of an answer sheet, and the mistakes that explain it, as plain data."""
 
 from __future__ import annotations
 
 import json as jsons
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import Enum
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
 
-MOST_NAMED = 6
-LONGEST_SHOWN = 400
-"""Characters of an answer, and of what is said about it, that a notebook shows."""
+MAX_ENTRIES_NAMED = 6
+"""Entries that a message names; of more, the rest is counted."""
+MAX_CHARACTERS_SHOWN = 400
+"""Longest answer, and longest statement about one, that a notebook shows, in characters."""
 
 
 class Verdict(Enum):
-    """What is decided of an entry, or of a sheet; the worst last."""
+    """Verdict on an entry or a sheet, from best to worst."""
 
     CORRECT = "correct"
     ROUNDED = "correct within rounding"
@@ -27,25 +29,25 @@ class Verdict(Enum):
 
     @property
     def severity(self) -> int:
-        """How bad it is, from 0."""
+        """Position in the order from best, 0, to worst."""
         return list(Verdict).index(self)
 
     @property
     def passes(self) -> bool:
-        """Whether nothing was found wrong."""
+        """Whether the entry is correct or undecided: no error was found."""
         return self.severity <= Verdict.UNDECIDED.severity
 
 
 @dataclass(frozen=True)
 class Witness:
-    """A state in which an answer and the truth differ, SI and radians.
+    """State at which an answer and the truth differ, in SI units and rad.
 
     Attributes
     ----------
     state
-        Values by name: q1, qd1, parameters, or px ... r33 for inverse kinematics.
+        Values by name: q1, qd1, parameters; of inverse kinematics the tool's pose px ... r33.
     answer, truth
-        What each gives there; None where the answer has no value.
+        Value of each at the state; None if the answer has no value there.
     """
 
     state: Mapping[str, float]
@@ -60,32 +62,32 @@ class Witness:
 
 @dataclass(frozen=True)
 class Entry:
-    """The judgement of one entry of a quantity.
+    """Verdict on one entry of a quantity, with its reason.
 
     Attributes
     ----------
     quantity
         M, C, h, g, tau, K, V, L, A1 ... An, T, J, dh or ik.
     index
-        Where it stands, from 0; empty for a number such as K.
+        Indices of the entry in the quantity, from 0; empty for a scalar such as K.
     verdict
-        What is decided of it.
+        Verdict on the entry.
     answer
-        The text as it was handed in.
+        Text of the answer as it was handed in.
     latex
-        The answer as it was read, in LaTeX, names in the robot's own; empty where it could not be read, or is too long.
+        The answer as it was read, in LaTeX and in the robot's own names; empty if it could not be read or is too long.
     statement
-        Why the verdict holds, in a line: proved, sampled, within which rounding.
+        Reason of the verdict in one line: proved, sampled, or within which rounding.
     difference
-        The answer less the truth, as text, where it is wrong; None where it cannot be written.
+        The answer less the truth as text, for a wrong entry; None if it cannot be written.
     difference_latex
-        The same in LaTeX; empty without one.
+        The same difference in LaTeX; empty without one.
     witness
-        A state in which both differ, where it is wrong.
+        State at which the answer and the truth differ, for a wrong entry.
     follows
-        Which earlier answers of the same sheet this follows from: right in itself, wrong because they are.
+        Earlier answers of the same sheet from which this one follows: it is derived correctly from wrong answers.
     read
-        The answer as it was read, as plain text in the robot's own names; empty where ``latex`` is.
+        The answer as it was read, as plain text in the robot's own names; empty whenever ``latex`` is.
     """
 
     quantity: str
@@ -102,8 +104,8 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """The entry as people write it, counted from 1: M12, g1, K."""
-        return self.quantity + ("_" if any(k > 8 for k in self.index) else "").join(str(k + 1) for k in self.index)
+        """Name of the entry with indices from 1, as people write it: M12, g1, K."""
+        return entry_name(self.quantity, self.index)
 
     def __repr__(self) -> str:
         answer = f", {plain(self.answer, 60)}" if self.answer else ""
@@ -119,25 +121,35 @@ class Entry:
             "witness": "" if self.witness is None else repr(self.witness)[1:-1].removeprefix("Witness: "),
         }
         rows = [(name, text) for name, text in texts.items() if text]
-        return html_block(f"{self.name}: {self.verdict.value}", html_table((), rows, longest=LONGEST_SHOWN))
+        return html_block(f"{self.name}: {self.verdict.value}", html_table((), rows, longest=MAX_CHARACTERS_SHOWN))
+
+
+def entry_name(quantity: str, index: tuple[int, ...]) -> str:
+    """Return the name of an entry, counted from 1: M12, and M1_10 if an index has two digits."""
+    return quantity + ("_" if any(k > 8 for k in index) else "").join(str(k + 1) for k in index)
+
+
+def worst_verdict(entries: Iterable[Entry]) -> Verdict | None:
+    """Return the worst verdict on some entries; None without entries."""
+    return max((entry.verdict for entry in entries), key=lambda verdict: verdict.severity, default=None)
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A mistake that gives exactly these answers, or what the terms show where none does.
+    """Mistake that gives exactly the answers of a sheet, or a description of their terms if no mistake does.
 
     Attributes
     ----------
     mistake
-        A stable name; None where only terms are described.
+        Identity of the mistake in the library; None if the terms alone are described.
     sentence
-        What a student learns from it.
+        Explanation for the student.
     where
-        The quantity and, where it is one alone, the link: ``g, link 2``.
+        The quantity and, if the mistake was made at one link alone, the link: ``g, link 2``.
     entries
-        Names of the wrong entries that it explains.
+        Names of the wrong entries that the mistake explains.
     hint
-        Where to look, without saying what is wrong.
+        Where to look, without naming the mistake.
     equivalent
         Other mistakes of the library that give the same answers.
     """
@@ -152,8 +164,9 @@ class Diagnosis:
     @property
     def place(self) -> str:
         """The entries in a few words, for messages."""
-        if len(self.entries) > MOST_NAMED:
-            return f"{', '.join(self.entries[: MOST_NAMED - 1])} and {len(self.entries) - MOST_NAMED + 1} more"
+        if len(self.entries) > MAX_ENTRIES_NAMED:
+            named = ", ".join(self.entries[: MAX_ENTRIES_NAMED - 1])
+            return f"{named} and {len(self.entries) - MAX_ENTRIES_NAMED + 1} more"
         return ", ".join(self.entries) or self.where
 
     def __repr__(self) -> str:
@@ -161,7 +174,7 @@ class Diagnosis:
 
 
 class NoteKind(Enum):
-    """What a note is about; :func:`dhkit.grading.reports.notes.note_text` puts it into words."""
+    """Subject of a note; :func:`dhkit.grading.reports.notes.note_text` writes the sentence."""
 
     AGREES = "agrees"
     """A quantity is what the sheet's own quantities ``values`` give, right or wrong."""
@@ -172,7 +185,7 @@ class NoteKind(Enum):
     SIDES_DIFFER = "sides_differ"
     """The sides of an entry's chain of equations differ; the last one is judged."""
     SIDES_UNREAD = "sides_unread"
-    """A side of an entry's chain of equations before the last could not be read, and was not held against it."""
+    """A side of an entry's chain of equations before the last could not be read, and was not compared with it."""
     CHRISTOFFEL = "christoffel"
     """C is the factorization of the Christoffel symbols."""
     SKEW = "skew"
@@ -180,23 +193,23 @@ class NoteKind(Enum):
     NOT_SKEW = "not_skew"
     """C is another factorization, for which dM/dt - 2 C is not skew-symmetric."""
     BY_TORQUES = "by_torques"
-    """C is judged by C qd alone: which factorization it is could not be decided."""
+    """C is judged by C qd alone: its factorization could not be determined."""
     TAKEN_FOR = "taken_for"
     """The name ``values[0]`` was read as ``values[1]``."""
     UP_TO_A_CONSTANT = "up_to_a_constant"
     """An energy is right up to a constant."""
     NOT_EXPLAINED = "not_explained"
-    """Mistakes were not looked for, since an answer is too long; ``values`` has the limit that it breaks."""
+    """Mistakes were not looked for, because an answer is too long; ``values`` has the limit that it exceeds."""
     OTHER_CONVENTION = "other_convention"
     """The file's table is in the convention ``values[0]``, and the answer in ``values[1]``."""
     RIGHT_IN_OTHER_FRAMES = "right_in_other_frames"
-    """A table with a slip would be right for the same arm in other frames than the file's."""
+    """A table with a slip would be right for the same arm in frames other than the file's."""
     ASKED_FOR = "asked_for"
-    """Inverse kinematics are asked for the parts ``values`` of the pose, which the arm can meet."""
+    """Inverse kinematics are asked for the parts ``values`` of the pose, which the arm can reach."""
     POSITIONS_ONLY = "positions_only"
-    """Inverse kinematics of an arm without a closed form of ours are asked for positions alone."""
+    """Inverse kinematics of an arm without a closed form in dhkit are asked for positions alone."""
     NO_CLOSED_FORM = "no_closed_form"
-    """How many solutions there are is open: the arm has no closed form of ours."""
+    """The number of solutions is unknown: dhkit has no closed form for the arm."""
     SOLUTIONS_MISSING = "solutions_missing"
     """The branches give ``values[0]`` of the ``values[1]`` solutions that the arm has in general."""
     PROGRAM = "program"
@@ -205,16 +218,16 @@ class NoteKind(Enum):
 
 @dataclass(frozen=True)
 class Note:
-    """What a reader should know beside the verdicts, as data.
+    """Remark that a reader needs besides the verdicts, as data.
 
     Attributes
     ----------
     kind
-        What it is about.
+        Subject of the note.
     quantity
-        The quantity or entry that it concerns; empty if it is the sheet.
+        The quantity or entry that it concerns; empty if it concerns the sheet.
     values
-        Names, numbers and texts that the kind tells of.
+        Names, numbers and texts that the sentence contains.
     """
 
     kind: NoteKind
@@ -227,40 +240,67 @@ class Note:
 
 
 @dataclass(frozen=True)
+class KinematicJudgement:
+    """Part of a report that concerns a Denavit-Hartenberg table, or formulas of inverse kinematics.
+
+    Attributes
+    ----------
+    entries
+        One for each row of the table, or one for each branch.
+    diagnosis
+        Mistakes, row by row or branch by branch.
+    notes
+        Remarks that a reader needs besides the verdicts.
+    judged_at
+        Values of the parameters that the answer holds as numbers, SI units and rad.
+    """
+
+    entries: tuple[Entry, ...]
+    diagnosis: tuple[Diagnosis, ...] = ()
+    notes: tuple[Note, ...] = ()
+    judged_at: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict on an entry."""
+        return worst_verdict(self.entries) or Verdict.UNREADABLE
+
+
+@dataclass(frozen=True)
 class GradeReport:
-    """What is decided of an answer sheet.
+    """Result of judging an answer sheet.
 
     Attributes
     ----------
     robot
         The robot's name.
     digest
-        Of the robot as data: two reports with one digest judged by the same truth.
+        Digest of the robot's description: reports with equal digests were judged by the same truth.
     version
-        Of dhkit.
+        Version of dhkit.
     entries
-        One an entry, in the order of the sheet.
+        Verdicts entry by entry, in the order of the sheet.
     diagnosis
-        What went wrong, quantity by quantity.
+        Mistakes, quantity by quantity.
     notes
-        What a reader should know: numbers taken from the file, a different valid factorization, conventions.
+        Remarks that a reader needs: numbers taken from the file, another valid factorization, conventions.
     sheet
-        The file, or what else it was; None for answers of the Python API.
+        File of the sheet, or another source; None for answers of the Python API.
     student
         Student's name; empty if unknown.
     error
-        Why the sheet could not be judged; empty where it was.
+        Why the sheet could not be judged; empty if it was.
     seconds
-        How long it took.
+        Time that judging took, s.
     left_out
         Statements and files of the student's that were not read as answers.
     judged_at
-        Parameters that the answers hold as numbers: what is right is right at these values alone, the file's.
+        Parameters that the answers hold as numbers, in SI units and rad: verdicts hold at these values, the file's,
+        alone.
     seed
-        Seed of the random states that answers outside the exact ring were tried at; None where the sheet was not
-        judged.
+        Seed of the random states at which answers outside the exact ring were tried; None if the sheet was not judged.
     proof_required
-        Whether the task asks for proof: what is undecided then does not pass.
+        Whether the task asks for proof: undecided entries then do not pass.
     own_robot
         Whether the sheet itself names the robot that it was judged by.
 
@@ -290,24 +330,23 @@ class GradeReport:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the entries."""
-        if self.error or not self.entries:
-            return Verdict.UNREADABLE
-        return max((entry.verdict for entry in self.entries), key=lambda verdict: verdict.severity)
+        """The worst verdict on an entry; unreadable if the sheet could not be judged."""
+        return (None if self.error else worst_verdict(self.entries)) or Verdict.UNREADABLE
 
     def __bool__(self) -> bool:
-        """Whether the sheet passes: nothing is wrong, missing or unread, and all is proved where that is asked for."""
-        return self.verdict.passes and not (self.proof_required and self.verdict is Verdict.UNDECIDED)
+        """Whether the sheet passes: nothing is wrong, missing or unread, and all is proved if the task asks for it."""
+        return self.verdict.passes and not self._lacks_proof
+
+    @property
+    def _lacks_proof(self) -> bool:
+        return self.proof_required and self.verdict is Verdict.UNDECIDED
 
     @property
     def conclusion(self) -> str:
-        """The verdict in words, with the parameter values at which it holds and what it lacks to pass."""
-        said = self.verdict.value
-        if self.judged_at:
-            said += f", judged at {', '.join(f'{name} = {value:g}' for name, value in self.judged_at.items())}"
-        if self.proof_required and self.verdict is Verdict.UNDECIDED:
-            said += ", and a proof is asked for"
-        return said
+        """The verdict in words, with the parameter values at which it holds and what the sheet lacks to pass."""
+        values = ", ".join(f"{name} = {value:g}" for name, value in self.judged_at.items())
+        proof = ", and a proof is asked for" if self._lacks_proof else ""
+        return f"{self.verdict.value}{f', judged at {values}' if values else ''}{proof}"
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -316,89 +355,78 @@ class GradeReport:
 
     @property
     def fault(self) -> str:
-        """Why the sheet, or its first entry that could not be read, was not judged; empty where all was."""
+        """Why the sheet, or its first unreadable entry, was not judged; empty if all were judged."""
         unread = (entry for entry in self.entries if entry.verdict is Verdict.UNREADABLE)
         return self.error or next((f"{entry.name}: {entry.statement}" for entry in unread), "")
 
     def __str__(self) -> str:
-        """Return the verdict, what is wrong, and why, in a few lines."""
+        """Return the verdict, the wrong entries and the diagnoses in a few lines."""
         if self.error:
             return f"{self.robot or self.sheet}: unreadable: {self.error}"
         failed = [
             entry.name for entry in self.entries if not entry.verdict.passes and entry.verdict is not Verdict.INCOMPLETE
         ]
         head = f"{self.robot}: {self.conclusion}" + (f": {', '.join(failed)}" if failed else "")
-        lines = [f"  {found.place}: {found.sentence}" for found in self.diagnosis]
-        lines += [f"  missing: {', '.join(self.missing)}"] if self.missing else []
-        return "\n".join([head, *lines])
+        return "\n".join([head, *(f"  {line}" for line in self._diagnosis_lines)])
+
+    @property
+    def _diagnosis_lines(self) -> list[str]:
+        lines = [f"{diagnosis.place}: {diagnosis.sentence}" for diagnosis in self.diagnosis]
+        return lines + ([f"missing: {', '.join(self.missing)}"] if self.missing else [])
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Which quantities were judged, in the order of the sheet."""
+        """Quantities that were judged, in the order of the sheet."""
         return tuple(dict.fromkeys(entry.quantity for entry in self.entries))
 
     def of(self, quantity: str) -> tuple[Entry, ...]:
-        """Return a quantity's entries."""
+        """Return the entries of a quantity."""
         return tuple(entry for entry in self.entries if entry.quantity == quantity)
 
-    def data(self) -> dict[str, Any]:
-        """Return everything as plain data, which :meth:`from_data` reads back."""
-        data = asdict(self)
-        for entry, own in zip(data["entries"], self.entries, strict=True):
-            entry["verdict"] = own.verdict.value
-        for note, own_note in zip(data["notes"], self.notes, strict=True):
-            note["kind"] = own_note.kind.value
-        return data
+    def data(self) -> dict[str, object]:
+        """Return all fields as plain data, which :meth:`from_data` reads back."""
+        return asdict(self, dict_factory=lambda items: {key: x.value if isinstance(x, Enum) else x for key, x in items})
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> GradeReport:
-        """Return the report that :meth:`data` was made of, by way of JSON perhaps.
+    def from_data(cls, data: object) -> GradeReport:
+        """Return the report that :meth:`data` was made of, by way of JSON perhaps; every field is checked.
 
         Raises
         ------
-        KeyError, TypeError, ValueError
-            Other data.
+        ValueError
+            Other data: not a report, or a field of another type.
         """
-        entries = tuple(
-            Entry(
-                **{
-                    **entry,
-                    "index": tuple(entry["index"]),
-                    "verdict": Verdict(entry["verdict"]),
-                    "witness": Witness(**entry["witness"]) if entry["witness"] else None,
-                }
-            )
-            for entry in data["entries"]
-        )
-        diagnosis = tuple(
-            Diagnosis(**{**found, "entries": tuple(found["entries"]), "equivalent": tuple(found["equivalent"])})
-            for found in data["diagnosis"]
-        )
-        notes = tuple(Note(NoteKind(note["kind"]), note["quantity"], tuple(note["values"])) for note in data["notes"])
-        listed = {"notes": notes, "left_out": tuple(data["left_out"])}
-        return cls(**{**data, "entries": entries, "diagnosis": diagnosis, **listed})
+        return _FORM.validate_python(data)
 
     def to_json(self) -> str:
-        """Return :meth:`data` as JSON."""
+        """Return :meth:`data` as JSON.
+
+        Raises
+        ------
+        ValueError
+            A number is not finite.
+        """
         return jsons.dumps(self.data(), ensure_ascii=False, allow_nan=False)
 
     def __repr__(self) -> str:
-        return repr_line("GradeReport", self.robot or self.sheet or "", self._said)
+        return repr_line("GradeReport", self.robot or self.sheet or "", self._summary)
 
     def _repr_html_(self) -> str:
-        whose = " by ".join(filter(None, (self.robot or self.sheet, self.student)))
-        # The worst first: a table shows so many.
+        title = " by ".join(filter(None, (self.robot or self.sheet, self.student)))
+        # The worst first, because the table of a notebook is cut.
         entries = sorted(self.entries, key=lambda entry: -entry.verdict.severity)
         rows = [(entry.name, entry.verdict.value, entry.answer, entry.statement) for entry in entries]
         table = html_table(("entry", "verdict", "answer", "why"), rows) if rows else ""
-        lines = [f"{found.place}: {found.sentence}" for found in self.diagnosis]
-        lines += [f"missing: {', '.join(self.missing)}"] if self.missing else []
-        return html_block(f"{whose}: {self._said}", table, html_lines(lines))
+        return html_block(f"{title}: {self._summary}", table, html_lines(self._diagnosis_lines))
 
     @property
-    def _said(self) -> str:
-        """The conclusion, and how many entries pass."""
+    def _summary(self) -> str:
+        """The conclusion, and the number of entries that pass."""
         if self.error:
             return f"unreadable: {self.error}"
         passed = sum(entry.verdict.passes for entry in self.entries)
         return f"{self.conclusion}, {passed} of {counted(len(self.entries), 'answer')} right"
+
+
+_FORM = TypeAdapter(GradeReport)
+"""Checks every field of a report from JSON."""

@@ -1,4 +1,4 @@
-"""What answers are worth: a rubric, read strictly from a file or a sheet's table."""
+"""Rubric: the worth of answers, read strictly from a file or a sheet's table."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
@@ -25,11 +25,11 @@ WEIGHED = re.compile(
     rf"(?:{QUANTITY.pattern})|(M|C|T|J|A[1-9][0-9]??)_?([1-9])([1-9])|(M|C|J)_?([1-9][0-9]?)_([1-9][0-9]?)"
     r"|(h|g|tau|dh|ik)_?([1-9][0-9]?)"
 )
-"""Names of quantities, and of their entries: M12, M_12, M1_10 where indices have two digits, A1_14, g2, tau_2."""
+"""Names of quantities and of entries: M12, M_12, M1_10 with indices of two digits, A1_14, g2, tau_2."""
 QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A1")
 
 Feedback: TypeAlias = Literal["full", "hint", "verdict"]
-"""How much a report tells: everything; verdicts and where to look; verdicts alone."""
+"""How much a report shows: everything; verdicts and where to look; verdicts alone."""
 
 Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
@@ -101,7 +101,7 @@ class Rubric:
         return cls.from_data(document, f"{path}: ")
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any], place: str = "rubric: ") -> Rubric:
+    def from_data(cls, data: Mapping[str, object], place: str = "rubric: ") -> Rubric:
         """Return the rubric of a parsed table, such as a sheet's ``[rubric]``.
 
         Raises
@@ -110,13 +110,13 @@ class Rubric:
             The first thing wrong, after ``place``: key, what was found, what was expected.
         """
         if not isinstance(data, Mapping):
-            raise AnswerError(f"{place}found {_shown(data)}; expected a table")
+            raise AnswerError(f"{place}found {_short_repr(data)}; expected a table")
         try:
             rubric = TypeAdapter(cls).validate_python(dict(data))
         except ValidationError as error:
-            # A mistyped key says more than what else is wrong.
-            found = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
-            raise AnswerError(place + _one_line(found[0])) from None
+            # A mistyped key is the most useful message.
+            errors = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
+            raise AnswerError(place + _one_line(errors[0])) from None
         weights: dict[str, float] = {}
         for name, weight in rubric.weights.items():
             entry = _entry_name(name)
@@ -129,12 +129,12 @@ class Rubric:
         return replace(rubric, weights=weights)
 
     def require_mistakes(self, known: Collection[str], place: str = "rubric: ") -> None:
-        """Refuse a share for a mistake that the library does not have: it would never be given.
+        """Refuse a share for an unknown mistake, which no sheet would ever get.
 
         Raises
         ------
         AnswerError
-            Names it, and the known one that it is nearest to.
+            The message names the mistake, and the known one with the most similar name.
         """
         for name in self.credit.mistakes:
             if name not in known:
@@ -146,11 +146,11 @@ class Rubric:
 
 
 def _entry_name(name: str) -> str | None:
-    """Return the name of a quantity or an entry as reports have it, M12 for M_12; None where there is no such one."""
-    found = WEIGHED.fullmatch(name)
-    if found is None:
+    """Return the name of a quantity or entry as in reports, M12 for M_12; None if there is no such entry."""
+    match = WEIGHED.fullmatch(name)
+    if match is None:
         return None
-    quantity, *indices = [part for part in found.groups() if part] or [name]
+    quantity, *indices = [part for part in match.groups() if part] or [name]
     return quantity + ("_" if any(len(index) > 1 for index in indices) else "").join(indices)
 
 
@@ -163,7 +163,7 @@ def _one_line(error: ErrorDetails) -> str:
     expected = {"dataclass_type": "a table", "dict_type": "a table", "float_type": "a number"}.get(
         error["type"], error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
     )
-    return f"{'.'.join(path)}: found {_shown(error['input'])}; expected {expected}"
+    return f"{'.'.join(path)}: found {_short_repr(error['input'])}; expected {expected}"
 
 
 def _hint(name: str, known: Collection[str]) -> str:
@@ -171,6 +171,6 @@ def _hint(name: str, known: Collection[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
 
 
-def _shown(found: object) -> str:
+def _short_repr(found: object) -> str:
     text = repr(found)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,12 +1,13 @@
-"""JSON Schemas of answer sheets, tasks and rubrics, made from the tables and forms by which they are checked."""
+"""Forms of answer sheets, tasks and rubrics: an empty sheet, and JSON Schemas made from the tables that check them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter
 
+from dhkit.description import Description
 from dhkit.description.schema import titled_schema
 from dhkit.grading.answers.quantity_names import SMALL_HEADS
 from dhkit.grading.answers.sheet import (
@@ -24,7 +25,9 @@ from dhkit.grading.answers.sheet import (
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
 
-ENTRY = {"type": ["string", "number"]}
+Schema: TypeAlias = dict[str, Any]
+"""A JSON Schema, or a part of one."""
+ENTRY: Schema = {"type": ["string", "number"]}
 """A formula as text, or a number."""
 ANSWER = {"$ref": "#/$defs/Answer"}
 MEANINGS = {
@@ -39,24 +42,24 @@ MEANINGS = {
     "T": "Transform from base to tool, 4 rows of 4: lengths in m.",
     "J": "The tool's Jacobian, 6 rows of n: linear (m), then angular; world axes.",
 }
-"""Of each quantity but the link transforms, by its name."""
+"""Descriptions by quantity, without the link transforms."""
 UNITS = dict(zip(COLUMNS, ("rad", "m", "m", "rad"), strict=True))
-"""Of the entries of a table's row."""
+"""Units of the entries of a table's row."""
 
 
-def sheet_schema() -> dict[str, Any]:
+def sheet_schema() -> Schema:
     """Return the JSON Schema of answer sheets in TOML."""
     text = "Answers about a robot, as text that is read and never run: SI units and radians."
     answer = {"anyOf": [ENTRY, {"type": "array", "items": ANSWER}]}
     return _document("answer sheet", "sheet", text, Answer=answer) | {"required": ["answer"]}
 
 
-def task_schema() -> dict[str, Any]:
+def task_schema() -> Schema:
     """Return the JSON Schema of an instructor's task, the file of ``dhkit grade --task``."""
     return _document("task", "task file", "What was asked for; it goes before what sheets say.")
 
 
-def rubric_schema() -> dict[str, Any]:
+def rubric_schema() -> Schema:
     """Return the JSON Schema of rubrics, the file of ``dhkit grade --rubric``, from the form that validates them."""
     schema = TypeAdapter(Rubric).json_schema() | {"description": "What answers are worth."}
     schema["properties"]["weights"]["propertyNames"] = {"pattern": _whole(WEIGHED.pattern)}
@@ -64,8 +67,8 @@ def rubric_schema() -> dict[str, Any]:
     return titled_schema("dhkit rubric", schema)
 
 
-def _document(noun: str, kind: str, description: str, **definitions: Any) -> dict[str, Any]:
-    """Return the schema of a document with a rubric in it, and with further definitions."""
+def _document(noun: str, kind: str, description: str, **definitions: Schema) -> Schema:
+    """Return the schema of a document that may contain a rubric, with further definitions."""
     rubric = rubric_schema()
     definitions |= rubric.pop("$defs")
     definitions["Rubric"] = {key: value for key, value in rubric.items() if key not in ("$schema", "title")}
@@ -73,8 +76,8 @@ def _document(noun: str, kind: str, description: str, **definitions: Any) -> dic
     return titled_schema(f"dhkit {noun}, format {FORMAT}", table | {"$defs": definitions})
 
 
-def _properties() -> dict[str, Any]:
-    """Return the schema of every key, of a document and of the tables in it."""
+def _properties() -> Schema:
+    """Return the schemas of all keys, of a document and of the tables in it."""
     names = {"type": "array", "items": {"type": "string"}}
     keys = {
         "format": {"const": FORMAT, "description": "Version of the file's format."},
@@ -137,13 +140,13 @@ def _properties() -> dict[str, Any]:
     return keys | tables
 
 
-def _table(keys: Sequence[str], properties: dict[str, Any], description: str) -> dict[str, Any]:
+def _table(keys: Sequence[str], properties: Schema, description: str) -> Schema:
     known = {key: properties[key] for key in keys}
     return {"type": "object", "description": description, "properties": known, "additionalProperties": False}
 
 
-def _answer(**tables: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of the answers: quantities whole, by their entries, or as one of the tables."""
+def _answer(**tables: Schema) -> Schema:
+    """Return the schema of the answers: whole quantities, single entries, or tables."""
     whole = {name: ANSWER | {"description": MEANINGS[name]} for name in quantity_names(0)}
     names = {name: name for name in whole} | ALIASES | SMALL_HEADS
     heads = "|".join(name for name, quantity in names.items() if shape_of(quantity, 1))
@@ -161,18 +164,68 @@ def _answer(**tables: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _text(description: str) -> dict[str, Any]:
+def _text(description: str) -> Schema:
     return {"type": "string", "description": description}
 
 
-def _switch(description: str) -> dict[str, Any]:
+def _switch(description: str) -> Schema:
     return {"type": "boolean", "default": False, "description": description}
 
 
-def _choice(key: str, description: str) -> dict[str, Any]:
+def _choice(key: str, description: str) -> Schema:
     return {"enum": [*CHOICES[key]], "default": CHOICES[key][0], "description": description}
 
 
 def _whole(pattern: str) -> str:
-    """Return a pattern for JSON Schema, which searches, that matches whole texts only."""
+    """Return a pattern that matches whole texts only, though JSON Schema searches."""
     return f"^(?:{pattern})$"
+
+
+# An empty sheet
+
+TEMPLATE_QUANTITIES = ("K", "V", "M", "C", "g", "tau")
+"""Quantities with entries in an empty sheet; others are in its comments."""
+
+
+def template(description: Description, robot: str | None = None) -> str:
+    """Return an empty answer sheet as TOML; entries that stay empty are not handed in.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    robot
+        Robot as the sheet names it: a library name, or a file beside the sheet; by default the description's name.
+    """
+    n = description.n
+    variables = ", ".join(f"q{i + 1}" for i in range(n))
+    symbols = ", ".join(description.parameters) or "none: numbers, SI and radians"
+    lines = [
+        f"# Answers for {description.name}; what stays empty is not handed in, and part of a quantity is incomplete.",
+        f"# Joint variables: {variables} (or th1, theta_1, ...), rates qd1 (q1dot, dq1), accelerations qdd1.",
+        f"# Sums of angles: c12 for cos(q1 + q2), s1 for sin(q1). Parameters: {symbols}.",
+        "format = 1",
+        f'robot = "{robot or description.name}"',
+        'student = ""',
+        "",
+        "[names]                      # your own names, where they differ",
+        "# q = [" + ", ".join(f'"th{i + 1}"' for i in range(n)) + "]",
+        '# angles = "absolute"        # if angles count from a fixed direction',
+        '# parameters = { lc1 = "l1/2" }',
+        "",
+        "[answer]",
+        *(f"{name} = {_empty(shape_of(name, n))}" for name in TEMPLATE_QUANTITIES),
+        *(f"# A{i + 1} = {_empty((4, 4))}" for i in range(n)),
+        f"# J = {_empty((6, n))}",
+        "",
+        "# [answer.dh]                # theta, d, a, alpha; SI and radians",
+        f'# convention = "{description.convention.value}"',
+        "# rows = [" + ", ".join('["", "", "", ""]' for _ in range(n)) + "]",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _empty(shape: tuple[int, ...]) -> str:
+    if not shape:
+        return '""'
+    return "[" + ", ".join([_empty(shape[1:])] * shape[0]) + "]"

@@ -1,4 +1,4 @@
-"""Which files of a folder are answer sheets, and whose."""
+"""Search for answer sheets in folders, with the student of each."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from dhkit.errors import AnswerError
 SUFFIXES = frozenset((".toml", ".py", ".m", ".tex", ".ipynb"))
 MAX_DEPTH = 8
 MAX_LISTED = 20
-"""Names of unread files that are listed one by one."""
+"""Largest number of unread files that are listed by name."""
 MAX_SHEETS = 10_000
 MAX_FILES = 200_000
-"""Entries of folders that are looked at: a student may hand in a whole disk."""
+"""Largest number of files and folders that are visited: a student may hand in a whole disk."""
 ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
 ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
-PEEK = 1_000_000
+PEEK_BYTES = 1_000_000
+"""Length of the beginning of a file by which robot files are recognized, bytes."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,9 @@ class Sheet:
     path
         The file.
     student
-        Whose it is: the name of the file, or of the folder of a student's own.
+        Student's name: the name of the file, or of the student's own folder.
     error
-        Why it is not to be judged; empty where it is.
+        Why the sheet is not to be judged; empty if it is.
     beside
         Names of the student's other files, which are not read.
     """
@@ -48,15 +49,16 @@ class Sheet:
 def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[Sheet]:
     """Return the sheets among files and folders, each once, in the order given and by name within a folder.
 
-    Files are taken as they are. Of folders, those files whose names end as sheets' do, in folders below as well;
-    hidden files, and robot files right in a folder, are passed over. Files of another kind are not read: a student's
-    sheet lists them, and of a student without a sheet they become one with an error. A link that leaves the folder is
-    not followed, and becomes a sheet with an error; a link to a folder within is passed over, since that folder is
-    read anyway.
+    A file is taken as it is. In a folder and the folders below, files with a suffix of answer sheets are taken; hidden
+    files, and robot files directly in the folder, are ignored. Files with other suffixes are not read: the student's
+    sheet lists them, and if the student has no sheet they become one with an error. A link that leaves the folder is
+    not followed, and becomes a sheet with an error; a link to a folder inside is ignored, because that folder is read
+    anyway.
 
-    A sheet right in a folder is its file's name's, one further below that of the first folder below; a file given is
-    its own name's, and of several with one name (``*/answer.toml``) each its folder's. What a sheet says itself counts
-    for a single file alone: in a class anybody could sign as another.
+    The student of a sheet directly in a folder is the name of the file, of a sheet further below the name of the first
+    folder below. The student of a single file is its name or, for several files of one name (``*/answer.toml``), the
+    name of its folder. A student's name in a sheet counts only for a single file: in a class anybody could sign as
+    another.
 
     Parameters
     ----------
@@ -94,7 +96,7 @@ def _student(path: Path, stems: Counter[str]) -> str:
 def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
     sheets: dict[str, list[Sheet]] = {}
     unread: dict[str, list[Path]] = {}
-    for sheet in _seen(root):
+    for sheet in _visit(root):
         if not sheet.error and sheet.path.resolve() in passed_over:
             continue
         if sheet.error == UNREAD:
@@ -106,24 +108,24 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
     for student, paths in unread.items():
         if student in sheets:
             first, *others = sheets[student]
-            sheets[student] = [replace(first, beside=_listed([path.name for path in paths])), *others]
+            sheets[student] = [replace(first, beside=_shorten([path.name for path in paths])), *others]
         else:
             kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
-            error = f"not read: {', '.join(_listed(list(kinds)))}; expected {', '.join(sorted(SUFFIXES))}"
+            error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SUFFIXES))}"
             sheets[student] = [Sheet(paths[0], student, error)]
     return sorted((sheet for own in sheets.values() for sheet in own), key=lambda sheet: sheet.path.parts)
 
 
-def _listed(names: Sequence[str]) -> tuple[str, ...]:
+def _shorten(names: Sequence[str]) -> tuple[str, ...]:
     more = (f"{len(names) - MAX_LISTED} more",) if len(names) > MAX_LISTED else ()
     return (*names[:MAX_LISTED], *more)
 
 
 UNREAD = "unread"
-"""Stands, in :func:`_seen`, for the error of a file of an unknown kind."""
+"""Marks, in :func:`_visit`, a file with another suffix; it is replaced by a message for the student."""
 
 
-def _seen(root: Path) -> Iterator[Sheet]:
+def _visit(root: Path) -> Iterator[Sheet]:
     inside = root.resolve()
     for looked_at, path in enumerate(_walk(root, 0)):
         if looked_at >= MAX_FILES:
@@ -143,7 +145,7 @@ def _seen(root: Path) -> Iterator[Sheet]:
 
 
 def _walk(folder: Path, depth: int) -> Iterator[Path]:
-    """Yield what is in a folder, sorted, and after each folder what is in it; follow no links."""
+    """Yield the entries of a folder, sorted, each folder followed by its entries; links are not followed."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -158,7 +160,7 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _fault_of_link(path: Path, inside: Path) -> str:
-    """Return what is wrong with a link; nothing where what it leads to would be no sheet, or is in the folder."""
+    """Return the error of a link; empty if its target is inside the folder, or would not be a sheet."""
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):
@@ -169,7 +171,7 @@ def _fault_of_link(path: Path, inside: Path) -> str:
 
 
 def _fault_of_folder(path: Path, depth: int) -> str:
-    """Return why a folder is not looked into; nothing where it is, or where a link leads to it."""
+    """Return why a folder is not searched; empty if it is, or for a link to a folder."""
     if path.is_symlink():
         return ""
     if depth >= MAX_DEPTH:
@@ -178,12 +180,12 @@ def _fault_of_folder(path: Path, depth: int) -> str:
 
 
 def _is_robot(path: Path) -> bool:
-    """Return whether a file is a robot's, which sheets beside it may name."""
+    """Whether a file is a robot file, which sheets beside it may name."""
     if path.suffix.lower() != ".toml" or not path.is_file():
         return False
     try:
         with path.open("rb") as file:
-            start = file.read(PEEK)
+            start = file.read(PEEK_BYTES)
     except OSError:
         return False
     return bool(ROBOT.search(start)) and not ANSWER.search(start)

@@ -1,4 +1,4 @@
-"""Time derivatives of syntax trees: d/dt of what stands there, in the robot's own names."""
+"""Time derivatives of syntax trees, in the robot's own names, and small pieces of trees."""
 
 from __future__ import annotations
 
@@ -9,8 +9,40 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 
 VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
+
 MAX_NODES = 2_000
-"""Nodes of a derivative: products of many factors grow by their number."""
+"""Largest number of nodes of a derivative: products of many factors grow by their number."""
+
+
+def number(value: int, at: int) -> Number:
+    """Return a whole number as a tree."""
+    return Number(Fraction(value), str(value), at)
+
+
+def product(*factors: Tree) -> Product:
+    """Return a product as a tree."""
+    return Product(tuple((True, factor) for factor in factors))
+
+
+def quotient(numerator: Tree, *denominators: Tree) -> Product:
+    """Return a quotient as a tree, divided by one denominator after the other."""
+    return Product(((True, numerator), *((False, denominator) for denominator in denominators)))
+
+
+def node_count(tree: Tree, limit: int) -> int:
+    """Return how many nodes a tree has, those that are shared each time; counting ends beyond a limit."""
+    count, waiting = 0, [tree]
+    while waiting and count <= limit:
+        part = waiting.pop()
+        count += 1
+        match part:
+            case Sum(parts) | Product(parts):
+                waiting += [inner for _, inner in parts]
+            case Power(base, exponent):
+                waiting += [base, exponent]
+            case Call(_, arguments):
+                waiting += arguments
+    return count
 
 
 def time_derivative(tree: Tree) -> Tree:
@@ -19,23 +51,14 @@ def time_derivative(tree: Tree) -> Tree:
     Raises
     ------
     AnswerError
-        An acceleration, a function without a derivative of ours, or too long.
+        An acceleration, a function whose derivative is not read, or more than :data:`MAX_NODES` nodes.
     """
     derivative = _derivative(tree)
-    if _size(derivative) > MAX_NODES:
+    if derivative is None:
+        return number(0, 0)
+    if node_count(derivative, MAX_NODES) > MAX_NODES:
         raise AnswerError(f"a time derivative of more than {MAX_NODES} terms and factors")
-    return Number(Fraction(0), "0", 0) if derivative is None else derivative
-
-
-def _size(tree: Tree | None) -> int:
-    match tree:
-        case Sum(parts) | Product(parts):
-            return 1 + sum(_size(part) for _, part in parts)
-        case Power(base, exponent):
-            return 1 + _size(base) + _size(exponent)
-        case Call(_, arguments):
-            return 1 + sum(map(_size, arguments))
-    return 1
+    return derivative
 
 
 def _derivative(tree: Tree) -> Tree | None:
@@ -44,58 +67,48 @@ def _derivative(tree: Tree) -> Tree | None:
         case Number():
             return None
         case Name(text, at):
-            return _of_name(text, at)
+            match = VARIABLE.fullmatch(text)
+            if match and match[1] == "qdd":
+                raise AnswerError(f"a time derivative of an acceleration, {text}")
+            return Name(f"{match[1]}d{match[2]}", at) if match else None
         case Sum(terms):
             changing = [(added, change) for added, term in terms if (change := _derivative(term)) is not None]
             return Sum(tuple(changing)) if changing else None
         case Product(factors):
-            return _of_product(factors)
+            return _derivative_of_product(factors)
         case Power(base, exponent, at):
-            return _of_power(base, exponent, at)
+            return _derivative_of_power(base, exponent, at)
         case Call(function, arguments, at):
-            return _of_call(function, arguments, at)
+            return _derivative_of_call(function, arguments, at)
 
 
-def _of_name(text: str, at: int) -> Tree | None:
-    match = VARIABLE.fullmatch(text)
-    if match is None:
-        return None
-    if match[1] == "qdd":
-        raise AnswerError(f"a time derivative of an acceleration, {text}")
-    return Name(f"{match[1]}d{match[2]}", at)
-
-
-def _of_product(factors: tuple[tuple[bool, Tree], ...]) -> Tree | None:
+def _derivative_of_product(factors: tuple[tuple[bool, Tree], ...]) -> Tree | None:
     """Differentiate one factor after the other; a divisor u adds -u'/u."""
     terms: list[tuple[bool, Tree]] = []
     for k, (multiplied, factor) in enumerate(factors):
         change = _derivative(factor)
-        if change is None:
-            continue
-        if multiplied:
+        if change is not None and multiplied:
             terms.append((True, Product((*factors[:k], (True, change), *factors[k + 1 :]))))
-        else:
+        elif change is not None:
             terms.append((False, Product((*factors, (True, change), (False, factor)))))
     return Sum(tuple(terms)) if terms else None
 
 
-def _of_power(base: Tree, exponent: Tree, at: int) -> Tree | None:
+def _derivative_of_power(base: Tree, exponent: Tree, at: int) -> Tree | None:
     change = _derivative(base)
     if _derivative(exponent) is not None:
         raise AnswerError(f"a time derivative of a power with a changing exponent at position {at + 1}")
     if change is None:
         return None
     if isinstance(exponent, Number) and exponent.value == 2:
-        return Product(((True, exponent), (True, base), (True, change)))
-    lower = Power(base, Sum(((True, exponent), (False, _number(1, at)))), at)
-    return Product(((True, exponent), (True, lower), (True, change)))
+        return product(exponent, base, change)
+    return product(exponent, Power(base, Sum(((True, exponent), (False, number(1, at)))), at), change)
 
 
-def _of_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree | None:
-    if all(_derivative(argument) is None for argument in arguments):
+def _derivative_of_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree | None:
+    changes = [_derivative(argument) for argument in arguments]
+    if all(change is None for change in changes):
         return None
-    inner = arguments[0]
-    change = _derivative(inner)
     outer: Tree
     match function:
         case "sin":
@@ -103,15 +116,11 @@ def _of_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree | None
         case "cos":
             outer = Sum(((False, Call("sin", arguments, at)),))
         case "tan":
-            outer = Product(((True, _number(1, at)), (False, Power(Call("cos", arguments, at), _number(2, at), at))))
+            outer = quotient(number(1, at), Power(Call("cos", arguments, at), number(2, at), at))
         case "exp":
             outer = Call("exp", arguments, at)
         case "sqrt":
-            outer = Product(((True, _number(1, at)), (False, _number(2, at)), (False, Call("sqrt", (inner,), at))))
+            outer = quotient(number(1, at), number(2, at), Call("sqrt", arguments[:1], at))
         case _:
             raise AnswerError(f"a time derivative of {function}() at position {at + 1}, which is not read")
-    return None if change is None else Product(((True, outer), (True, change)))
-
-
-def _number(value: int, at: int) -> Number:
-    return Number(Fraction(value), str(value), at)
+    return None if changes[0] is None else product(outer, changes[0])

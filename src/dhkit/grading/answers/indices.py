@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from dhkit.expressions.syntax import Token
-from dhkit.grading.answers.tokens import fail
+from dhkit.grading.answers.tokens import fail, replace_runs
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
 SQUARE = re.compile(r"(?<!\w)([A-Za-z_]\w*)\s*\[\s*(\d{1,4})\s*\](\s*\(\s*t\s*\))?", re.ASCII)
@@ -16,75 +16,68 @@ FROM_ZERO = re.compile(r"\*\*|\b(?:np|numpy|math)\s*\.\s*[a-z]|\bpow\s*\(", re.A
 
 
 def first_index(texts: Iterable[str], vocabulary: Vocabulary) -> int | None:
-    """Return from where indices in square brackets count on a whole sheet; None where nothing on it tells.
+    """Return the first index, 0 or 1, in square brackets on a whole sheet; None where nothing on it tells.
 
-    They count from 0 where a 0 occurs, from 1 in Maple's ``theta[1](t)`` or where an index has a meaning only so, and
-    otherwise from 0 in Python's and C's notation: ``**``, ``np.cos``, ``pow``.
+    It is 0 where a 0 occurs, 1 in Maple's ``theta[1](t)`` or where an index has a meaning only so, and
+    otherwise 0 in Python's and C's notation: ``**``, ``np.cos``, ``pow``.
     """
-    one, is_python = False, False
+    is_one, is_python = False, False
     for text in texts:
-        for name, index, by_time in SQUARE.findall(text):
-            from_zero, from_one = _both(name, int(index), vocabulary)
+        for name, index, of_time in SQUARE.findall(text):
+            from_zero, from_one = _readings(name, int(index), vocabulary)
             if index == "0" and from_zero:
                 return 0
-            one = one or bool(from_one and (by_time or not from_zero))
+            is_one = is_one or bool(from_one and (of_time or not from_zero))
         is_python = is_python or FROM_ZERO.search(text) is not None
-    return 1 if one else 0 if is_python else None
+    return 1 if is_one else 0 if is_python else None
 
 
 def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Put in the names that indices make.
+    """Return tokens with the names that indices make: q1 for q[0].
 
     Raises
     ------
     AnswerError
         An index without a meaning, or one that may count from 0 and from 1.
     """
-    found: list[Token] = []
     first = vocabulary.first_index
     if first is None and any(token.text == "[" for token in tokens):
         first = first_index([text], vocabulary)
-    k = 0
-    while k < len(tokens):
+
+    def read_run(k: int) -> tuple[list[Token], int] | None:
         name, *behind = tokens[k : k + 4]
-        pattern = [x.text if x.kind == "sign" else x.kind for x in behind]
-        if name.kind == "name" and behind[1:2] and behind[1].text.isdecimal():
-            index = int(behind[1].text[:4])
-            whole = ""
-            if pattern == ["(", "number", ")"]:
+        if name.kind != "name" or len(behind) != 3 or behind[1].kind != "number" or not behind[1].text.isdecimal():
+            return None
+        whole, index = "", int(behind[1].text[:4])
+        match [token.text for token in behind if token.kind == "sign"]:
+            case ["(", ")"]:
                 whole = _in_round_brackets(name, index, vocabulary, text)
-            elif pattern == ["[", "number", "]"]:
+            case ["[", "]"]:
                 whole = _in_square_brackets(name, index, first, vocabulary, text)
-            if whole:
-                found.append(Token("name", whole, name.at))
-                k += 4
-                continue
-        found.append(name)
-        k += 1
-    return found
+        return ([Token("name", whole, name.at)], k + 4) if whole else None
+
+    return replace_runs(tokens, read_run)
 
 
-def _both(name: str, index: int, vocabulary: Vocabulary) -> tuple[str, str]:
+def _readings(name: str, index: int, vocabulary: Vocabulary) -> tuple[str, str]:
     """Return the names that an index makes, counted from 0 and from 1; empty where it makes none."""
-    plain = plain_name(name)
-    names = f"{plain}{index + 1}", f"{plain}{index}"
-    return names[0] if vocabulary.knows(names[0]) else "", names[1] if vocabulary.knows(names[1]) else ""
+    from_zero, from_one = f"{plain_name(name)}{index + 1}", f"{plain_name(name)}{index}"
+    return from_zero if vocabulary.knows(from_zero) else "", from_one if vocabulary.knows(from_one) else ""
 
 
 def _in_round_brackets(name: Token, index: int, vocabulary: Vocabulary, text: str) -> str:
     whole = plain_name(name.text) + str(index)
-    alone = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
-    is_known = vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES
-    if is_known and not alone and (vocabulary.is_state(whole) or (name.text in ("c", "s") and vocabulary.knows(whole))):
-        fail(
-            text, name.at, f"{name.text}({index}) may be {whole}, or {name.text} and a number in brackets; write which"
-        )
-    return whole if (alone or not is_known) and vocabulary.knows(whole) else ""
+    is_only_joint = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
+    is_known = not is_only_joint and (vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES)
+    if is_known and (vocabulary.is_state(whole) or (name.text in ("c", "s") and vocabulary.knows(whole))):
+        problem = f"{name.text}({index}) may be {whole}, or {name.text} and a number in brackets; write which"
+        fail(text, name.at, problem)
+    return whole if not is_known and vocabulary.knows(whole) else ""
 
 
 def _in_square_brackets(name: Token, index: int, first: int | None, vocabulary: Vocabulary, text: str) -> str:
-    both = _both(name.text, index, vocabulary)
+    both = _readings(name.text, index, vocabulary)
     if first is None and all(both):
         fail(text, name.at, f"{name.text}[{index}] may be {both[1]} or, counted from 0, {both[0]}; write one of them")
-    found = both[first] if first is not None else both[0] or both[1]
-    return found or fail(text, name.at, f"unknown name {name.text}[{index}]")
+    whole = both[first] if first is not None else both[0] or both[1]
+    return whole or fail(text, name.at, f"unknown name {name.text}[{index}]")

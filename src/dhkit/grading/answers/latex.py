@@ -6,36 +6,49 @@ import re
 from collections.abc import Callable
 
 from dhkit.expressions.syntax import Token
-from dhkit.grading.answers.tokens import closing_bracket, dotted, fail
+from dhkit.grading.answers.tokens import (
+    closing_bracket,
+    derivative_by_time,
+    fail,
+    in_brackets,
+    rate_name,
+    sign,
+    word_set,
+)
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
 MAX_DEPTH = 50
+"""Largest depth of nested arguments."""
+
 MAX_LETTERS = 64
+"""Largest number of letters in a row."""
+
 PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
 MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
 """A number in front of a fraction, which is no subscript or exponent."""
-SPACE_NAMES = """
-    quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf
-"""
-SPACES = frozenset(SPACE_NAMES.split()) | frozenset(",;:!> \n")
-"""Macros that set spaces and type, and say nothing."""
-SIZES = frozenset(
-    ["left", "right", "big", "Big", "bigg", "Bigg", "bigl", "bigr", "Bigl", "Bigr", "biggl", "biggr", "Biggl", "Biggr"]
+SPACE_NAMES = word_set(
+    "quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf"
 )
+SPACES = SPACE_NAMES | frozenset(",;:!> \n")
+"""Macros that set spaces and type, and say nothing."""
+SIZES = word_set("left right big Big bigg Bigg bigl bigr Bigl Bigr biggl biggr Biggl Biggr")
 FRACTIONS = frozenset(("frac", "tfrac", "dfrac", "cfrac"))
-UPRIGHT_NAMES = """
-    mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal
-"""
-UPRIGHT = frozenset(UPRIGHT_NAMES.split())
+UPRIGHT = word_set("mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal")
 TIMES = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
-DOTS = {"dot": "dot", "ddot": "ddot"}
+DOTS = ("dot", "ddot")
 GREEK = LETTERS - {"pi", "Pi"} | {"varepsilon", "vartheta", "varrho", "varphi"}
 OVER = "\\over"
 MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
 
 
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9]*", re.ASCII)
+
+OPERAND_ENDS = re.compile(
+    r"(?:\s|~|\$|\\[,;:! ]|\\q?quad\b)*(?:$|[-+)\]},;&=.|]|\\\\|\\(?:right|cr|end)\b|\\[bB]igg?r?\s*[)\]]"
+    r"|\{?\s*(?:\\left)?\s*\(\s*t\s*(?:\\right)?\s*\))"
+)
+r"""What ends the operand of \frac{d}{dt}: a sign of a sum, the end, or (t)."""
 
 
 def is_latex(text: str) -> bool:
@@ -58,18 +71,11 @@ def latex_tokens(text: str, knows: Callable[[str], bool]) -> list[Token]:
     AnswerError
         A macro that is no mathematics, or brackets that do not match.
     """
-    return _Latex(text, knows).whole()
+    return _LatexReader(text, knows).tokens()
 
 
-OPERAND_ENDS = re.compile(
-    r"(?:\s|~|\$|\\[,;:! ]|\\q?quad\b)*(?:$|[-+)\]},;&=.|]|\\\\|\\(?:right|cr|end)\b|\\[bB]igg?r?\s*[)\]]"
-    r"|\{?\s*(?:\\left)?\s*\(\s*t\s*(?:\\right)?\s*\))"
-)
-r"""What ends the operand of \frac{d}{dt}: a sign of a sum, the end, or (t)."""
-
-
-class _Latex:
-    """One pass over a LaTeX formula."""
+class _LatexReader:
+    """One pass over a LaTeX formula; ``at`` is where it stands in the text, and ``depth`` counts nested arguments."""
 
     def __init__(self, text: str, knows: Callable[[str], bool]) -> None:
         self.text = text
@@ -77,11 +83,11 @@ class _Latex:
         self.at = 0
         self.depth = 0
 
-    def whole(self) -> list[Token]:
-        found = self._until("")
+    def tokens(self) -> list[Token]:
+        tokens = self._until("")
         if self.at < len(self.text.rstrip()):
             fail(self.text, self.at, "a closing brace without an opening one")
-        return found
+        return tokens
 
     # Pieces of the text
 
@@ -94,29 +100,25 @@ class _Latex:
 
     def _until(self, closing: str) -> list[Token]:
         """Read up to a closing brace, or to the end."""
-        found: list[Token] = []
+        tokens: list[Token] = []
         while (piece := self._peek()) is not None and piece[4] != "}":
-            found += self._item(piece)
+            tokens += self._item(piece)
         if closing:
             if not self._next_is(closing):
                 fail(self.text, min(self.at, len(self.text) - 1), f"expected {closing!r}")
-            self._skip()
-        return self._over(found)
+            self.at = self.text.index(closing, self.at) + 1
+        return self._over(tokens)
 
-    def _over(self, found: list[Token]) -> list[Token]:
+    def _over(self, tokens: list[Token]) -> list[Token]:
         r"""Read {a \over b} as \frac{a}{b}."""
-        places = [k for k, token in enumerate(found) if token.text == OVER]
+        places = [k for k, token in enumerate(tokens) if token.text == OVER]
         if not places:
-            return found
+            return tokens
         if len(places) > 1:
-            fail(self.text, found[places[1]].at, "two \\over in one group")
-        at = found[places[0]].at
-        above, below = found[: places[0]], found[places[0] + 1 :]
-        return self._fraction(_in_brackets(above, at), _in_brackets(below, at), at)
-
-    def _skip(self) -> None:
-        piece = self._peek()
-        self.at = piece.end() if piece else len(self.text)
+            fail(self.text, tokens[places[1]].at, "two \\over in one group")
+        at = tokens[places[0]].at
+        above, below = tokens[: places[0]], tokens[places[0] + 1 :]
+        return self._fraction(in_brackets(above, at), in_brackets(below, at), at)
 
     def _item(self, piece: re.Match[str]) -> list[Token]:
         """Read one thing with what stands below it."""
@@ -128,26 +130,26 @@ class _Latex:
             return [Token("number", piece[2], at)]
         if piece[3] is not None:
             return self._letters(piece[3], at)
-        sign = piece[4]
-        if sign == "{":
+        character = piece[4]
+        if character == "{":
             self.at = at
             return self._grouped(at)
-        if sign == "^":
-            return [Token("sign", "^", at), *self._bracketed(at)]
-        if sign in "$~":
+        if character == "^":
+            return [sign("^", at), *self._bracketed(at)]
+        if character in "$~":
             return []
-        if sign in "+-*/(),;[]&<>='.|":
-            return [Token("sign", sign, at)]
-        return fail(self.text, at, f"unexpected {sign!r}")
+        if character in "+-*/(),;[]&<>='.|":
+            return [sign(character, at)]
+        return fail(self.text, at, f"unexpected {character!r}")
 
     def _grouped(self, at: int) -> list[Token]:
         r"""Read a group: {l_1}, or {\dot\theta}_1, whose subscript belongs to the name inside."""
         inner = self._argument(at)
         if len(inner) == 1 and inner[0].kind == "name":
-            return [Token("name", self._with_subscript(inner[0].text), at)]
+            return self._name(inner[0].text, at)
         if inner and inner[0].text == "(" and closing_bracket(inner, 0) == len(inner) - 1:
             return inner
-        return [Token("sign", "(", at), *inner, Token("sign", ")", at)] if inner else []
+        return in_brackets(inner, at) if inner else []
 
     def _argument(self, at: int) -> list[Token]:
         """Read what a macro applies to: a group in braces, or one thing."""
@@ -176,9 +178,12 @@ class _Latex:
         return inner
 
     def _bracketed(self, at: int) -> list[Token]:
-        return [Token("sign", "(", at), *self._argument(at), Token("sign", ")", at)]
+        return in_brackets(self._argument(at), at)
 
     # Names
+
+    def _name(self, name: str, at: int, bare: bool = False) -> list[Token]:
+        return [Token("name", name if bare else name + self._subscript(), at)]
 
     def _letters(self, letters: str, at: int) -> list[Token]:
         """Read letters: a known name, a function's, or one name each, the last with what stands below it."""
@@ -213,15 +218,12 @@ class _Latex:
         if careless := re.compile(r"_(\d)(\d+)", re.ASCII).match(self.text, at):
             first, rest = careless.groups()
             fail(self.text, at, f"{careless[0]} is _{first} followed by {rest} in LaTeX; write _{{{first}{rest}}}")
-        self._skip()
+        self.at = self.text.index("_", at) + 1
         inner = self._argument(at)
         word = "".join({"+": "p", "-": "m", ",": ""}.get(token.text, token.text) for token in inner)
         if not re.fullmatch(r"\w*", word, re.ASCII):
             fail(self.text, at, "a subscript that is no name")
         return word
-
-    def _with_subscript(self, name: str) -> str:
-        return name + self._subscript()
 
     # Macros
 
@@ -231,7 +233,7 @@ class _Latex:
         if name in ("\\", "cr"):
             spacing = re.compile(r"\s*\[-?\d*\.?\d+(?:pt|em|ex|mm|cm)\]", re.ASCII).match(self.text, self.at)
             self.at = spacing.end() if spacing else self.at
-            return [Token("sign", "\\\\", at)]
+            return [sign("\\\\", at)]
         if name == "partial":
             return [Token("name", "d", at)]
         if name in SIZES:
@@ -239,74 +241,65 @@ class _Latex:
         if name in FRACTIONS:
             return self._fraction(self._bracketed(at), self._bracketed(at), at)
         if name == "over":
-            return [Token("sign", OVER, at)]
+            return [sign(OVER, at)]
         if name == "sqrt":
             if self._next_is("["):
                 fail(self.text, at, "a root other than the square root")
             return [Token("name", "sqrt", at), *self._bracketed(at)]
         if name in DOTS:
-            return self._dotted(DOTS[name], at, bare)
+            return self._dotted(name, at, bare)
         if name in UPRIGHT:
             return self._upright(at, bare)
         if name in ("begin", "end"):
             return self._environment(name, at)
-        if name in FUNCTION_NAMES:
+        if name in FUNCTION_NAMES or name == "top":
             return [Token("name", name, at)]
         if name in ("pi", "ell") or name in GREEK:
-            letter = TIMES.get(name, name)
-            return [Token("name", letter if bare else self._with_subscript(letter), at)]
+            return self._name(TIMES.get(name, name), at, bare)
         if name in TIMES:
-            return [Token("sign", TIMES[name], at)]
-        if name == "top":
-            return [Token("name", "top", at)]
+            return [sign(TIMES[name], at)]
         if name in "{}":
-            return [Token("sign", "(" if name == "{" else ")", at)]
+            return [sign("(" if name == "{" else ")", at)]
         return fail(self.text, at, f"the macro \\{name}, which is not read,")
 
     def _fraction(self, above: list[Token], below: list[Token], at: int) -> list[Token]:
-        """Return a fraction of two bracketed parts, or the time derivative that it is."""
-        if order := _order_by_time(below[1:-1]):
+        """Return a fraction of two bracketed parts, or the time derivative that it is.
+
+        Two numbers right behind a number are refused: they may be a mixed number.
+        """
+        bottom = "".join(token.text for token in below[1:-1] if token.text not in "()")
+        if order := {"dt": 1, "dt^2": 2}.get(bottom, 0):
             while above and above[0].text == "(" and closing_bracket(above, 0) == len(above) - 1:
                 above = above[1:-1]
             return self._derivative(above, order, at)
-        self._refuse_mixed_number(above, below, at)
-        return _in_brackets([*above, Token("sign", "/", at), *below], at)
-
-    def _refuse_mixed_number(self, above: list[Token], below: list[Token], at: int) -> None:
-        """Refuse a fraction of two numbers right behind a number."""
-        before = MIXED.search(self.text[:at])
-        if before and [token.kind for token in above[1:-1]] == ["number"] == [token.kind for token in below[1:-1]]:
+        number = MIXED.search(self.text[:at])
+        if number and [token.kind for token in above[1:-1]] == ["number"] == [token.kind for token in below[1:-1]]:
             part = f"{above[1].text}/{below[1].text}"
-            fail(
-                self.text,
-                at,
-                f"{before[1]} {part} may be {before[1]} + {part} or {before[1]}*{part}; write one of them",
-            )
+            both = f"{number[1]} + {part} or {number[1]}*{part}"
+            fail(self.text, at, f"{number[1]} {part} may be {both}; write one of them")
+        return in_brackets([*above, sign("/", at), *below], at)
 
     def _derivative(self, above: list[Token], order: int, at: int) -> list[Token]:
         r"""Read \frac{d}{d t} \theta_{1}{\left(t \right)}, as sympy prints it, and \frac{d (5 \theta_1)}{dt}."""
         inner = _without_d(above, order)
         if inner is None:
             fail(self.text, at, "a fraction over dt that is no derivative by t")
-        inner = inner or self._operand_of_derivative(at)
-        for _ in range(order):
-            inner = [Token("function", "ddt", at), Token("sign", "(", at), *inner, Token("sign", ")", at)]
-        return inner
+        return derivative_by_time(inner or self._operand_of_derivative(at), order, at)
 
     def _operand_of_derivative(self, at: int) -> list[Token]:
         r"""Read what \frac{d}{dt} stands in front of: brackets, a function of something, or a name without a power."""
-        found = self._one_item()
-        if found and found[0].text == "(":
-            while closing_bracket(found, 0) != len(found) - 1:
-                found += self._one_item() or fail(self.text, at, "a bracket that does not close")
-            return found
-        if found and found[0].kind == "name" and found[0].text in FUNCTION_NAMES:
-            found += self._function_argument()
-        elif len(found) != 1 or found[0].kind != "name":
-            found = []
-        if not found or not OPERAND_ENDS.match(self.text, self.at):
+        tokens = self._one_item()
+        if tokens and tokens[0].text == "(":
+            while closing_bracket(tokens, 0) != len(tokens) - 1:
+                tokens += self._one_item() or fail(self.text, at, "a bracket that does not close")
+            return tokens
+        if tokens and tokens[0].kind == "name" and tokens[0].text in FUNCTION_NAMES:
+            tokens += self._function_argument()
+        elif len(tokens) != 1 or tokens[0].kind != "name":
+            tokens = []
+        if not tokens or not OPERAND_ENDS.match(self.text, self.at):
             fail(self.text, at, "a derivative that may reach further than the name behind it; put brackets around what")
-        return found
+        return tokens
 
     def _one_item(self) -> list[Token]:
         """Read one thing that is no space; nothing at the end of a group."""
@@ -317,27 +310,24 @@ class _Latex:
 
     def _function_argument(self) -> list[Token]:
         """Read what a function applies to, with a power in front of it: up to a name, or a closing bracket."""
-        found: list[Token] = []
+        tokens: list[Token] = []
         while item := self._one_item():
-            found += item
-            first = next(
-                (k for k, token in enumerate(found) if token.text == "(" and found[max(k - 1, 0)].text != "^"), -1
-            )
-            is_closed = closing_bracket(found, first) == len(found) - 1 if first >= 0 else found[-1].kind == "name"
-            if is_closed:
+            tokens += item
+            brackets = [k for k, token in enumerate(tokens) if token.text == "(" and tokens[max(k - 1, 0)].text != "^"]
+            if closing_bracket(tokens, brackets[0]) == len(tokens) - 1 if brackets else tokens[-1].kind == "name":
                 break
-        return found
+        return tokens
 
     def _delimiter(self, at: int) -> list[Token]:
         piece = self._peek()
         if piece is None:
             fail(self.text, at, "ends where a bracket was expected")
         self.at = piece.end()
-        sign = piece[1] or piece[4]
-        if sign == ".":
+        bracket = piece[1] or piece[4]
+        if bracket == ".":
             return []
-        if sign in ("(", ")", "[", "]", "{", "}"):
-            return [Token("sign", "(" if sign in "([{" else ")", at)]
+        if bracket in ("(", ")", "[", "]", "{", "}"):
+            return [sign("(" if bracket in "([{" else ")", at)]
         return fail(self.text, at, "expected a bracket")
 
     def _dotted(self, dots: str, at: int, bare: bool) -> list[Token]:
@@ -345,37 +335,26 @@ class _Latex:
         inner = self._argument(at)
         if len(inner) != 1 or inner[0].kind != "name":
             fail(self.text, at, "dots on something that is no name")
-        name = dotted(inner[0].text, dots)
-        return [Token("name", name if bare else self._with_subscript(name), at)]
+        return self._name(rate_name(inner[0].text, dots), at, bare)
 
     def _upright(self, at: int, bare: bool) -> list[Token]:
         inner = self._argument(at)
         if not all(token.kind in ("name", "number") for token in inner):
             if any(token.text in ("+", "-", "=", "<", ">", ",") for token in inner):
                 fail(self.text, at, "a sign inside text,")
-            return _in_brackets(inner, at)
+            return in_brackets(inner, at)
         name = "".join(token.text for token in inner)
         if not name:
             return []
         is_function = name in FUNCTION_NAMES and not self._next_is("_")
-        return [Token("name", name if bare or is_function else self._with_subscript(name), at)]
+        return self._name(name, at, bare or is_function)
 
     def _environment(self, name: str, at: int) -> list[Token]:
         match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)
         if match is None or match[1] not in MATRICES:
             fail(self.text, at, "an environment that is no matrix")
         self.at = match.end()
-        return [Token("sign", "[" if name == "begin" else "]", at)]
-
-
-def _in_brackets(found: list[Token], at: int) -> list[Token]:
-    return [Token("sign", "(", at), *found, Token("sign", ")", at)]
-
-
-def _order_by_time(below: list[Token]) -> int:
-    """Return 1 of dt, 2 of dt^2, 0 of another denominator."""
-    bottom = "".join(token.text for token in below if token.text not in "()")
-    return {"dt": 1, "dt^2": 2}.get(bottom, 0)
+        return [sign("[" if name == "begin" else "]", at)]
 
 
 def _without_d(above: list[Token], order: int) -> list[Token] | None:

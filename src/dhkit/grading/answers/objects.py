@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Call, Number, Power, Product, Sum, Tree
+from dhkit.expressions.syntax import Call, Number, Power, Sum, Tree
+from dhkit.grading.answers.derivatives import product, quotient
 from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.vocabulary import Vocabulary
 
@@ -21,12 +22,18 @@ if TYPE_CHECKING:
     from dhkit.symbolic.programs.graph import Node
 
 STATES = ("q", "qd", "qdd")
+
 MAX_NODES = 20_000
-"""Of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""
-SHOWN = 500
+"""Largest number of nodes of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""
+
+MAX_NODES_SHOWN = 500
+"""Largest number of nodes of a CasADi expression that is shown as its text."""
+
+MAX_TEXT = 1_000
+"""Largest length of the text of a CasADi expression, in characters."""
 
 
-def entries_of(value: Any, n: int) -> Any:
+def entries_of(value: object, n: int) -> object:
     """Return an object's entries as nested lists of what :func:`entry_tree` reads; text and callables stay.
 
     Parameters
@@ -49,34 +56,34 @@ def entries_of(value: Any, n: int) -> Any:
 
 
 def _entries(value: Any, n: int) -> Any:
-    module = _module(value)
-    if module == "casadi":
+    library = _library(value)
+    if library == "casadi":
         return _casadi_entries(value, n)
-    if module == "sympy" and hasattr(value, "tolist"):
-        return _squeezed(value.tolist())
+    if library == "sympy" and hasattr(value, "tolist"):
+        return _squeeze(value.tolist())
     if isinstance(value, np.ndarray):
         return _entries(value.tolist(), n)
     if isinstance(value, list | tuple):
         return [_entries(entry, n) for entry in value]
-    if isinstance(value, str | int | float | Fraction | np.number) or module == "sympy" or callable(value):
+    if isinstance(value, str | int | float | Fraction | np.number) or library == "sympy" or callable(value):
         return value
     raise AnswerError(f"found {type(value).__name__}; expected text, numbers, sympy, CasADi or a function")
 
 
-def _module(value: Any) -> str:
-    """Return which library a value is of; sympy's undefined functions have no module."""
+def _library(value: object) -> str:
+    """Return the package of a value's type; sympy's undefined functions have no module."""
     module = (type(value).__module__ or "").partition(".")[0]
     return module or ("sympy" if hasattr(value, "free_symbols") else "")
 
 
-def is_entry(value: Any) -> bool:
+def is_entry(value: object) -> bool:
     """Whether :func:`entry_tree` reads a value."""
-    if isinstance(value, _Expression) or _module(value) == "sympy":
+    if isinstance(value, _CasadiScalar) or _library(value) == "sympy":
         return True
     return isinstance(value, str | int | float | Fraction | Decimal | np.number) and not isinstance(value, bool)
 
 
-def entry_tree(value: Any, vocabulary: Vocabulary) -> tuple[str, Tree]:
+def entry_tree(value: object, vocabulary: Vocabulary) -> tuple[str, Tree]:
     """Return an entry's text and its syntax tree.
 
     Raises
@@ -84,15 +91,15 @@ def entry_tree(value: Any, vocabulary: Vocabulary) -> tuple[str, Tree]:
     AnswerError
         No expression, or an unknown name.
     """
-    if isinstance(value, _Expression):
+    if isinstance(value, _CasadiScalar):
         return value.text, value.tree(vocabulary)
-    if isinstance(value, float | np.floating) and not isinstance(value, bool):
-        return str(value), _double(float(value))
+    if isinstance(value, float | np.floating):
+        return str(value), _decimal(float(value))
     text = _text(value)
     return text, read_answer(text, vocabulary)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Return what a value prints as.
 
     Raises
@@ -100,10 +107,8 @@ def _text(value: Any) -> str:
     AnswerError
         It is too large to be printed.
     """
-    if isinstance(value, str):
-        return value
     try:
-        if _module(value) == "sympy":
+        if _library(value) == "sympy":
             import sympy
 
             if sum(1 for _ in islice(sympy.preorder_traversal(value), MAX_NODES + 1)) > MAX_NODES:
@@ -113,8 +118,8 @@ def _text(value: Any) -> str:
         raise AnswerError("nested too deep, or a number too long") from None
 
 
-def _double(value: float) -> Tree:
-    """Return a double as the decimal of 15 digits that it is: what is beyond them came of arithmetic in doubles.
+def _decimal(value: float) -> Tree:
+    """Return a double as its decimal of 15 digits: further digits come from arithmetic in doubles.
 
     Raises
     ------
@@ -128,13 +133,12 @@ def _double(value: float) -> Tree:
     return number if value >= 0 else Sum(((False, number),))
 
 
-def _squeezed(rows: list[Any]) -> list[Any]:
+def _squeeze(rows: list[Any]) -> list[Any]:
     """Return a column's or a row's entries in one list."""
     if len(rows) == 1 and isinstance(rows[0], list):
         return list(rows[0])
-    if all(isinstance(row, list) and len(row) == 1 for row in rows):
-        return [row[0] for row in rows]
-    return rows
+    is_column = all(isinstance(row, list) and len(row) == 1 for row in rows)
+    return [row[0] for row in rows] if is_column else rows
 
 
 # CasADi
@@ -144,22 +148,21 @@ def _casadi_entries(value: Any, n: int) -> Any:
     import casadi
 
     if isinstance(value, casadi.Function):
-        inputs = [casadi.SX.sym(name, n) for name, _ in zip(STATES, range(value.n_in()), strict=False)]
-        if value.n_in() > len(inputs) or value.n_out() != 1:
+        if value.n_in() > len(STATES) or value.n_out() != 1:
             raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
         try:
-            value = value(*inputs)
+            value = value(*(casadi.SX.sym(name, n) for name in STATES[: value.n_in()]))
         except RuntimeError as error:
             raise AnswerError(f"{value.name()}: {str(error).splitlines()[-1][:200]}") from None
     if isinstance(value, casadi.DM):
-        return _squeezed(value.full().tolist())
+        return _squeeze(value.full().tolist())
     if not isinstance(value, casadi.SX):
         raise AnswerError(f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX")
-    rows = [[_Expression(value[i, j]) for j in range(value.shape[1])] for i in range(value.shape[0])]
-    return rows[0][0] if value.shape == (1, 1) else _squeezed(rows)
+    rows = [[_CasadiScalar(value[i, j]) for j in range(value.shape[1])] for i in range(value.shape[0])]
+    return rows[0][0] if value.shape == (1, 1) else _squeeze(rows)
 
 
-class _Expression:
+class _CasadiScalar:
     """A CasADi scalar, still unread."""
 
     def __init__(self, scalar: Any) -> None:
@@ -167,7 +170,8 @@ class _Expression:
 
         self.scalar = scalar
         self.nodes = int(casadi.n_nodes(scalar))
-        self.text = str(scalar)[:1000] if self.nodes <= SHOWN else f"a CasADi expression of {self.nodes} nodes"
+        is_short = self.nodes <= MAX_NODES_SHOWN
+        self.text = str(scalar)[:MAX_TEXT] if is_short else f"a CasADi expression of {self.nodes} nodes"
 
     def tree(self, vocabulary: Vocabulary) -> Tree:
         import casadi
@@ -177,53 +181,53 @@ class _Expression:
         if self.nodes > MAX_NODES:
             raise AnswerError(f"{self.text}; expected at most {MAX_NODES}")
         symbols = casadi.symvar(self.scalar)
-        names = [symbol.name() for symbol in symbols]
-        inputs = [read_answer(name, vocabulary) for name in _from_one(names)]
+        inputs = [read_answer(name, vocabulary) for name in _counted_from_one([x.name() for x in symbols])]
         try:
             inside = {"x": casadi.SX(casadi.vertcat(*symbols))} if symbols else {}
             graph = Graph.of("answer", inside, {"y": self.scalar})
         except ValueError as error:
             raise AnswerError(f"{self.text[:60]!r}: {error}") from None
-        made: list[Tree] = []
+        trees: list[Tree] = []
         for node in graph.nodes:
-            earlier = [] if node.operation == "input" else [made[k] for k in node.arguments]
-            made.append(_node(node, earlier, inputs))
-        return made[graph.results[0][0]]
+            arguments = [] if node.operation == "input" else [trees[k] for k in node.arguments]
+            trees.append(_tree_of(node, arguments, inputs))
+        return trees[graph.results[0][0]]
 
 
-def _from_one(names: Sequence[str]) -> list[str]:
-    """Return names as they are counted here: SX.sym("q", 2) has q_0 and q_1."""
-    from_zero = {match[1] for name in names if (match := re.fullmatch(r"(\w*?)_0", name))}
-    renamed = []
-    for name in names:
-        match = re.fullmatch(r"(\w*?)_(\d+)", name)
-        renamed.append(f"{match[1]}{int(match[2]) + 1}" if match and match[1] in from_zero else name)
-    return renamed
+def _counted_from_one(names: Sequence[str]) -> list[str]:
+    """Return names whose numbers begin with 1: SX.sym("q", 2) has q_0 and q_1."""
+    matches = [re.fullmatch(r"(\w*?)_(\d+)", name) for name in names]
+    from_zero = {match[1] for match in matches if match and match[2] == "0"}
+    return [
+        f"{match[1]}{int(match[2]) + 1}" if match and match[1] in from_zero else name
+        for name, match in zip(names, matches, strict=True)
+    ]
 
 
-BINARY: dict[str, Callable[[Tree, Tree], Tree]] = {
+TREES: dict[str, Callable[..., Tree]] = {
+    "negate": lambda a: Sum(((False, a),)),
     "add": lambda a, b: Sum(((True, a), (True, b))),
     "subtract": lambda a, b: Sum(((True, a), (False, b))),
-    "multiply": lambda a, b: Product(((True, a), (True, b))),
-    "divide": lambda a, b: Product(((True, a), (False, b))),
+    "multiply": product,
+    "divide": quotient,
     "power": lambda a, b: Power(a, b, 0),
-    "atan2": lambda a, b: Call("atan2", (a, b), 0),
-    "minimum": lambda a, b: Call("min", (a, b), 0),
-    "maximum": lambda a, b: Call("max", (a, b), 0),
 }
-UNARY = {"sqrt": "sqrt", "sin": "sin", "cos": "cos", "absolute": "abs", "sign": "sign"}
+"""Trees of operations of their arguments' trees."""
+
+FUNCTIONS = {name: name for name in ("sqrt", "sin", "cos", "sign", "atan2")} | dict(
+    absolute="abs", minimum="min", maximum="max"
+)
+"""Names of operations that are functions."""
 
 
-def _node(node: Node, arguments: Sequence[Tree], inputs: Sequence[Tree]) -> Tree:
+def _tree_of(node: Node, arguments: Sequence[Tree], inputs: Sequence[Tree]) -> Tree:
     operation = node.operation
     if operation == "constant":
-        return _double(node.value)
+        return _decimal(node.value)
     if operation == "input":
         return inputs[node.arguments[1]]
-    if operation == "negate":
-        return Sum(((False, arguments[0]),))
-    if operation in BINARY:
-        return BINARY[operation](arguments[0], arguments[1])
-    if operation in UNARY:
-        return Call(UNARY[operation], (arguments[0],), 0)
+    if operation in TREES:
+        return TREES[operation](*arguments)
+    if operation in FUNCTIONS:
+        return Call(FUNCTIONS[operation], tuple(arguments), 0)
     raise AnswerError(f"CasADi's {operation} is not read")

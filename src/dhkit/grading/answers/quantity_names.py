@@ -11,9 +11,9 @@ from dhkit.description import Description
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-SCALARS = ("K", "V", "L")
-LONGEST = 40
-"""Characters of a name that may be a quantity."""
+MAX_NAME = 40
+"""Largest length of a name that may be an entry, in characters."""
+
 ENTRY = re.compile(r"([A-Za-z]+?)(\d*)_?(\d+)(?:[_,](\d+))?", re.ASCII)
 SMALL_HEADS = {"m": "M"}
 """Small letters in front of two numbers: m12 is an entry of M. c12 and s12 are cosines and sines."""
@@ -28,7 +28,7 @@ class Target:
     quantity
         M, C, h, g, tau, K, V, L, A1 ... An, T or J.
     index
-        Of an entry, from 0; None of the whole quantity.
+        Index of the entry, from 0; None for the whole quantity.
     """
 
     quantity: str
@@ -85,43 +85,27 @@ class QuantityNames:
 
     def entries(self, name: str) -> list[Target]:
         """Return the entries that a name may stand for: several where its digits can be read in two ways."""
-        if len(name) > LONGEST or self.is_parameter(name):
-            return []
-        match = ENTRY.fullmatch(name.replace("{", "").replace("}", ""))
-        if match is None:
+        match = ENTRY.fullmatch(re.sub(r"[{}]", "", name)) if len(name) <= MAX_NAME else None
+        if match is None or self.is_parameter(name):
             return []
         letters, digits, first, second = match.groups()
-        return list(dict.fromkeys(self._readings(letters, digits, first, second)))
-
-    def _readings(self, letters: str, digits: str, first: str, second: str | None) -> Iterable[Target]:
-        if second is not None:
-            pairs = [(digits, first, second)] if digits else [("", first, second)]
-            pairs += [("", digits + first, second)] if digits else []
-            for head, i, j in pairs:
-                yield from self._matrix_entry(letters + head, i, j)
-            return
         number = digits + first
-        yield from self._vector_entry(letters, number)
-        for k in range(1, len(number)):
-            yield from self._matrix_entry(letters, number[:k], number[k:])
-        for start in range(1, len(number) - 1):
-            for end in range(start + 1, len(number)):
-                yield from self._matrix_entry(letters + number[:start], number[start:end], number[end:])
+        readings: list[tuple[str, ...]]
+        if second is not None:
+            readings = [(letters + digits, first, second), (letters, number, second)]
+        else:
+            cuts = range(1, len(number))
+            readings = [(letters, number)]
+            readings += [(letters, number[:k], number[k:]) for k in cuts]
+            readings += [(letters + number[:i], number[i:k], number[k:]) for i in cuts for k in cuts if i < k]
+        return list(dict.fromkeys(target for reading in readings for target in self._entry(*reading)))
 
-    def _vector_entry(self, letters: str, number: str) -> Iterable[Target]:
-        quantity = self.quantity(letters)
-        if len(self.shape(quantity or "K")) == 1 and self._in(number, self.n):
-            yield Target(quantity, (int(number) - 1,))
-
-    def _matrix_entry(self, letters: str, i: str, j: str) -> Iterable[Target]:
-        quantity = self.quantity(SMALL_HEADS.get(letters, letters))
-        shape = self.shape(quantity or "K")
-        if len(shape) == 2 and self._in(i, shape[0]) and self._in(j, shape[1]):
-            yield Target(quantity, (int(i) - 1, int(j) - 1))
-
-    @staticmethod
-    def _in(number: str, largest: int) -> bool:
-        return len(number) <= 3 and not number.startswith("0") and int(number) <= largest
+    def _entry(self, head: str, *numbers: str) -> Iterable[Target]:
+        """Yield the entry of a vector with one number, or of a matrix with two, counted from 1."""
+        quantity = self.quantity(SMALL_HEADS.get(head, head) if len(numbers) == 2 else head)
+        shape = self.shape(quantity) if quantity else ()
+        if shape and len(shape) == len(numbers) and all(map(_is_place, numbers, shape)):
+            yield Target(quantity, tuple(int(number) - 1 for number in numbers))
 
     def index_in(self, quantity: str, index: tuple[int, ...]) -> tuple[int, ...] | None:
         """Return an index as the quantity has it: (i, 0) of a column is (i,); None of one that it does not have."""
@@ -130,3 +114,7 @@ class QuantityNames:
             index = index[:1]
         inside = len(index) == len(shape) and all(0 <= k < length for k, length in zip(index, shape, strict=True))
         return index if inside else None
+
+
+def _is_place(number: str, length: int) -> bool:
+    return len(number) <= 3 and not number.startswith("0") and int(number) <= length

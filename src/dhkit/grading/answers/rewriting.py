@@ -1,27 +1,50 @@
-"""Students' notations brought to one: shorthand, derivatives, products without a sign, functions without brackets."""
+"""Students' notations in one grammar: shorthand, derivatives, products without a sign, functions without brackets."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from typing import NoReturn
 
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.indices import without_indices
-from dhkit.grading.answers.tokens import check_depth, closing_bracket, fail
+from dhkit.grading.answers.tokens import (
+    begins_with,
+    check_depth,
+    closing_bracket,
+    derivative_by_time,
+    fail,
+    in_brackets,
+    replace_runs,
+    sign,
+    word_set,
+)
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
-TURNS = ("sin", "cos", "tan")
+TRIGONOMETRIC = ("sin", "cos", "tan")
 SHORTHAND = ("c", "s")
 CALLED = frozenset(FUNCTION_NAMES.values())
-MODULES = frozenset(("np", "numpy", "math", "sp", "sympy", "sym", "ca", "cs", "casadi", "cmath", "mpmath", "mp", "cas"))
+MODULES = word_set("np numpy math sp sympy sym ca cs casadi cmath mpmath mp cas")
 ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
+
+ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
+"""Orders of derivatives, by what stands behind the expression that is differentiated."""
+
 MATLAB = re.compile(r"\.[*/^']")
 """Signs that are MATLAB's alone."""
+
+BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
+AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
+
 MAX_TOKENS = 300_000
+"""Largest number of tokens of an answer, its names written out."""
+
+SQUARED = (("^", "2"), ("^", "(", "2", ")"))
+OVER_TIME = (("/", "dt"), ("/", "d", "t"), ("/", "(", "dt", ")"))
 
 
-def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
+def to_plain_grammar(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
     """Return tokens of the plain grammar, in the robot's own names.
 
     Raises
@@ -29,119 +52,294 @@ def rewritten(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> lis
     AnswerError
         An unknown name, an attribute, or brackets that do not match.
     """
-    check_depth(tokens, text)
-    found = _without_modules(_methods(tokens), text)
-    found = _without_time(without_indices(_without_primes(found, vocabulary, text), vocabulary, text), vocabulary, text)
-    # Square brackets that are left stand for round ones.
-    found = [Token("sign", {"[": "(", "]": ")"}.get(x.text, x.text), x.at) if x.kind == "sign" else x for x in found]
-    found = _derivatives(found, text)
-    found = _fractions_by_time(found, vocabulary, text)
-    found = _named(found, vocabulary, text)
-    found = _functions(found, text)
-    return _products(found)
+    return _Rewriting(vocabulary, text).to_plain_grammar(tokens)
 
 
-def _methods(tokens: Sequence[Token]) -> list[Token]:
-    """Read q1.diff(t) as diff(q1, t)."""
-    found: list[Token] = []
-    k = 0
-    while k < len(tokens):
-        if [x.text for x in tokens[k : k + 3]] == [".", "diff", "("] and found and found[-1].kind == "name":
-            name = found.pop()
-            found += [tokens[k + 1], tokens[k + 2], name, Token("sign", ",", tokens[k].at)]
-            k += 3
-            continue
-        found.append(tokens[k])
-        k += 1
-    return found
+class _Rewriting:
+    """The steps from a student's notation to the plain grammar, each from tokens to tokens."""
 
+    def __init__(self, vocabulary: Vocabulary, text: str) -> None:
+        self.vocabulary = vocabulary
+        self.text = text
 
-def _without_modules(tokens: Sequence[Token], text: str) -> list[Token]:
-    """Take np. off np.sin; no other attribute is read."""
-    found: list[Token] = []
-    for token in tokens:
-        if len(found) > 1 and found[-1].text == "." and token.kind == "name" and token.text in ATTRIBUTES:
-            module = found[-2]
-            if module.kind != "name" or module.text not in MODULES:
-                fail(text, module.at, f"an attribute of {module.text!r}, which is not read,")
-            del found[-2:]
-        found.append(token)
-    for token in found:
-        if token.text == ".":
-            fail(text, token.at, "an attribute, which is not read,")
-    return found
+    def to_plain_grammar(self, tokens: Sequence[Token]) -> list[Token]:
+        check_depth(tokens, self.text)
+        tokens = self._without_modules(_without_methods(tokens))
+        tokens = without_indices(self._without_primes(tokens), self.vocabulary, self.text)
+        tokens = self._without_time(tokens)
+        # Square brackets that are left stand for round ones.
+        plain = {"[": "(", "]": ")"}
+        tokens = [sign(plain.get(x.text, x.text), x.at) if x.kind == "sign" else x for x in tokens]
+        tokens = self._fractions_by_time(self._derivatives(tokens))
+        return _with_product_signs(self._functions(self._names(tokens)))
 
+    def _fail(self, token: Token, problem: str) -> NoReturn:
+        fail(self.text, token.at, problem)
 
-def _without_primes(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read Lagrange's prime behind a joint's variable as a rate, and drop MATLAB's transpose.
+    def _without_modules(self, tokens: Sequence[Token]) -> list[Token]:
+        """Take np. off np.sin; no other attribute is read."""
+        plain: list[Token] = []
+        for token in tokens:
+            if len(plain) > 1 and plain[-1].text == "." and token.kind == "name" and token.text in ATTRIBUTES:
+                module = plain[-2]
+                if module.kind != "name" or module.text not in MODULES:
+                    self._fail(module, f"an attribute of {module.text!r}, which is not read,")
+                del plain[-2:]
+            plain.append(token)
+        for token in plain:
+            if token.text == ".":
+                self._fail(token, "an attribute, which is not read,")
+        return plain
 
-    Raises
-    ------
-    AnswerError
-        A prime behind anything but a matrix where nothing else is MATLAB's: it may be a derivative.
-    """
-    found: list[Token] = []
-    for token in tokens:
-        if token.text not in ("'", ".'") or not found or (found[-1].kind == "sign" and found[-1].text not in ")]"):
-            found.append(token)
-            continue
-        name = found[-1].text if found[-1].kind == "name" else ""
-        if token.text == "'" and vocabulary.is_position(name):
-            found[-1] = Token("name", f"{name}dot", found[-1].at)
-        elif token.text == "'" and vocabulary.is_position(name.removesuffix("dot")):
-            found[-1] = Token("name", f"{name.removesuffix('dot')}ddot", found[-1].at)
-        elif token.text == "'" and found[-1].text != "]" and not MATLAB.search(text):
-            fail(text, token.at, "a prime that belongs to no joint variable,")
-    return found
+    def _without_primes(self, tokens: Sequence[Token]) -> list[Token]:
+        """Read Lagrange's prime behind a joint's variable as a rate, and drop MATLAB's transpose.
 
+        A prime behind anything but a matrix is refused where nothing else is MATLAB's: it may be a derivative.
+        """
+        plain: list[Token] = []
+        for token in tokens:
+            if token.text not in ("'", ".'") or not plain or (plain[-1].kind == "sign" and plain[-1].text not in ")]"):
+                plain.append(token)
+                continue
+            name = plain[-1].text if plain[-1].kind == "name" else ""
+            if token.text == "'" and self.vocabulary.is_position(name):
+                plain[-1] = Token("name", f"{name}dot", plain[-1].at)
+            elif token.text == "'" and self.vocabulary.is_position(name.removesuffix("dot")):
+                plain[-1] = Token("name", f"{name.removesuffix('dot')}ddot", plain[-1].at)
+            elif token.text == "'" and plain[-1].text != "]" and not MATLAB.search(self.text):
+                self._fail(token, "a prime that belongs to no joint variable,")
+        return plain
 
-def _without_time(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read theta1(t), and Mathematica's theta1[t], as theta1.
+    def _without_time(self, tokens: Sequence[Token]) -> list[Token]:
+        """Read theta1(t), and Mathematica's theta1[t], as theta1; refuse them where the robot has a parameter t."""
 
-    Raises
-    ------
-    AnswerError
-        The robot has a parameter t.
-    """
-    found: list[Token] = []
-    k = 0
-    while k < len(tokens):
-        found.append(tokens[k])
-        is_operand = (tokens[k].kind == "name" and tokens[k].text not in FUNCTION_NAMES) or tokens[k].text in (")", "}")
-        behind = [x.text for x in tokens[k + 1 : k + 4]]
-        is_of_time = is_operand and behind in (["(", "t", ")"], ["[", "t", "]"])
-        if is_of_time and vocabulary.is_exactly("t"):
-            fail(text, tokens[k].at, f"{tokens[k].text}(t) may be a function of time, or a product; t is a parameter")
-        k += 4 if is_of_time else 1
-    return found
+        def read_run(k: int) -> tuple[Sequence[Token], int] | None:
+            token = tokens[k]
+            is_operand = (token.kind == "name" and token.text not in FUNCTION_NAMES) or token.text in (")", "}")
+            is_of_time = begins_with(tokens, k + 1, "(", "t", ")") or begins_with(tokens, k + 1, "[", "t", "]")
+            if not is_operand or not is_of_time:
+                return None
+            if self.vocabulary.is_exactly("t"):
+                self._fail(token, f"{token.text}(t) may be a function of time, or a product; t is a parameter")
+            return [token], k + 4
 
+        return replace_runs(tokens, read_run)
 
-ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
-"""Orders of derivatives, by what stands behind the expression that is differentiated."""
+    # Derivatives
 
+    def _derivatives(self, tokens: Sequence[Token]) -> list[Token]:
+        """Read diff(theta1, t) and Derivative(l1*theta1(t), (t, 2)) as time derivatives of their first argument."""
 
-def _derivatives(tokens: Sequence[Token], text: str) -> list[Token]:
-    """Read diff(theta1, t) and Derivative(l1*theta1(t), (t, 2)) as time derivatives of what stands there."""
-    found: list[Token] = []
-    k = 0
-    while k < len(tokens):
-        token = tokens[k]
-        if token.text not in DERIVATIVES or k + 1 == len(tokens) or tokens[k + 1].text != "(":
-            found.append(token)
+        def read_run(k: int) -> tuple[Sequence[Token], int] | None:
+            token = tokens[k]
+            if token.text not in DERIVATIVES or not begins_with(tokens, k + 1, "("):
+                return None
+            end = self._closing(tokens, k + 1)
+            inner = tokens[k + 2 : end]
+            comma = _first_comma(inner)
+            order = ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
+            if not comma or not order:
+                self._fail(token, "a derivative other than by t")
+            return derivative_by_time(self._derivatives(inner[:comma]), order, token.at), end + 1
+
+        return replace_runs(tokens, read_run)
+
+    def _fractions_by_time(self, tokens: Sequence[Token]) -> list[Token]:
+        """Read dtheta1/dt, d(5 theta1)/dt, d/dt(theta1/2) and d^2 theta1/dt^2 as time derivatives."""
+
+        def read_run(k: int) -> tuple[Sequence[Token], int] | None:
+            token = tokens[k]
+            if token.kind != "name" or token.text[0] != "d":
+                return None
+            run = self._fraction_by_time(tokens, k) if "d" not in self.vocabulary.own else None
+            if run is None and token.text == "dt" and not self.vocabulary.is_own("dt"):
+                self._fail(token, "dt that belongs to no derivative")
+            return run
+
+        return replace_runs(tokens, read_run)
+
+    def _fraction_by_time(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None:
+        """Return the derivative that begins with the d at k, and where it ends; None where there is none."""
+        token, order, at = tokens[k], 1, k + 1
+        if token.text == "d":
+            square = next((len(square) for square in SQUARED if begins_with(tokens, at, *square)), 0)
+            order, at = 1 + bool(square), at + square
+            if end := _end_of_over_time(tokens, at, order):
+                stop = self._operand(tokens, end)
+                self._refuse_unclear_end(tokens, k, end, stop)
+                return derivative_by_time(tokens[end:stop], order, token.at), stop
+            stop = self._operand(tokens, at)
+            end = _end_of_over_time(tokens, stop, order) if stop > at else 0
+            return (derivative_by_time(tokens[at:stop], order, token.at), end) if end else None
+        squared = re.fullmatch(r"d[2d](\w+)", token.text, re.ASCII)
+        if squared and self.vocabulary.is_position(squared[1]) and begins_with(tokens, k + 1, "/", "dt2"):
+            return derivative_by_time([Token("name", squared[1], token.at)], 2, token.at), k + 3
+        name, end = token.text[1:], _end_of_over_time(tokens, k + 1, 1)
+        if end and self.vocabulary.is_state(name):
+            return derivative_by_time([Token("name", name, token.at)], 1, token.at), end
+        return None
+
+    def _refuse_unclear_end(self, tokens: Sequence[Token], k: int, start: int, stop: int) -> None:
+        """Refuse d/dt at k in front of an operand, from start to stop, that may go on behind it."""
+        is_enclosed = start < len(tokens) and (
+            tokens[start].text == "(" or BY_TIME.match(self.text, tokens[start].at) is not None
+        )
+        following = tokens[stop] if stop < len(tokens) else sign("", 0)
+        goes_on = following.kind != "sign" or following.text in ("(", "*", "/")
+        if stop == start or following.text == "^" or (goes_on and not is_enclosed):
+            self._fail(
+                tokens[k], "a derivative that may reach further than the name behind it; put brackets around what"
+            )
+
+    # Names
+
+    def _names(self, tokens: Sequence[Token]) -> list[Token]:
+        """Put in what names stand for."""
+        plain: list[Token] = []
+        for k, token in enumerate(tokens):
+            if len(plain) > MAX_TOKENS:
+                self._fail(token, f"more than {MAX_TOKENS} signs, names written out,")
+            if token.kind != "name":
+                plain.append(token)
+                continue
+            following = tokens[k + 1].text if k + 1 < len(tokens) else ""
+            meaning = self.vocabulary.find(token.text)
+            self._refuse_ambiguous(tokens, k)
+            self._refuse_shorthand(tokens, k)
+            is_known = token.text in self.vocabulary.own or token.text in self.vocabulary.symbols
+            is_called = following == "(" or (following == "^" and not is_known)
+            if token.text in FUNCTION_NAMES and (meaning is None or is_called):
+                plain.append(Token("function", FUNCTION_NAMES[token.text], token.at))
+            elif meaning is not None:
+                plain += _written_out(meaning, token.at)
+            else:
+                plain += self._split(token, following in ("(", "^"))
+        return plain
+
+    def _refuse_shorthand(self, tokens: Sequence[Token], k: int) -> None:
+        """Refuse c (...) where c is a parameter or the cosine, c W where W is no angle, and q1(0)."""
+        name, vocabulary = tokens[k].text, self.vocabulary
+        behind = [token.text for token in tokens[k + 1 : k + 4]]
+        is_exact = vocabulary.is_exactly(name)
+        if name in FUNCTION_NAMES and is_exact and behind[:1] == ["("]:
+            problem = f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
+            self._fail(tokens[k], problem)
+        is_shorthand = name in SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
+        if is_shorthand and not vocabulary.is_position(behind[0]) and vocabulary.is_exactly(behind[0]):
+            self._fail(tokens[k], f"{name} before {behind[0][:40]}, which is no angle,")
+        is_number_in_brackets = len(behind) == 3 and behind[0] == "(" and behind[2] == ")" and behind[1].isdecimal()
+        if vocabulary.is_state(name) and is_number_in_brackets:
+            self._fail(tokens[k], f"{name}({behind[1][:20]}) may be a value at a time, or a product; write which")
+
+    def _refuse_ambiguous(self, tokens: Sequence[Token], k: int) -> None:
+        """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
+        match = AMBIGUOUS.fullmatch(tokens[k].text)
+        if match is None or tokens[k].text in self.vocabulary.own:
+            return
+        function, number, rest = match.groups()
+        following = tokens[k + 1] if k + 1 < len(tokens) else sign("", 0)
+        if rest is None and following.text == "(":
+            problem = f"{function}{number}(...) may be {function}(...)^{number} or {function} of {number}(...)"
+            self._fail(tokens[k], problem)
+        if rest is None and following.kind == "name":
+            rest = following.text
+        if rest is not None and self.vocabulary.is_position(rest):
+            both = f"{function}({number}*{rest}) or {function}(q{number})*{rest}"
+            self._fail(tokens[k], f"{tokens[k].text} may be {both}; put brackets")
+
+    def _split(self, token: Token, is_called: bool) -> list[Token]:
+        """Read names that are run together: m2l1, sintheta1, and in front of a bracket l2cos."""
+        vocabulary, at = self.vocabulary, token.at
+        name = plain_name(token.text)
+        for function in TRIGONOMETRIC:
+            if is_called and name.endswith(function):
+                before = name.removesuffix(function)
+                factors = [*self._split(Token("name", before, at), False), sign("*", at)] if before else []
+                return [*factors, Token("function", function, at)]
+            if name.startswith(function) and vocabulary.is_position(name.removeprefix(function)):
+                angle = vocabulary.find(name.removeprefix(function)) or ()
+                return [Token("function", function, at), *_written_out(angle, at)]
+        if meaning := vocabulary.find(token.text):
+            return _written_out(meaning, at)
+        pieces = vocabulary.split(name)
+        if pieces is None:
+            nearest = vocabulary.nearest(token.text[:60])
+            return fail(self.text, at, f"unknown name {token.text[:60]!r} ({nearest})")
+        vocabulary.taken_for[token.text] = " ".join(pieces)
+        words = [word for piece in pieces for word in ("*", *(vocabulary.find(piece) or ()))]
+        return _written_out(words[1:], at)
+
+    # Functions
+
+    def _functions(self, tokens: Sequence[Token]) -> list[Token]:
+        """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions behind them, sin^2(q1)."""
+
+        def read_run(k: int) -> tuple[Sequence[Token], int] | None:
+            return self._function(tokens, k) if tokens[k].kind == "function" else None
+
+        return replace_runs(tokens, read_run)
+
+    def _function(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int]:
+        """Return the call of the function at k, and where it ends."""
+        token, name, start = tokens[k], tokens[k].text, k + 1
+        power: list[Token] = []
+        if begins_with(tokens, start, "^"):
+            end = self._operand(tokens, start + 1)
+            power, start = list(tokens[start:end]), end
+            if "".join(x.text for x in power).strip("^()") == "-1":
+                if name in ("sec", "csc", "cot"):
+                    self._fail(token, f"{name}^-1 may be the inverse function or 1/{name}")
+                if name in TRIGONOMETRIC:
+                    name, power = f"a{name}", []  # cos^-1 is the arc cosine
+        end = self._operand(tokens, start, is_product=True)
+        if name == "sqrt" and end - start > 1 and tokens[start].kind == "number":
+            both = " ".join(x.text for x in tokens[start:end])
+            problem = f"sqrt {both} may be sqrt({both}) or sqrt({tokens[start].text}) times the rest; put brackets"
+            self._fail(token, problem)
+        argument = self._functions(tokens[start:end])
+        if not argument:
+            self._fail(token, f"{name} without an argument")
+        following = tokens[end] if end < len(tokens) else sign("", token.at)
+        goes_on = following.kind in ("name", "function") or (argument[-1].text != ")" and following.text == "/")
+        if name in TRIGONOMETRIC and goes_on and all(x.kind in ("number", "sign") for x in argument):
+            self._fail(token, f"{name} of a number, or of more; put its argument in brackets")
+        if argument[0].text != "(" or self._closing(argument, 0) != len(argument) - 1:
+            argument = in_brackets(argument, token.at)
+        return [Token("call", name, token.at), *argument, *power], end
+
+    def _operand(self, tokens: Sequence[Token], k: int, is_product: bool = False) -> int:
+        """Return where the operand ends that begins at k.
+
+        An operand is what stands in brackets, or a name or a number behind signs; in a product, numbers may stand
+        in front of the brackets or the name.
+        """
+        if begins_with(tokens, k, "("):
+            return self._closing(tokens, k) + 1
+        while k < len(tokens) and (tokens[k].kind == "number" if is_product else tokens[k].text in "+-"):
             k += 1
-            continue
-        end = _closing(tokens, k + 1, text)
-        inner = list(tokens[k + 2 : end])
-        comma = _comma(inner)
-        order = ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
-        if not comma or not order:
-            fail(text, token.at, "a derivative other than by t")
-        found += _by_time(_derivatives(inner[:comma], text), order, token.at)
-        k = end + 1
-    return found
+        if is_product and begins_with(tokens, k, "("):
+            return self._closing(tokens, k) + 1
+        return k + 1 if k < len(tokens) and tokens[k].kind in ("name", "number") else k
+
+    def _closing(self, tokens: Sequence[Token], k: int) -> int:
+        """Return where the bracket at k closes."""
+        end = closing_bracket(tokens, k)
+        return end if end < len(tokens) else fail(self.text, tokens[k].at, "a bracket that does not close")
 
 
-def _comma(tokens: Sequence[Token]) -> int:
+def _without_methods(tokens: Sequence[Token]) -> list[Token]:
+    """Read q1.diff(t) as diff(q1, t)."""
+
+    def read_run(k: int) -> tuple[Sequence[Token], int] | None:
+        if tokens[k].kind != "name" or not begins_with(tokens, k + 1, ".", "diff", "("):
+            return None
+        name, dot, method, bracket = tokens[k : k + 4]
+        return [method, bracket, name, sign(",", dot.at)], k + 4
+
+    return replace_runs(tokens, read_run)
+
+
+def _first_comma(tokens: Sequence[Token]) -> int:
     """Return where the first comma outside brackets is; 0 without one."""
     depth = 0
     for k, token in enumerate(tokens):
@@ -151,272 +349,35 @@ def _comma(tokens: Sequence[Token]) -> int:
     return 0
 
 
-def _by_time(inner: Sequence[Token], order: int, at: int) -> list[Token]:
-    found = list(inner)
-    for _ in range(order):
-        found = [Token("function", "ddt", at), Token("sign", "(", at), *found, Token("sign", ")", at)]
-    return found
+def _end_of_over_time(tokens: Sequence[Token], k: int, order: int) -> int:
+    """Return where / dt, or / dt^2 for order 2, ends that begins at k; 0 where something else stands there."""
+    over = next((len(over) for over in OVER_TIME if begins_with(tokens, k, *over)), 0)
+    if not over or order == 1:
+        return k + over if over else 0
+    square = next((len(square) for square in SQUARED if begins_with(tokens, k + over, *square)), 0)
+    return k + over + square if square else 0
 
 
-def _fractions_by_time(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read dtheta1/dt, d(5 theta1)/dt, d/dt(theta1/2) and d^2 theta1/dt^2 as time derivatives."""
-    found: list[Token] = []
-    k = 0
-    while k < len(tokens):
-        token = tokens[k]
-        if token.kind == "name" and token.text[0] == "d" and "d" not in vocabulary.own:
-            read = _fraction_by_time(tokens, k, vocabulary, text)
-            if read is not None:
-                found += read[0]
-                k = read[1]
-                continue
-        if token.kind == "name" and token.text == "dt" and not vocabulary.is_own("dt"):
-            fail(text, token.at, "dt that belongs to no derivative")
-        found.append(token)
-        k += 1
-    return found
+def _written_out(words: Sequence[str], at: int) -> list[Token]:
+    """Return the tokens of what a name stands for."""
+    return [Token(_kind(word), word, at) for word in words]
 
 
-def _fraction_by_time(
-    tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str
-) -> tuple[list[Token], int] | None:
-    """Return a derivative that begins with the d at k, and where it ends; None where there is none."""
-    token, order, at = tokens[k], 1, k + 1
-    if token.text == "d" and [x.text for x in tokens[at : at + 2]] == ["^", "2"]:
-        order, at = 2, at + 2
-    elif token.text == "d" and [x.text for x in tokens[at : at + 4]] == ["^", "(", "2", ")"]:
-        order, at = 2, at + 4
-    if token.text == "d" and (end := _over_time(tokens, at, order)):
-        stop = _operand(tokens, end, text)  # d/dt(...)
-        is_enclosed = end < len(tokens) and (tokens[end].text == "(" or _is_by_time(text, tokens[end].at))
-        following = tokens[stop] if stop < len(tokens) else None
-        goes_on = following is not None and (following.kind != "sign" or following.text in ("(", "*", "/"))
-        is_raised = following is not None and following.text == "^"
-        if stop == end or is_raised or (goes_on and not is_enclosed):
-            fail(
-                text, token.at, "a derivative that may reach further than the name behind it; put brackets around what"
-            )
-        return _by_time(tokens[end:stop], order, token.at), stop
-    if token.text == "d":
-        stop = _operand(tokens, at, text)
-        end = _over_time(tokens, stop, order) if stop > at else 0
-        return (_by_time(tokens[at:stop], order, token.at), end) if end else None
-    twice = re.fullmatch(r"d[2d](\w+)", token.text, re.ASCII)
-    if twice and vocabulary.is_position(twice[1]) and [x.text for x in tokens[k + 1 : k + 3]] == ["/", "dt2"]:
-        return _by_time([Token("name", twice[1], token.at)], 2, token.at), k + 3
-    name, end = token.text[1:], _over_time(tokens, k + 1, 1)
-    if end and vocabulary.is_state(name):
-        return _by_time([Token("name", name, token.at)], 1, token.at), end
-    return None
-
-
-BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
-
-
-def _is_by_time(text: str, at: int) -> bool:
-    """Whether (t) stands behind the name that begins at a place of a text."""
-    return BY_TIME.match(text, at) is not None
-
-
-def _over_time(tokens: Sequence[Token], k: int, order: int) -> int:
-    """Return where / dt, or / dt^2, ends that begins at k; 0 where something else stands there."""
-    texts = [x.text for x in tokens[k : k + 6]]
-    for below in (["/", "dt"], ["/", "d", "t"], ["/", "(", "dt", ")"]):
-        if texts[: len(below)] != below:
-            continue
-        end = k + len(below)
-        rest = [x.text for x in tokens[end : end + 4]]
-        for power in (["^", "2"], ["^", "(", "2", ")"]):
-            if order == 2 and rest[: len(power)] == power:
-                return end + len(power)
-        return end if order == 1 else 0
-    return 0
-
-
-def _named(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Put in what names stand for."""
-    found: list[Token] = []
-    for k, token in enumerate(tokens):
-        if len(found) > MAX_TOKENS:
-            fail(text, token.at, f"more than {MAX_TOKENS} signs, names written out,")
-        if token.kind != "name":
-            found.append(token)
-            continue
-        calls = k + 1 < len(tokens) and tokens[k + 1].text in ("(", "^")
-        meaning = vocabulary.find(token.text)
-        _refuse_ambiguous(tokens, k, vocabulary, text)
-        _refuse_shorthand(tokens, k, vocabulary, text)
-        is_known = token.text in vocabulary.own or token.text in vocabulary.symbols
-        is_raised = calls and tokens[k + 1].text == "^" and is_known
-        if token.text in FUNCTION_NAMES and (meaning is None or (calls and not is_raised)):
-            found.append(Token("function", FUNCTION_NAMES[token.text], token.at))
-        elif meaning is not None:
-            found += [_token(word, token.at) for word in meaning]
-        else:
-            found += _split(token, calls, vocabulary, text)
-    return found
-
-
-def _refuse_shorthand(tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str) -> None:
-    """Refuse c (...) where c is a parameter or the cosine, c W where W is no angle, and q1(0).
-
-    Raises
-    ------
-    AnswerError
-        One of these.
-    """
-    name, at = tokens[k].text, tokens[k].at
-    behind = [x.text for x in tokens[k + 1 : k + 4]]
-    if name in FUNCTION_NAMES and vocabulary.is_exactly(name) and behind[:1] == ["("]:
-        fail(
-            text, at, f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
-        )
-    following = tokens[k + 1] if k + 1 < len(tokens) else None
-    is_shorthand = name in SHORTHAND and not vocabulary.is_exactly(name)
-    if (
-        is_shorthand
-        and following is not None
-        and following.kind == "name"
-        and not _is_angle(following.text, vocabulary)
-    ):
-        fail(text, at, f"{name} before {following.text[:40]}, which is no angle,")
-    if (
-        vocabulary.is_state(name)
-        and len(behind) == 3
-        and behind[0] == "("
-        and behind[2] == ")"
-        and behind[1].isdecimal()
-    ):
-        fail(text, at, f"{name}({behind[1][:20]}) may be a value at a time, or a product; write which")
-
-
-def _is_angle(name: str, vocabulary: Vocabulary) -> bool:
-    """Whether a sine may be taken of a name: a joint's variable, or what is no length, mass or other parameter."""
-    return vocabulary.is_position(name) or not vocabulary.is_exactly(name)
-
-
-AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
-
-
-def _refuse_ambiguous(tokens: Sequence[Token], k: int, vocabulary: Vocabulary, text: str) -> None:
-    """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
-    match = AMBIGUOUS.fullmatch(tokens[k].text)
-    if match is None or tokens[k].text in vocabulary.own:
-        return
-    function, number, rest = match.groups()
-    following = tokens[k + 1] if k + 1 < len(tokens) else None
-    if rest is None and following is not None and following.text == "(":
-        fail(
-            text,
-            tokens[k].at,
-            f"{function}{number}(...) may be {function}(...)^{number} or {function} of {number}(...)",
-        )
-    if rest is None and following is not None and following.kind == "name" and vocabulary.is_position(following.text):
-        rest = following.text
-    if rest is not None and vocabulary.is_position(rest):
-        both = f"{function}({number}*{rest}) or {function}(q{number})*{rest}"
-        fail(text, tokens[k].at, f"{tokens[k].text} may be {both}; put brackets")
-
-
-def _split(token: Token, calls: bool, vocabulary: Vocabulary, text: str) -> list[Token]:
-    """Read names that are run together: m2l1, sintheta1, and in front of a bracket l2cos."""
-    for function in ("sin", "cos", "tan"):
-        name, rest = plain_name(token.text), ""
-        if calls and name.endswith(function):
-            name, rest = name.removesuffix(function), function
-            before = _split(Token("name", name, token.at), False, vocabulary, text) if name else []
-            return [*before, *([_token("*", token.at)] if before else []), Token("function", rest, token.at)]
-        if name.startswith(function) and vocabulary.is_position(name.removeprefix(function)):
-            inner = vocabulary.find(name.removeprefix(function)) or ()
-            return [Token("function", function, token.at), *(_token(word, token.at) for word in inner)]
-    if vocabulary.knows(token.text):
-        return [_token(word, token.at) for word in vocabulary.find(token.text) or ()]
-    pieces = vocabulary.split(plain_name(token.text))
-    if pieces is None:
-        fail(text, token.at, f"unknown name {token.text[:60]!r} ({vocabulary.nearest(token.text[:60])})")
-    vocabulary.taken_for[token.text] = " ".join(pieces)
-    found: list[Token] = []
-    for piece in pieces:
-        found += [_token("*", token.at)] if found else []
-        found += [_token(word, token.at) for word in vocabulary.find(piece) or ()]
-    return found
-
-
-def _token(word: str, at: int) -> Token:
+def _kind(word: str) -> str:
     if word[0] in "0123456789.":
-        return Token("number", word, at)
-    if word in CALLED:
-        return Token("function", word, at)
-    return Token("name" if word[0].isalpha() else "sign", word, at)
+        return "number"
+    return "function" if word in CALLED else "name" if word[0].isalpha() else "sign"
 
 
-def _functions(tokens: Sequence[Token], text: str) -> list[Token]:
-    """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions behind them, sin^2(q1)."""
-    found: list[Token] = []
-    k = 0
-    while k < len(tokens):
-        token = tokens[k]
-        k += 1
-        if token.kind != "function":
-            found.append(token)
-            continue
-        power: list[Token] = []
-        if k < len(tokens) and tokens[k].text == "^":
-            end = _operand(tokens, k + 1, text)
-            power, k = list(tokens[k:end]), end
-            if "".join(x.text for x in power).strip("^()") == "-1":
-                if token.text in ("sec", "csc", "cot"):
-                    fail(text, token.at, f"{token.text}^-1 may be the inverse function or 1/{token.text}")
-                if token.text in ("sin", "cos", "tan"):
-                    token, power = Token("function", f"a{token.text}", token.at), []  # cos^-1 is the arc cosine
-        end = _operand(tokens, k, text, product=True)
-        if token.text == "sqrt" and end - k > 1 and tokens[k].kind == "number":
-            both = " ".join(x.text for x in tokens[k:end])
-            fail(
-                text,
-                token.at,
-                f"sqrt {both} may be sqrt({both}) or sqrt({tokens[k].text}) times the rest; put brackets",
-            )
-        argument = _functions(tokens[k:end], text)
-        if not argument:
-            fail(text, token.at, f"{token.text} without an argument")
-        following = tokens[end] if end < len(tokens) else Token("sign", "", token.at)
-        goes_on = following.kind in ("name", "function") or (argument[-1].text != ")" and following.text == "/")
-        if token.text in TURNS and goes_on and all(x.kind in ("number", "sign") for x in argument):
-            fail(text, token.at, f"{token.text} of a number, or of more; put its argument in brackets")
-        if argument[0].text != "(" or _closing(argument, 0, text) != len(argument) - 1:
-            argument = [Token("sign", "(", token.at), *argument, Token("sign", ")", token.at)]
-        found += [Token("call", token.text, token.at), *argument, *power]
-        k = end
-    return found
-
-
-def _operand(tokens: Sequence[Token], k: int, text: str, product: bool = False) -> int:
-    """Return where an operand ends that begins at k: brackets, or a name, perhaps with numbers in front of it."""
-    if k < len(tokens) and tokens[k].text == "(":
-        return _closing(tokens, k, text) + 1
-    while k < len(tokens) and (tokens[k].text in "+-" if not product else tokens[k].kind == "number"):
-        k += 1
-    if k < len(tokens) and tokens[k].text == "(" and product:
-        return _closing(tokens, k, text) + 1
-    return k + 1 if k < len(tokens) and tokens[k].kind in ("name", "number") else k
-
-
-def _products(tokens: Sequence[Token]) -> list[Token]:
+def _with_product_signs(tokens: Sequence[Token]) -> list[Token]:
     """Put in the signs of products that stand without one."""
-    found: list[Token] = []
+    result: list[Token] = []
     for token in tokens:
-        if found:
-            before = found[-1]
+        if result:
+            before = result[-1]
             ends = before.kind in ("name", "number") or before.text == ")"
             begins = token.kind in ("name", "number", "call") or token.text == "("
             if ends and begins and not (before.kind == "number" == token.kind):
-                found.append(Token("sign", "*", token.at))
-        found.append(token)
-    return [Token("name", token.text, token.at) if token.kind == "call" else token for token in found]
-
-
-def _closing(tokens: Sequence[Token], k: int, text: str) -> int:
-    """Return where the bracket at k closes."""
-    end = closing_bracket(tokens, k)
-    return end if end < len(tokens) else fail(text, tokens[k].at, "a bracket that does not close")
+                result.append(sign("*", token.at))
+        result.append(token)
+    return [Token("name", token.text, token.at) if token.kind == "call" else token for token in result]

@@ -4,21 +4,33 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import toml_document
 from dhkit.errors import AnswerError, DescriptionError
 
+T = TypeVar("T")
+
 FORMAT = 1
+"""Version of the format of answer sheets."""
+
 MAX_BYTES = 4_000_000
-"""A PUMA's M and C, multiplied out in numbers, are 2 MB."""
+"""Largest size of a sheet: a PUMA's M and C, multiplied out in numbers, are 2 MB."""
+
 MAX_NAMES = 100
+"""Largest number of names that a student defines."""
+
 MAX_BRANCHES = 64
+"""Largest number of branches of inverse kinematics."""
+
+MAX_LEFT_OUT = 20
+"""Largest number of statements of a program or a document that are listed as left out."""
+
 KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
     "task file": ("format", "robot", "names", "task", "rubric"),
@@ -28,6 +40,7 @@ KEYS = {
     "ik": ("branches",),
 }
 """Keys that a document, and each table in it, may have. No key stands in two tables with two meanings."""
+
 CHOICES = {
     "angles": ("relative", "absolute"),
     "proof": ("optional", "required"),
@@ -36,33 +49,25 @@ CHOICES = {
     "convention": ("standard", "modified"),
 }
 """Values that a key may have; the first counts where the key is missing."""
+
 COLUMNS = ("theta", "d", "a", "alpha")
 """Entries of a table's row."""
+
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
-ALIASES = {
-    "D": "M",
-    "G": "g",
-    "KE": "K",
-    "PE": "V",
-    "U": "V",
-    "P": "V",
-    "Tau": "tau",
-    "N": "g",
-    "Jac": "J",
-    "Lagrangian": "L",
-}
-"""What quantities are called elsewhere."""
+
+ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
+"""Other names of quantities."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """What stands for a text that a program assigned and that is not to be judged.
+    """Stands in place of a text that a program or a document assigns and that is not to be judged.
 
     Attributes
     ----------
     reason
-        Why, with the line.
+        Why it is not judged, with the line.
     """
 
     reason: str
@@ -96,18 +101,18 @@ class Entries:
 
 @dataclass(frozen=True)
 class Names:
-    """How a student's names map on ours.
+    """What a student's names mean.
 
     Attributes
     ----------
     q, qd, qdd
-        Names of the joint variables, their rates and accelerations; the usual ones unless given.
+        Names of the joint variables, their rates and accelerations; the usual ones where empty.
     absolute
         Whether angles count from a fixed direction rather than from the link before.
     parameters
-        The student's further names, each as text in the robot's parameters and in those before it.
+        The student's further names, each as text in the robot's parameters and in the names before it.
     lenient
-        Whether a further name may be unreadable, and replaces any other meaning: what a program defines.
+        Whether a further name may be unreadable, and replaces any other meaning: names that a program defines.
     """
 
     q: tuple[str, ...] = ()
@@ -119,8 +124,8 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Task:
-    """What was asked for, where there is a choice.
+class Requirements:
+    """What the instructor asks for, where there is a choice: the table ``[task]``.
 
     Attributes
     ----------
@@ -129,7 +134,7 @@ class Task:
     total_derivative
         Whether L is right up to the total derivative of a function of q and t.
     asked
-        Quantities that were assigned; a sheet without one of them is incomplete. Those that were begun unless given.
+        Quantities that were assigned; a sheet without one of them is incomplete. Empty: the quantities on the sheet.
     proof_required
         Whether answers that are not proved do not pass (``proof = "required"``).
     frames_given
@@ -153,7 +158,7 @@ class AnswerSheet:
     Attributes
     ----------
     robot
-        A library name, or a path inside the sheet's folder; empty where the caller says.
+        A library name, or a path inside the sheet's folder; empty where the caller knows the robot.
     names, task
         What names mean, and what was asked for.
     answers
@@ -161,7 +166,7 @@ class AnswerSheet:
     table
         Convention and rows (theta, d, a, alpha) of a table; None without one.
     branches
-        Inverse kinematics' formulas, a list of n a branch.
+        Formulas of inverse kinematics, n for each branch.
     rubric
         How points are given; the instructor's own file comes first.
     student
@@ -176,19 +181,60 @@ class AnswerSheet:
 
     robot: str = ""
     names: Names = field(default=Names())
-    task: Task = field(default=Task())
-    answers: Mapping[str, Any] = field(default_factory=dict)
+    task: Requirements = field(default=Requirements())
+    answers: Mapping[str, object] = field(default_factory=dict)
     table: tuple[str, tuple[tuple[str, ...], ...]] | None = None
     branches: tuple[tuple[str, ...], ...] = ()
-    rubric: Mapping[str, Any] = field(default_factory=dict)
+    rubric: Mapping[str, object] = field(default_factory=dict)
     student: str = ""
     file: str = "answers"
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
 
 
+def source_sheet(
+    file: str,
+    n: int,
+    answers: Mapping[str, str | Chain | Entries | Refusal],
+    parameters: Mapping[str, str | Refusal],
+    notes: Sequence[str],
+    left_out: Sequence[str],
+) -> AnswerSheet:
+    """Return the answers of a program or a document as a sheet.
+
+    Parameters
+    ----------
+    file
+        What messages begin with.
+    n
+        The number of joints.
+    answers
+        Answers by quantity.
+    parameters
+        The file's own names that the answers are made of, each after those that it needs.
+    notes, left_out
+        As in :class:`AnswerSheet`.
+
+    Raises
+    ------
+    AnswerError
+        No answers.
+    """
+    if not answers:
+        known = ", ".join(quantity_names(n)[:8])
+        left = f"; left out: {left_out[0]}" if left_out else ""
+        raise AnswerError(f"{file}: assigns no quantity; expected some of {known}, A1, T, J{left}")
+    return AnswerSheet(
+        names=Names(parameters=parameters, lenient=True),
+        answers=answers,
+        file=file,
+        notes=tuple(notes),
+        left_out=tuple(left_out[:MAX_LEFT_OUT]),
+    )
+
+
 def read_text(path: Path, expected: str) -> str:
-    """Return a file's text; ``expected`` says in a message what it should be.
+    """Return a file's text; ``expected`` names in messages what the file should be.
 
     Raises
     ------
@@ -211,13 +257,7 @@ def read_sheet(path: Path) -> AnswerSheet:
     AnswerError
         A file that cannot be read, or is no answer sheet; with the file, the key, what was found and expected.
     """
-    text = read_text(path, "an answer sheet")
-    try:
-        return sheet_of(toml_document(text), str(path))
-    except DescriptionError as error:
-        raise AnswerError(f"{path}: {error}") from None
-    except RecursionError:
-        raise AnswerError(f"{path}: nested too deep") from None
+    return _read(path, "an answer sheet", lambda data: sheet_of(data, str(path)))
 
 
 def read_task(path: Path) -> AnswerSheet:
@@ -228,9 +268,13 @@ def read_task(path: Path) -> AnswerSheet:
     AnswerError
         A file that cannot be read, or is no task; with the file, the key, what was found and expected.
     """
+    return _read(path, "a task", lambda data: _sheet(data, _Checker(str(path)), KEYS["task file"]))
+
+
+def _read(path: Path, expected: str, sheet_from: Callable[[Mapping[str, object]], AnswerSheet]) -> AnswerSheet:
+    text = read_text(path, expected)
     try:
-        data = toml_document(read_text(path, "a task"))
-        return _sheet(data, _Where(str(path)), KEYS["task file"])
+        return sheet_from(toml_document(text))
     except DescriptionError as error:
         raise AnswerError(f"{path}: {error}") from None
     except RecursionError:
@@ -238,7 +282,7 @@ def read_task(path: Path) -> AnswerSheet:
 
 
 def quantity_names(n: int) -> list[str]:
-    """Return what an arm of n joints may be asked for."""
+    """Return the names of the quantities that an arm of n joints may be asked for."""
     return ["M", "C", "h", "g", "tau", "K", "V", "L", *(f"A{i}" for i in range(1, n + 1)), "T", "J"]
 
 
@@ -253,7 +297,7 @@ def shape_of(quantity: str, n: int) -> tuple[int, ...]:
     return (6, n) if quantity == "J" else (4, 4)
 
 
-def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:
+def sheet_of(data: Mapping[str, object], file: str = "answers") -> AnswerSheet:
     """Return the answer sheet that a TOML document is.
 
     Raises
@@ -261,142 +305,137 @@ def sheet_of(data: Mapping[str, Any], file: str = "answers") -> AnswerSheet:
     AnswerError
         It is none; with the key, what was found and expected.
     """
-    where = _Where(file)
-    sheet = _sheet(data, where, KEYS["sheet"])
-    if not where.table(data, "answer", ""):
+    checker = _Checker(file)
+    sheet = _sheet(data, checker, KEYS["sheet"])
+    if not checker.table(data, "answer", ""):
         raise AnswerError(f"{file}: no answers; expected a table [answer] with M, g, tau or others")
     return sheet
 
 
-def _sheet(data: Mapping[str, Any], where: _Where, known: Sequence[str]) -> AnswerSheet:
-    """Return what a document says, of the keys that it may have."""
-    where.keys(data, known, "")
+def _sheet(data: Mapping[str, object], checker: _Checker, known: Sequence[str]) -> AnswerSheet:
+    """Return the sheet of a document, which may have the known keys."""
+    checker.keys(data, known, "")
     if data.get("format", FORMAT) != FORMAT:
-        raise AnswerError(f"{where.file}: format: found {where.shown(data['format'])}; expected {FORMAT}")
-    answers = where.table(data, "answer", "")
-    names, task = where.table(data, "names", ""), where.table(data, "task", "")
-    table, inverse = where.table(answers, "dh", "answer."), where.table(answers, "ik", "answer.")
+        raise checker.error("format", data["format"], str(FORMAT))
+    answers = checker.table(data, "answer", "")
+    names, task = checker.table(data, "names", ""), checker.table(data, "task", "")
+    table, inverse = checker.table(answers, "dh", "answer."), checker.table(answers, "ik", "answer.")
     return AnswerSheet(
-        where.text(data, "robot", ""),
-        _names(where, names),
-        _task(where, task),
+        checker.text(data, "robot", ""),
+        _names(checker, names),
+        _requirements(checker, task),
         {name: value for name, value in answers.items() if name not in ("dh", "ik")},
-        _dh(where, table) if "dh" in answers else None,
-        _branches(where, inverse) if "ik" in answers else (),
-        where.table(data, "rubric", ""),
-        where.text(data, "student", ""),
-        where.file,
+        _table(checker, table) if "dh" in answers else None,
+        _branches(checker, inverse) if "ik" in answers else (),
+        checker.table(data, "rubric", ""),
+        checker.text(data, "student", ""),
+        checker.file,
     )
 
 
-class _Where:
-    """Checks entries of a document, with the file in every message."""
+class _Checker:
+    """Reads entries of a document; messages begin with the file and the key."""
 
     def __init__(self, file: str) -> None:
         self.file = file
 
-    def fail(self, key: str, found: object, expected: str) -> AnswerError:
-        return AnswerError(f"{self.file}: {key}: found {self.shown(found)}; expected {expected}")
+    def error(self, key: str, value: object, expected: str) -> AnswerError:
+        text = str(value) if isinstance(value, Decimal) else repr(value)
+        text = "a table" if isinstance(value, Mapping) else text if len(text) <= 60 else text[:57] + "..."
+        return AnswerError(f"{self.file}: {key}: found {text}; expected {expected}")
 
-    @staticmethod
-    def shown(found: object) -> str:
-        if isinstance(found, Mapping):
-            return "a table"
-        text = str(found) if isinstance(found, Decimal) else repr(found)
-        return text if len(text) <= 60 else text[:57] + "..."
-
-    def keys(self, table: Mapping[str, Any], known: Sequence[str], prefix: str) -> None:
+    def keys(self, table: Mapping[str, object], known: Sequence[str], prefix: str) -> None:
         for key in table:
             if key not in known:
                 close = difflib.get_close_matches(key, known, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else f"expected {', '.join(known)}"
                 raise AnswerError(f"{self.file}: unknown key {prefix}{key[:60]!r}; {hint}")
 
-    def table(self, data: Mapping[str, Any], key: str, prefix: str) -> Mapping[str, Any]:
+    def _value(self, data: Mapping[str, object], key: str, prefix: str, default: T, expected: str) -> T:
+        """Return the value of a key, of the same type as the default."""
+        value = data.get(key, default)
+        if not isinstance(value, type(default)):
+            raise self.error(prefix + key, value, expected)
+        return value
+
+    def table(self, data: Mapping[str, object], key: str, prefix: str) -> Mapping[str, object]:
         value = data.get(key, {})
         if not isinstance(value, Mapping):
-            raise self.fail(prefix + key, value, "a table")
+            raise self.error(prefix + key, value, "a table")
         return value
 
-    def text(self, data: Mapping[str, Any], key: str, prefix: str) -> str:
-        value = data.get(key, "")
-        if not isinstance(value, str):
-            raise self.fail(prefix + key, value, "text in quotes")
-        return value
+    def text(self, data: Mapping[str, object], key: str, prefix: str) -> str:
+        return self._value(data, key, prefix, "", "text in quotes")
 
-    def texts(self, value: object, key: str, what: str) -> tuple[str, ...]:
+    def switch(self, data: Mapping[str, object], key: str, prefix: str) -> bool:
+        return self._value(data, key, prefix, False, "true or false")
+
+    def texts(self, value: object, key: str, expected: str) -> tuple[str, ...]:
         if not isinstance(value, list) or not all(_is_entry(x) for x in value):
-            raise self.fail(key, value, what)
+            raise self.error(key, value, expected)
         return tuple(str(x) for x in value)
 
-    def choice(self, data: Mapping[str, Any], key: str, prefix: str) -> str:
+    def choice(self, data: Mapping[str, object], key: str, prefix: str) -> str:
         known = CHOICES[key]
         value = data.get(key, known[0])
         if value not in known:
-            raise self.fail(prefix + key, value, " or ".join(map(repr, known)))
+            raise self.error(prefix + key, value, " or ".join(map(repr, known)))
         return str(value)
-
-    def switch(self, data: Mapping[str, Any], key: str, prefix: str) -> bool:
-        value = data.get(key, False)
-        if not isinstance(value, bool):
-            raise self.fail(prefix + key, value, "true or false")
-        return value
 
 
 def _is_entry(value: object) -> bool:
     return isinstance(value, str | int | float | Decimal) and not isinstance(value, bool)
 
 
-def _names(where: _Where, data: Mapping[str, Any]) -> Names:
-    where.keys(data, KEYS["names"], "names.")
-    parameters = where.table(data, "parameters", "names.")
+def _names(checker: _Checker, data: Mapping[str, object]) -> Names:
+    checker.keys(data, KEYS["names"], "names.")
+    parameters = checker.table(data, "parameters", "names.")
     if len(parameters) > MAX_NAMES:
-        raise where.fail("names.parameters", f"{len(parameters)} names", f"at most {MAX_NAMES}")
+        raise checker.error("names.parameters", f"{len(parameters)} names", f"at most {MAX_NAMES}")
     for name, value in parameters.items():
         if not _is_entry(value):
-            raise where.fail(f"names.parameters: {name[:40]!r}", value, "an expression in the robot's parameters")
+            raise checker.error(f"names.parameters: {name[:40]!r}", value, "an expression in the robot's parameters")
     q, qd, qdd = (
-        where.texts(data[key], f"names.{key}", "a list of names, one a joint") if key in data else ()
-        for key in ("q", "qd", "qdd")
+        checker.texts(data.get(key, []), f"names.{key}", "a list of names, one a joint") for key in ("q", "qd", "qdd")
     )
-    absolute = where.choice(data, "angles", "names.") == "absolute"
+    absolute = checker.choice(data, "angles", "names.") == "absolute"
     return Names(q, qd, qdd, absolute, parameters={name: str(value) for name, value in parameters.items()})
 
 
-def _task(where: _Where, data: Mapping[str, Any]) -> Task:
-    where.keys(data, KEYS["task"], "task.")
-    asked = where.texts(data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]')
+def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements:
+    checker.keys(data, KEYS["task"], "task.")
+    asked = checker.texts(data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]')
     for name in asked:
         if not QUANTITY.fullmatch(name):
-            raise where.fail("task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik")
-    return Task(
-        where.switch(data, "friction", "task."),
-        where.switch(data, "total_derivative", "task."),
+            raise checker.error("task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik")
+    return Requirements(
+        checker.switch(data, "friction", "task."),
+        checker.switch(data, "total_derivative", "task."),
         tuple(dict.fromkeys(asked)),
-        where.choice(data, "proof", "task.") == "required",
-        where.choice(data, "frames", "task.") == "given",
-        where.choice(data, "zero", "task.") == "given",
+        checker.choice(data, "proof", "task.") == "required",
+        checker.choice(data, "frames", "task.") == "given",
+        checker.choice(data, "zero", "task.") == "given",
     )
 
 
-def _dh(where: _Where, data: Mapping[str, Any]) -> tuple[str, tuple[tuple[str, ...], ...]]:
-    where.keys(data, KEYS["dh"], "answer.dh.")
+def _table(checker: _Checker, data: Mapping[str, object]) -> tuple[str, tuple[tuple[str, ...], ...]]:
+    checker.keys(data, KEYS["dh"], "answer.dh.")
     rows = data.get("rows")
     if not isinstance(rows, list) or not rows:
-        raise where.fail("answer.dh.rows", rows, "a list of rows [theta, d, a, alpha]")
-    read = tuple(where.texts(row, f"answer.dh.rows[{k}]", "[theta, d, a, alpha]") for k, row in enumerate(rows))
-    for k, row in enumerate(read):
+        raise checker.error("answer.dh.rows", rows, "a list of rows [theta, d, a, alpha]")
+    texts = tuple(checker.texts(row, f"answer.dh.rows[{k}]", "[theta, d, a, alpha]") for k, row in enumerate(rows))
+    for k, row in enumerate(texts):
         if len(row) != len(COLUMNS):
-            raise where.fail(f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha")
-    return where.choice(data, "convention", "answer.dh."), read
+            raise checker.error(f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha")
+    return checker.choice(data, "convention", "answer.dh."), texts
 
 
-def _branches(where: _Where, data: Mapping[str, Any]) -> tuple[tuple[str, ...], ...]:
-    where.keys(data, KEYS["ik"], "answer.ik.")
+def _branches(checker: _Checker, data: Mapping[str, object]) -> tuple[tuple[str, ...], ...]:
+    checker.keys(data, KEYS["ik"], "answer.ik.")
     branches = data.get("branches")
     if not isinstance(branches, list) or not 0 < len(branches) <= MAX_BRANCHES:
-        raise where.fail("answer.ik.branches", branches, f"1 to {MAX_BRANCHES} lists of formulas, one a joint")
+        raise checker.error("answer.ik.branches", branches, f"1 to {MAX_BRANCHES} lists of formulas, one a joint")
     return tuple(
-        where.texts(branch, f"answer.ik.branches[{k}]", "a list of formulas, one a joint")
+        checker.texts(branch, f"answer.ik.branches[{k}]", "a list of formulas, one a joint")
         for k, branch in enumerate(branches)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
@@ -11,10 +12,13 @@ from dhkit.errors import AnswerError
 from dhkit.grading.answers.sheet import AnswerSheet, read_text
 
 MAX_CHARACTERS = 1_000_000
-"""Characters of code or LaTeX; a notebook may be longer, since its figures do not count."""
+"""Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""
 
-Reader: TypeAlias = Callable[[str, str, Callable[[int], str], Description], AnswerSheet]
-"""From a text, the file's name, how lines are named, and the robot to the answers."""
+LineName: TypeAlias = Callable[[int], str]
+"""Function from a line, from 1, to its name in messages."""
+
+Reader: TypeAlias = Callable[[str, str, LineName, Description], AnswerSheet]
+"""Function from a text, the file's name, the names of lines, and the robot to the answers."""
 
 
 def read_source(path: Path, description: Description) -> AnswerSheet:
@@ -30,8 +34,9 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
     Returns
     -------
     AnswerSheet
-        Quantities as text, as :class:`Entries` where they are given entry by entry, and as :class:`Refusal` where
-        something that they depend on is not understood; with notes on how the file was read, and what was left out.
+        Quantities as text, as :class:`~dhkit.grading.answers.sheet.Entries` where they are given entry by entry, and
+        as :class:`~dhkit.grading.answers.sheet.Refusal` where something that they depend on is not understood; with
+        notes on how the file was read, and what was left out.
 
     Raises
     ------
@@ -39,7 +44,8 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
         A file that cannot be read, one in which a statement may change any name, or one that assigns no quantity.
     """
     text = read_text(path, "a program or a paper")
-    suffix, line_name = path.suffix.lower(), _line_name
+    suffix = path.suffix.lower()
+    line_name: LineName = "line {}".format
     notes: tuple[str, ...] = ()
     if suffix == ".ipynb":
         from dhkit.grading.answers.programs.notebook import notebook_code
@@ -49,39 +55,31 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
     if len(text) > MAX_CHARACTERS:
         raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
     sheet = LANGUAGES[suffix](text, str(path), line_name, description)
-    if not notes:
-        return sheet
-    return AnswerSheet(
-        names=sheet.names, answers=sheet.answers, file=sheet.file, notes=(*notes, *sheet.notes), left_out=sheet.left_out
-    )
-
-
-def _line_name(line: int) -> str:
-    return f"line {line}"
+    return replace(sheet, notes=(*notes, *sheet.notes))
 
 
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.
 
 
-def _python(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+def _python(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
     from dhkit.grading.answers.programs.program_answers import answers_of
     from dhkit.grading.answers.programs.python_program import python_program
 
     return answers_of(python_program(text, file, line_name, description.n), description, file)
 
 
-def _matlab(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+def _matlab(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
     from dhkit.grading.answers.programs.matlab_program import matlab_program
     from dhkit.grading.answers.programs.program_answers import answers_of
 
-    return answers_of(matlab_program(text, file, line_name, description.n), description, file)
+    return answers_of(matlab_program(text, file, line_name), description, file)
 
 
-def _latex(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+def _latex(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
     from dhkit.grading.answers.documents.latex_document import latex_answers
 
     return latex_answers(text, file, line_name, description)
 
 
 LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}
-"""How files are read, by suffix."""
+"""Readers by suffix."""

@@ -1,19 +1,20 @@
-"""From what a student typed to tokens: ASCII or the mathematical characters that keyboards and editors insert."""
+"""Text that a student typed as tokens: ASCII or the mathematical characters that keyboards and editors insert."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NoReturn
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
 
 MAX_LENGTH = 200_000
-"""Characters of one entry: a PUMA's first, multiplied out in numbers, has 30,000."""
+"""Largest length of one entry, in characters: a PUMA's first, multiplied out in numbers, has 30,000."""
 
 MAX_DEPTH = 50
+"""Largest depth of nested brackets."""
 
 TOKEN = re.compile(
     r"\s*(?:((?:\d+(?:\.(?![*/^'])\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)"
@@ -23,28 +24,29 @@ TOKEN = re.compile(
 SAME = {".*": "*", "./": "/", ".^": "^", "**": "^"}
 """Signs of MATLAB and Python that mean one thing between numbers."""
 
-_FOLDED = {
+VULGAR_FRACTIONS = {"½": "(1/2)", "⅓": "(1/3)", "¼": "(1/4)", "¾": "(3/4)", "⅔": "(2/3)"}
+
+ASCII_TEXTS = {
     **dict.fromkeys("·×∗⋅∙•", "*"),
     **dict.fromkeys("−–—‐‑﹣", "-"),
     **dict.fromkeys("÷∕⁄", "/"),
     **dict.fromkeys("\u00a0\u2009\u202f\u2002\u2003\u200a\u2061\u2062", " "),
     **dict.fromkeys("′’‘", "'"),
     **{subscript: str(k) for k, subscript in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-    "½": "(1/2)",
-    "⅓": "(1/3)",
-    "¼": "(1/4)",
-    "¾": "(3/4)",
-    "⅔": "(2/3)",
-    "√": " sqrt ",
-    "ℓ": "l",
-    "\u0307": "dot",
-    "\u0308": "ddot",
+    **VULGAR_FRACTIONS,
+    **dict(zip("√ℓ\u0307\u0308", (" sqrt ", "l", "dot", "ddot"), strict=True)),
 }
-_VULGAR = "½⅓¼¾⅔"
-_RAISED = {raised: str(k) for k, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "-", "⁺": "+"}
+"""ASCII text of characters; Greek letters and raised digits are told apart from these."""
+
+RAISED = {raised: str(k) for k, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "-", "⁺": "+"}
 
 
-def shown(text: str) -> str:
+def word_set(text: str) -> frozenset[str]:
+    """Return the words of a text as a set, for long tables of words."""
+    return frozenset(text.split())
+
+
+def quote(text: str) -> str:
     """Return text as messages show it: short, and with nothing that a terminal would obey."""
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
@@ -57,10 +59,10 @@ def fail(text: str, at: int, problem: str) -> NoReturn:
     AnswerError
         Always.
     """
-    raise AnswerError(f"{shown(text)}: {problem} at position {at + 1}")
+    raise AnswerError(f"{quote(text)}: {problem} at position {at + 1}")
 
 
-def folded(text: str) -> tuple[str, list[int]]:
+def to_ascii(text: str) -> tuple[str, list[int]]:
     """Return text in ASCII, and where each of its characters stood.
 
     Greek letters become their names, raised digits powers, dots above a letter ``dot``. A letter of another alphabet
@@ -79,27 +81,27 @@ def folded(text: str) -> tuple[str, list[int]]:
     places: list[int] = []
     before_raised = False
     for at, character in enumerate(unicodedata.normalize("NFD", text)):
-        piece, raised = character, character in _RAISED
-        if character in _VULGAR and pieces and pieces[-1][-1:].isdigit():
-            whole, part = pieces[-1][-1], _FOLDED[character]
+        piece, raised = character, character in RAISED
+        if character in VULGAR_FRACTIONS and pieces and pieces[-1][-1:].isdigit():
+            whole, part = pieces[-1][-1], ASCII_TEXTS[character]
             fail(text, at, f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them")
         if raised:
-            piece = ("" if before_raised else "^") + _RAISED[character]
+            piece = ("" if before_raised else "^") + RAISED[character]
         elif not character.isascii():
-            piece = _FOLDED.get(character) or _greek(character) or fail(text, at, _described(character))
+            piece = ASCII_TEXTS.get(character) or _greek(character) or fail(text, at, _described(character))
         before_raised = raised
         pieces.append(piece)
         places += [at] * len(piece)
     return "".join(pieces), places
 
 
-def tokens(text: str, places: list[int], original: str, allowed: str = "") -> list[Token]:
+def split_tokens(text: str, places: list[int], original: str, allowed: str = "") -> list[Token]:
     """Split ASCII text into tokens.
 
     Parameters
     ----------
     text, places
-        What :func:`folded` returns.
+        What :func:`to_ascii` returns.
     original
         What messages show.
     allowed
@@ -110,21 +112,21 @@ def tokens(text: str, places: list[int], original: str, allowed: str = "") -> li
     AnswerError
         A character that no formula has.
     """
-    found, at, end = [], 0, len(text.rstrip())
+    tokens: list[Token] = []
+    at, end = 0, len(text.rstrip())
     while at < end:
-        match = TOKEN.match(text, at)
-        if match is None:
-            at += len(text[at:]) - len(text[at:].lstrip())
-            if text[at] not in allowed:
-                fail(original, places[at], f"unexpected character {text[at]!r}")
-            found.append(Token("sign", text[at], places[at]))
-            at += 1
+        if match := TOKEN.match(text, at):
+            group = match.lastindex or 1
+            word = SAME.get(match[group], match[group])
+            tokens.append(Token(("number", "name", "sign")[group - 1], word, places[match.start(group)]))
+            at = match.end()
             continue
-        which = match.lastindex or 1
-        word = match.group(which)
-        found.append(Token(("number", "name", "sign")[which - 1], SAME.get(word, word), places[match.start(which)]))
-        at = match.end()
-    return found
+        at += len(text[at:]) - len(text[at:].lstrip())
+        if text[at] not in allowed:
+            fail(original, places[at], f"unexpected character {text[at]!r}")
+        tokens.append(sign(text[at], places[at]))
+        at += 1
+    return tokens
 
 
 def nesting(text: str) -> int:
@@ -132,7 +134,7 @@ def nesting(text: str) -> int:
     return {"(": 1, "[": 1, ")": -1, "]": -1}.get(text, 0)
 
 
-def check_depth(found: Sequence[Token], text: str) -> None:
+def check_depth(tokens: Sequence[Token], text: str) -> None:
     """Refuse tokens whose brackets are nested deeper than :data:`MAX_DEPTH`.
 
     Raises
@@ -141,23 +143,67 @@ def check_depth(found: Sequence[Token], text: str) -> None:
         They are; with the place.
     """
     depth = 0
-    for token in found:
+    for token in tokens:
         depth += nesting(token.text)
         if depth > MAX_DEPTH:
             fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
 
 
-def closing_bracket(found: Sequence[Token], k: int) -> int:
+def closing_bracket(tokens: Sequence[Token], k: int) -> int:
     """Return where the bracket at k closes; the number of tokens where it does not."""
     depth = 0
-    for end in range(k, len(found)):
-        depth += nesting(found[end].text)
+    for end in range(k, len(tokens)):
+        depth += nesting(tokens[end].text)
         if depth == 0:
             return end
-    return len(found)
+    return len(tokens)
 
 
-def dotted(name: str, dots: str) -> str:
+def sign(text: str, at: int) -> Token:
+    """Return the token of a sign."""
+    return Token("sign", text, at)
+
+
+def in_brackets(inner: Iterable[Token], at: int) -> list[Token]:
+    """Return tokens in round brackets."""
+    return [sign("(", at), *inner, sign(")", at)]
+
+
+def derivative_by_time(inner: Iterable[Token], order: int, at: int) -> list[Token]:
+    """Return the first or second time derivative of what tokens say: ddt(...)."""
+    derivative = list(inner)
+    for _ in range(order):
+        derivative = [Token("function", "ddt", at), *in_brackets(derivative, at)]
+    return derivative
+
+
+def begins_with(tokens: Sequence[Token], k: int, *texts: str) -> bool:
+    """Whether the tokens from place k on have some texts."""
+    if k >= len(tokens) or tokens[k].text != texts[0]:  # most often, and fast
+        return False
+    return [token.text for token in tokens[k : k + len(texts)]] == list(texts)
+
+
+def replace_runs(tokens: Sequence[Token], read_run: Callable[[int], tuple[Sequence[Token], int] | None]) -> list[Token]:
+    """Return tokens with some runs of them replaced.
+
+    Parameters
+    ----------
+    tokens
+        The tokens.
+    read_run
+        Function from a place to the tokens that replace the run that begins there, and to the place behind the run;
+        None where no such run begins.
+    """
+    result: list[Token] = []
+    k = 0
+    while k < len(tokens):
+        replacement, k = read_run(k) or ([tokens[k]], k + 1)
+        result += replacement
+    return result
+
+
+def rate_name(name: str, dots: str) -> str:
     """Return the name of a derivative by time, its number last: theta1 and dot are thetadot1."""
     letters = name.rstrip("0123456789")
     return f"{letters}{dots}{name[len(letters) :]}"

@@ -7,16 +7,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.grading.answers.derivatives import node_count
 from dhkit.grading.judging.numeric import parts_of
 from dhkit.symbolic.equations.latex_names import latex_names
 
 MAX_NODES = 600
-"""Nodes of an entry that is typeset: a longer one fills a page."""
+"""Largest number of nodes of an entry that is typeset: a longer one fills a page."""
+
 VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")
 LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
+LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
 LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
 SUM, PRODUCT, POWER = 0, 1, 2
-"""How tightly what surrounds a part binds."""
+"""What surrounds a part of a formula, which decides whether the part stands in brackets."""
 
 
 def typeset(tree: Tree) -> tuple[str, str]:
@@ -28,29 +31,13 @@ def typeset(tree: Tree) -> tuple[str, str]:
     >>> typeset(read("m1/2*cos(q1)^2"))
     ('m1/2*cos(q1)^2', '\\frac{m_{1}}{2} \\cos(q_{1})^{2}')
     """
-    if _size(tree, MAX_NODES) > MAX_NODES:
+    if node_count(tree, MAX_NODES) > MAX_NODES:
         return "", ""
     names = {part.text for part in parts_of(tree) if isinstance(part, Name)}
     symbols = latex_names([name for name in names if not VARIABLE.fullmatch(name)])
-    text = _Writer(_plain_name, _plain_call, _plain_product, lambda a, b: f"{a}^{b}")
+    text = _Writer(str, _plain_call, _plain_product, lambda base, exponent: f"{base}^{exponent}")
     latex = _Writer(lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power)
-    return text.of(tree, SUM), latex.of(tree, SUM)
-
-
-def _size(tree: Tree, most: int) -> int:
-    """Return how many nodes are written, those that are shared each time; counting ends beyond the most."""
-    count, left = 0, [tree]
-    while left and count <= most:
-        part = left.pop()
-        count += 1
-        match part:
-            case Sum(parts) | Product(parts):
-                left += [inner for _, inner in parts]
-            case Power(base, exponent):
-                left += [base, exponent]
-            case Call(_, arguments):
-                left += arguments
-    return count
+    return text.write(tree), latex.write(tree)
 
 
 @dataclass(frozen=True)
@@ -62,29 +49,25 @@ class _Writer:
     product: Callable[[Sequence[tuple[bool, str]]], str]
     power: Callable[[str, str], str]
 
-    def of(self, tree: Tree, around: int) -> str:
+    def write(self, tree: Tree, around: int = SUM) -> str:
         match tree:
             case Number(text=text):
                 return text
             case Name(text):
                 return self.name(text)
             case Call(function, arguments):
-                return self.call(function, [self.of(argument, SUM) for argument in arguments])
+                return self.call(function, [self.write(argument) for argument in arguments])
             case Power(base, exponent):
-                return self.power(self.of(base, POWER), self.of(exponent, POWER))
+                return self.power(self.write(base, POWER), self.write(exponent, POWER))
             case Product(factors):
-                written = self.product([(multiplied, self.of(factor, PRODUCT)) for multiplied, factor in factors])
-                return f"({written})" if around == POWER else written
+                text = self.product([(multiplied, self.write(factor, PRODUCT)) for multiplied, factor in factors])
+                return f"({text})" if around == POWER else text
             case Sum(terms):
                 signed = "".join(
-                    f" {'+' if added else '-'} {self.of(term, PRODUCT if not added else SUM)}" for added, term in terms
+                    f" + {self.write(term)}" if added else f" - {self.write(term, PRODUCT)}" for added, term in terms
                 )
-                written = signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}"
-                return f"({written})" if around != SUM else written
-
-
-def _plain_name(name: str) -> str:
-    return name
+                text = signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}"
+                return f"({text})" if around != SUM else text
 
 
 def _plain_call(function: str, arguments: Sequence[str]) -> str:
@@ -92,20 +75,16 @@ def _plain_call(function: str, arguments: Sequence[str]) -> str:
 
 
 def _plain_product(factors: Sequence[tuple[bool, str]]) -> str:
-    written = factors[0][1] if factors[0][0] else f"1/{_single(factors[0][1])}"
-    for multiplied, factor in factors[1:]:
-        written += f"*{factor}" if multiplied else f"/{_single(factor)}"
-    return written
-
-
-def _single(factor: str) -> str:
-    """Return a divisor in brackets where it is a product itself."""
-    return f"({factor})" if re.search(r"[*/]", re.sub(r"\([^()]*\)", "", factor)) else factor
+    text = "" if factors[0][0] else "1"
+    for multiplied, factor in factors:
+        is_product = re.search(r"[*/]", re.sub(r"\([^()]*\)", "", factor)) is not None
+        divisor = f"({factor})" if is_product else factor
+        text += (f"*{factor}" if text else factor) if multiplied else f"/{divisor}"
+    return text
 
 
 def _latex_name(name: str, symbols: dict[str, str]) -> str:
-    match = VARIABLE.fullmatch(name)
-    if match:
+    if match := VARIABLE.fullmatch(name):
         return f"{LATEX_MARKS[match[1]]}_{{{match[2]}}}"
     return r"\pi" if name == "pi" else symbols[name]
 
@@ -113,28 +92,24 @@ def _latex_name(name: str, symbols: dict[str, str]) -> str:
 def _latex_call(function: str, arguments: Sequence[str]) -> str:
     if function == "sqrt":
         return rf"\sqrt{{{arguments[0]}}}"
-    if function in ("sin", "cos", "tan", "exp", "min", "max"):
-        head = rf"\{function}"
-    else:
-        head = LATEX_FUNCTIONS.get(function, rf"\mathrm{{{function}}}")
-    return f"{head}({', '.join(arguments)})"
+    name = rf"\{function}" if function in LATEX_NAMES else rf"\mathrm{{{function}}}"
+    return f"{LATEX_FUNCTIONS.get(function, name)}({', '.join(arguments)})"
 
 
 def _latex_product(factors: Sequence[tuple[bool, str]]) -> str:
     """Write a product from left to right: what follows a division is a factor of the fraction."""
-    written = ""
+    text = ""
     above: list[str] = []
     for multiplied, factor in factors:
         if multiplied:
             above.append(factor)
-            continue
-        dividend = " ".join(above) or "1"
-        written = rf"\frac{{{_joined(written, dividend)}}}{{{factor}}}"
-        above = []
-    return _joined(written, " ".join(above))
+        else:
+            text = rf"\frac{{{_join(text, ' '.join(above) or '1')}}}{{{factor}}}"
+            above = []
+    return _join(text, " ".join(above))
 
 
-def _joined(left: str, right: str) -> str:
+def _join(left: str, right: str) -> str:
     if not left or not right:
         return left or right
     return rf"{left} \cdot {right}" if right[0].isdigit() else f"{left} {right}"

@@ -1,4 +1,4 @@
-"""What names mean: the many ways in which students write joint variables, their rates, and sines of sums of angles."""
+"""Meanings of names: the many spellings of joint variables, of their rates, and of sines of sums of angles."""
 
 from __future__ import annotations
 
@@ -12,48 +12,41 @@ from typing import TypeAlias
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
-from dhkit.grading.answers.tokens import shown
+from dhkit.grading.answers.tokens import quote
 
 Meaning: TypeAlias = tuple[str, ...]
 """Tokens that a name stands for, in the robot's own names."""
 
-FUNCTION_NAMES = {
-    **{name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp")},
-    **{name: name for name in ("sec", "csc", "cot", "sind", "cosd", "tand", "pow", "min", "max")},
-    **{name: name.lower() for name in ("Sin", "Cos", "Tan", "SIN", "COS", "TAN", "Sqrt", "SQRT", "ABS")},
-    **{f"Arc{name}": f"a{name.lower()}" for name in ("Sin", "Cos", "Tan")},
-    **{name: name.lower() for name in ("Sec", "Csc", "Cot", "Exp", "Sign")},
-    "c": "cos",
-    "s": "sin",
-    "arcsin": "asin",
-    "arccos": "acos",
-    "arctan": "atan",
-    "arctan2": "atan2",
-    "Abs": "abs",
-    "fabs": "abs",
-    "sgn": "sign",
-    "Rational": "Rational",
-    "Integer": "number",
-    "Float": "number",
-    "S": "number",
-    "sympify": "number",
-    "Min": "min",
-    "Max": "max",
-    "fmin": "min",
-    "fmax": "max",
-    "Pow": "pow",
-    "power": "pow",
-    "square": "square",
-    "deg2rad": "radians",
-    "radians": "radians",
-}
-"""What may be called, and what it is called here."""
+SPELLINGS = (
+    dict(sin="sin Sin SIN s", cos="cos Cos COS c", tan="tan Tan TAN", asin="asin arcsin ArcSin")
+    | dict(acos="acos arccos ArcCos", atan="atan arctan ArcTan", atan2="atan2 arctan2", sqrt="sqrt Sqrt SQRT")
+    | dict(abs="abs Abs ABS fabs", sign="sign Sign sgn", exp="exp Exp", pow="pow Pow power", square="square")
+    | dict(min="min Min fmin", max="max Max fmax", sec="sec Sec", csc="csc Csc", cot="cot Cot")
+    | dict(sind="sind", cosd="cosd", tand="tand", radians="radians deg2rad")
+    | dict(Rational="Rational", number="Integer Float S sympify")
+)
+"""Functions that may be called, each with its spellings."""
+
+FUNCTION_NAMES = {spelling: name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
+"""The function of each spelling."""
 
 ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
 SLIDES = ("d", "r", "x", "s", "rho")
 """Letters for the variable of a sliding joint, beside those of all joints."""
-LONGEST = 64
-"""Characters of a name that is looked into."""
+
+MAX_NAME = 64
+"""Largest length of a name that is taken apart, in characters."""
+
+RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
+DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
+"""Marks of a derivative by time, and its order."""
+
+_LETTERS = "|".join(sorted((*ANGLES, *SLIDES), key=len, reverse=True))
+VARIABLE = re.compile(
+    rf"(dot|ddot|d|dd|d2|D|DD)??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?", re.ASCII
+)
+SINE_OR_COSINE = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
+"""The sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
 
 
 def plain_name(text: str) -> str:
@@ -97,18 +90,18 @@ class Vocabulary:
         self.symbols = tuple(description.parameters)
         self.own: dict[str, Meaning] = {}
         self.numbers = _numbering(q) or {str(i + 1): i + 1 for i in range(description.n)}
-        """What joint's numbers mean, from 1: those of the student's own names come first."""
+        """Joints, from 1, by the numbers in their names: those of the student's own names come first."""
         for given, kind in ((q, "q"), (qd, "qd"), (qdd, "qdd")):
             self._name_joints(given, kind)
         self.further = tuple(further)
         self.gravity = _gravity(description)
-        self._found: dict[str, Meaning | None] = {}
+        self._meanings: dict[str, Meaning | None] = {}
         self.taken_for: dict[str, str] = {}
         """What was not exactly a known name, and what it was taken for."""
         self.refused: dict[str, str] = {}
         """Names that could not be defined, and why."""
         self.first_index: int | None = None
-        """From where indices in square brackets count on the whole sheet; None where that is not known."""
+        """First index, 0 or 1, in square brackets on the whole sheet; None where that is not known."""
 
     def _name_joints(self, given: Sequence[str], kind: str) -> None:
         if given and len(given) != len(self.kinds):
@@ -116,20 +109,20 @@ class Vocabulary:
         for i, name in enumerate(given, start=1):
             own = plain_name(name)
             if not re.fullmatch(r"[A-Za-z]\w*", own, re.ASCII):
-                raise AnswerError(f"names: {kind}: found {shown(name)}; expected a name such as th1")
-            self._add(own, self._sum(kind, i))
+                raise AnswerError(f"names: {kind}: found {quote(name)}; expected a name such as th1")
+            self._add(own, self._own_variable(kind, i))
             if kind == "q":
-                for dots, rate in ((1, "qd"), (2, "qdd")):
-                    for written in _dotted(own, dots):
-                        self.own.setdefault(written, self._sum(rate, i))
+                for order, rate in ((1, "qd"), (2, "qdd")):
+                    for spelling in _rate_names(own, order):
+                        self.own.setdefault(spelling, self._own_variable(rate, i))
 
-    def _sum(self, kind: str, i: int) -> Meaning:
-        """Return joint i's variable (from 1), as the sum that it is."""
-        return _added([(f"{kind}{joint + 1}",) for joint in self.sums[i - 1]])
+    def _own_variable(self, kind: str, i: int) -> Meaning:
+        """Return the student's variable of joint i, from 1, as a sum of joint variables; kind is q, qd or qdd."""
+        return _sum_of([(f"{kind}{joint + 1}",) for joint in self.sums[i - 1]])
 
     def _add(self, name: str, meaning: Meaning) -> None:
         if self.own.get(name, meaning) != meaning:
-            raise AnswerError(f"names: {shown(name)} stands for two things")
+            raise AnswerError(f"names: {quote(name)} stands for two things")
         self.own[name] = meaning
 
     def define(self, name: str, meaning: Meaning) -> None:
@@ -141,17 +134,17 @@ class Vocabulary:
             It has another one already.
         """
         self._add(plain_name(name), meaning)
-        self._found.clear()
+        self._meanings.clear()
 
     def redefine(self, name: str, meaning: Meaning) -> None:
         """Give a name a meaning in place of any other."""
         self.own[plain_name(name)] = meaning
-        self._found.clear()
+        self._meanings.clear()
 
     def refuse(self, name: str, why: str) -> None:
         """Take a name's meaning away."""
         self.refused[plain_name(name)] = why
-        self._found.clear()
+        self._meanings.clear()
 
     def is_own(self, name: str) -> bool:
         """Whether a name is one of the student's own, or a parameter of the file."""
@@ -159,7 +152,7 @@ class Vocabulary:
 
     def is_state(self, name: str) -> bool:
         """Whether a name is a joint's variable, rate or acceleration."""
-        return self._is_one_of(name, ("q", "qd", "qdd"))
+        return self._is_variable(name, ("q", "qd", "qdd"))
 
     def knows(self, name: str) -> bool:
         """Whether a name, as typed, has a meaning."""
@@ -167,21 +160,21 @@ class Vocabulary:
 
     def is_position(self, name: str) -> bool:
         """Whether a name is a joint's variable."""
-        return self._is_one_of(name, ("q",))
+        return self._is_variable(name, ("q",))
 
-    def _is_one_of(self, name: str, kinds: Sequence[str]) -> bool:
+    def _is_variable(self, name: str, kinds: Sequence[str]) -> bool:
         meaning = self.find(name) if name else None
         return meaning is not None and meaning in (
-            self._sum(kind, i + 1) for kind in kinds for i in range(len(self.kinds))
+            self._own_variable(kind, i + 1) for kind in kinds for i in range(len(self.kinds))
         )
 
     def find(self, name: str) -> Meaning | None:
         """Return what a name stands for, nothing if it is unknown: the student's own names first, then the file's."""
-        if name not in self._found:
-            self._found[name] = self._find(name)
-        return self._found[name]
+        if name not in self._meanings:
+            self._meanings[name] = self._look_up(name)
+        return self._meanings[name]
 
-    def _find(self, name: str) -> Meaning | None:
+    def _look_up(self, name: str) -> Meaning | None:
         plain = plain_name(name)
         if plain in self.refused:
             return None
@@ -197,12 +190,12 @@ class Vocabulary:
         if why := self._ambiguous(plain):
             self.refused[plain] = why
             return None
-        found = self._joint(plain) or self._turn(plain) or (self.gravity if plain == "g" else None)
-        if found is None and len(self._loose.get(plain.lower(), ())) == 1:
-            (symbol,) = self._loose[plain.lower()]
+        meaning = self._joint_variable(plain) or self._sine_or_cosine(plain) or (self.gravity if plain == "g" else None)
+        if meaning is None and len(self._by_lower_case.get(plain.lower(), ())) == 1:
+            (symbol,) = self._by_lower_case[plain.lower()]
             self.taken_for[name] = symbol
             return (symbol,)
-        return found
+        return meaning
 
     def is_exactly(self, name: str) -> bool:
         """Whether a name is one of the file's parameters or of the student's own, letter by letter."""
@@ -215,23 +208,23 @@ class Vocabulary:
         return meanings | {name: (name,) for name in names}
 
     @cached_property
-    def _loose(self) -> dict[str, set[str]]:
+    def _by_lower_case(self) -> dict[str, set[str]]:
         """Parameters by their names in small letters."""
         loose: dict[str, set[str]] = {}
         for name in self.symbols:
             loose.setdefault(plain_name(name).lower(), set()).add(name)
         return loose
 
-    def _joint(self, name: str) -> Meaning | None:
+    def _joint_variable(self, name: str) -> Meaning | None:
         """Return a joint's variable, rate or acceleration, in any of the usual spellings."""
         angular = RATES.fullmatch(name)
         if angular and angular[1] in self.numbers and self.kinds[self.numbers[angular[1]] - 1] == "R":
             self.taken_for[name] = f"the rate of joint {self.numbers[angular[1]]}"
-            return self._sum("qd", self.numbers[angular[1]])
-        match = _VARIABLE.fullmatch(name)
+            return self._own_variable("qd", self.numbers[angular[1]])
+        match = VARIABLE.fullmatch(name)
         if match is None:
             alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
-            return self._joint(name + "1") if alone else None
+            return self._joint_variable(name + "1") if alone else None
         before, letter, between, number, behind = match.groups()
         joints = self._numbered(number)
         if not joints:
@@ -239,9 +232,9 @@ class Vocabulary:
         marks = [mark for mark in (before, between, behind) if mark]
         if len(marks) > 1 or (letter in SLIDES and letter not in ANGLES and self.kinds[joints[0] - 1] == "R"):
             return None
-        dots = _DOTS[marks[0]] if marks else 0
+        dots = DOTS[marks[0]] if marks else 0
         kind = ("q", "qd", "qdd")[dots]
-        return _added([self._sum(kind, joint) for joint in joints])
+        return _sum_of([self._own_variable(kind, joint) for joint in joints])
 
     def _numbered(self, number: str) -> list[int]:
         """Return which joint a number means, or several in a row: theta12 is theta1 + theta2."""
@@ -253,9 +246,9 @@ class Vocabulary:
         in_a_row = all(b == a + 1 for a, b in pairwise(digits))
         return digits if in_a_row and all(self.kinds[k - 1] == "R" for k in digits) else []
 
-    def _turn(self, name: str) -> Meaning | None:
+    def _sine_or_cosine(self, name: str) -> Meaning | None:
         """Return the sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
-        match = _TURN.fullmatch(name)
+        match = SINE_OR_COSINE.fullmatch(name)
         if match is None:
             return None
         numbers = re.findall(r"[pm]?\d", match[2])
@@ -264,12 +257,12 @@ class Vocabulary:
             return None
         angle: list[str] = []
         for x, joint in zip(numbers, joints, strict=True):
-            angle += ["-" if x[0] == "m" else "+", *self._sum("q", joint)]
+            angle += ["-" if x[0] == "m" else "+", *self._own_variable("q", joint)]
         return ("cos" if match[1][0] in "cC" else "sin", "(", *angle[1:], ")")
 
     def _ambiguous(self, name: str) -> str:
         """Return why a name of an arm of ten joints or more has two meanings: c12 is cos(q12) or cos(q1 + q2)."""
-        match = _TURN.fullmatch(name)
+        match = SINE_OR_COSINE.fullmatch(name)
         if match is None or len(match[2]) < 2 or match[2] not in self.numbers:
             return ""
         function = "cos" if match[1][0] in "cC" else "sin"
@@ -278,7 +271,7 @@ class Vocabulary:
 
     def split(self, name: str) -> list[str] | None:
         """Return the known names that an unknown one is a product of, where there is one way: m2l1 is m2 l1."""
-        if len(name) > LONGEST:
+        if len(name) > MAX_NAME:
             return None
         fewest: dict[int, list[list[str]]] = {len(name): [[]]}
         for start in reversed(range(len(name))):
@@ -291,12 +284,16 @@ class Vocabulary:
             if ways:
                 shortest = min(map(len, ways))
                 fewest[start] = [way for way in ways if len(way) == shortest][:4]
-        found = fewest.get(0, [])
-        is_product = len(found) == 1 and any(len(piece) > 1 for piece in found[0])
-        return found[0] if is_product else None
+        products = fewest.get(0, [])
+        is_product = len(products) == 1 and any(len(piece) > 1 for piece in products[0])
+        return products[0] if is_product else None
 
     def _is_factor(self, piece: str) -> bool:
-        is_known = piece in self.own or piece in self._exact or bool(self._joint(piece) or self._turn(piece))
+        is_known = (
+            piece in self.own
+            or piece in self._exact
+            or bool(self._joint_variable(piece) or self._sine_or_cosine(piece))
+        )
         return piece[0].isalpha() and is_known and self.knows(piece)
 
     def nearest(self, name: str) -> str:
@@ -305,21 +302,13 @@ class Vocabulary:
             return self.refused[plain_name(name)][:200]
         known = [*self.own, *self.further, *self.symbols, *FUNCTION_NAMES]
         known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
-        known = [other for other in known if len(other) <= LONGEST]
+        known = [other for other in known if len(other) <= MAX_NAME]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        listed = [*(other for other in self.own if len(other) <= LONGEST), *self.symbols, "q1", "qd1", "c1", "s1"]
+        listed = [*(other for other in self.own if len(other) <= MAX_NAME), *self.symbols, "q1", "qd1", "c1", "s1"]
         return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
 
 
-RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
-_DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
-_BEFORE = "dot|ddot|d|dd|d2|D|DD"
-_LETTERS = "|".join(sorted((*ANGLES, *SLIDES), key=len, reverse=True))
-_VARIABLE = re.compile(rf"({_BEFORE})??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?", re.ASCII)
-_TURN = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
-
-
-def _added(terms: Sequence[Meaning]) -> Meaning:
+def _sum_of(terms: Sequence[Meaning]) -> Meaning:
     """Return a sum in brackets; one term as it is."""
     if len(terms) == 1:
         return terms[0]
@@ -334,7 +323,7 @@ def _numbering(q: Sequence[str]) -> dict[str, int]:
     return numbers if len(numbers) == len(q) else {}
 
 
-def _dotted(name: str, dots: int) -> list[str]:
+def _rate_names(name: str, dots: int) -> list[str]:
     """Return the usual spellings of the derivative of a student's own name: xdot, dx, xd, x1dot and xdot1."""
     letters, number = re.fullmatch(r"(.*?)(\d*)", name).groups()  # type: ignore[union-attr]
     marks = ("dot", "d", "p") if dots == 1 else ("ddot", "dd", "pp")

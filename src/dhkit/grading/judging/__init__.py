@@ -1,1 +1,1 @@
-"""Answers held against the truth: exactly where the ring has them, in many digits or by closing FK where not."""
+"""Judging of single quantities: exactly in the ring, numerically outside it, or by forward kinematics."""

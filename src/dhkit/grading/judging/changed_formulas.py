@@ -1,4 +1,4 @@
-"""Formulas in which parts are replaced: names, calls of functions, equal parts; what stays is shared."""
+"""Formulas with some parts replaced: names, calls of functions, equal parts; unchanged parts are shared."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from dhkit.grading.judging.numeric import parts_of
 
 
 def renamed(tree: Tree, change: Mapping[str, Tree]) -> Tree:
-    """Return a formula with names and numbers replaced, all at once; ``change`` is by :func:`leaf_text`."""
+    """Return a formula with names and numbers replaced at once; keys of ``change`` are those of :func:`leaf_text`."""
     if isinstance(tree, Name | Number):
         return change.get(leaf_text(tree), tree)
     return with_operands(tree, [renamed(child, change) for child in operands(tree)])
 
 
 def leaf_text(leaf: Name | Number) -> str:
-    """Return what a name or a number is known by, however it was written."""
+    """Return the key of a name or number, which does not depend on how a number was written."""
     return leaf.text if isinstance(leaf, Name) else str(leaf.value)
 
 
 def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
-    """Return by the id of each part of some formulas the ids of all parts that are equal to it."""
+    """Return, by the id of each part of some formulas, the ids of all parts equal to it."""
     places: dict[str, list[int]] = defaultdict(list)
     for tree in trees:
         for part, text in _texts(tree):
@@ -33,19 +33,19 @@ def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
 
 
 def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
-    """Return a formula with its parts of these ids replaced."""
+    """Return a formula with the parts of the given ids replaced."""
     if id(tree) in places:
         return new
     return with_operands(tree, [replaced_everywhere(child, places, new) for child in operands(tree)])
 
 
 def has_call(tree: Tree, functions: Sequence[str]) -> bool:
-    """Whether a formula calls one of some functions."""
+    """Whether a formula calls one of the functions."""
     return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
 
 
 def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
-    """Return a formula with all its calls of some functions changed; the formula itself where it has none."""
+    """Return a formula with all calls of the functions changed; the formula itself if it has none."""
     changed = with_operands(tree, [with_calls_changed(child, functions, change) for child in operands(tree)])
     return change(changed) if isinstance(changed, Call) and changed.function in functions else changed
 
@@ -56,7 +56,7 @@ def minus(tree: Tree) -> Tree:
 
 
 def operands(tree: Tree) -> tuple[Tree, ...]:
-    """Return what a formula's outermost operation is made of; nothing for a name or a number."""
+    """Return the operands of a formula's outermost operation; none for a name or a number."""
     match tree:
         case Call(_, arguments):
             return arguments
@@ -68,7 +68,7 @@ def operands(tree: Tree) -> tuple[Tree, ...]:
 
 
 def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
-    """Return a formula's outermost operation of others; the formula itself where they are the same."""
+    """Return a formula's outermost operation with other operands; the formula itself if they are the same."""
     if all(new is old for new, old in zip(children, operands(tree), strict=True)):
         return tree
     match tree:
@@ -77,14 +77,14 @@ def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
         case Power():
             return replace(tree, base=children[0], exponent=children[1])
         case Product(parts):
-            return Product(tuple((up, child) for (up, _), child in zip(parts, children, strict=True)))
+            return Product(tuple((is_factor, child) for (is_factor, _), child in zip(parts, children, strict=True)))
         case Sum(parts):
             return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
     return tree
 
 
-def exchanged(call: Call) -> Tree:
-    """Return a call with its arguments the other way round."""
+def exchange_arguments(call: Call) -> Tree:
+    """Return a call with its arguments in reverse order."""
     return replace(call, arguments=call.arguments[::-1])
 
 
@@ -109,12 +109,12 @@ def applied(function: str, argument: Tree) -> Tree:
 
 
 def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
-    """Yield a formula's parts with texts that equal parts share, the whole last."""
+    """Yield a formula's parts, the whole last, with texts that are equal for equal parts."""
     inner = []
     for child in operands(tree):
-        found = list(_texts(child))
-        yield from found
-        inner.append(found[-1][1])
+        parts_of_child = list(_texts(child))
+        yield from parts_of_child
+        inner.append(parts_of_child[-1][1])
     match tree:
         case Number(value=value):
             yield tree, str(value)
@@ -125,7 +125,7 @@ def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
         case Power():
             yield tree, f"({inner[0]})^({inner[1]})"
         case Product(parts):
-            factors = (("*" if up else "/") + text for (up, _), text in zip(parts, inner, strict=True))
+            factors = (("*" if is_factor else "/") + text for (is_factor, _), text in zip(parts, inner, strict=True))
             yield tree, f"[{''.join(factors)}]"
         case Sum(parts):
             terms = (("+" if added else "-") + text for (added, _), text in zip(parts, inner, strict=True))

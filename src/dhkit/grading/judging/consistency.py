@@ -1,4 +1,4 @@
-"""Whether a student's own parts agree: an error that follows from an earlier one is told from a new one."""
+"""Consistency of a sheet's own quantities: new errors, and errors that follow from earlier ones."""
 
 from __future__ import annotations
 
@@ -7,67 +7,65 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dhkit.grading.judging.quantities import JudgedQuantity
+from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.report import Note, NoteKind, Verdict
-from dhkit.symbolic.ring import Element, Elements, element_array
-
-Index = tuple[int, ...]
+from dhkit.grading.report import Note, NoteKind
+from dhkit.symbolic.ring import Element, Elements, Ring, element_array
 
 
 @dataclass(frozen=True, eq=False)
 class Consistency:
-    """A sheet's quantities, held against one another in the order of the derivation.
+    """Comparison of a sheet's quantities with each other, in the order of the derivation.
 
     Attributes
     ----------
     truth
-        For what is not on the sheet.
+        Right answers, for quantities that are not on the sheet.
     judged
-        By name.
+        The sheet's quantities by name.
     """
 
     truth: Truth
     judged: Mapping[str, JudgedQuantity]
 
     def follows(self, quantity: str) -> dict[Index, str]:
-        """Return which wrong entries are right in themselves, each with the wrong answers that they follow from."""
+        """Return the wrong entries that are derived correctly from wrong answers, with the names of these answers."""
         judged = self.judged[quantity]
-        routes = _ROUTES.get(quantity, ())
-        found: dict[Index, str] = {}
-        for sources, route in routes:
-            wrong = [name for name in sources if name in self.judged and self.judged[name].wrong]
-            if not wrong:
-                continue
-            expected = route(self)
-            if expected is None:
-                continue
-            for index, finding in judged.findings.items():
-                if finding.verdict is not Verdict.WRONG or index in found or finding.answer is None:
-                    continue
-                place = index[:1] if quantity == "C" else index
-                if finding.answer.numerator_of_difference(expected[place]).is_zero:
-                    found[index] = ", ".join(wrong)
-        return found
+        if quantity not in _ROUTES:
+            return {}
+        sources, derive = _ROUTES[quantity]
+        wrong = [name for name in sources if name in self.judged and self.judged[name].wrong]
+        expected = derive(self) if wrong else None
+        if expected is None:
+            return {}
+        answers = {index: judged.findings[index].answer for index in judged.wrong_indices}
+        return {
+            index: ", ".join(wrong)
+            for index, answer in answers.items()
+            if answer is not None and answer.numerator_of_difference(expected[place_of(quantity, index)]).is_zero
+        }
 
     def notes(self) -> list[Note]:
-        """Say of a sheet with mistakes which of its parts agree with each other, right or wrong."""
-        found = []
-        for quantity, ((sources, route), *_) in _ROUTES.items():
+        """Return notes on which quantities agree with each other, right or wrong, if one of them is wrong."""
+        notes = []
+        for quantity, (sources, derive) in _ROUTES.items():
             given = tuple(name for name in sources if name in self.judged)
             if quantity not in self.judged or not given:
                 continue
             if not any(self.judged[name].wrong for name in (quantity, *given)):
                 continue
-            own, expected = self.own(quantity), route(self)
+            own, expected = self.own(quantity), derive(self)
             if own is None or expected is None:
                 continue
             agrees = all((a - b).is_zero for a, b in zip(own.flat, expected.flat, strict=True))
-            found.append(Note(NoteKind.AGREES if agrees else NoteKind.DISAGREES, quantity, given))
-        return found
+            notes.append(Note(NoteKind.AGREES if agrees else NoteKind.DISAGREES, quantity, given))
+        return notes
 
     def own(self, quantity: str) -> Elements | None:
-        """Return the student's elements of a quantity, or the truth where it is not on the sheet; of C its h."""
+        """Return a quantity of the sheet, or the truth if it is not on the sheet; None if it is outside the ring.
+
+        C and h stand for C qd.
+        """
         name = quantity
         if quantity == "h" and "h" not in self.judged and "C" in self.judged:
             name = "C"
@@ -80,7 +78,7 @@ class Consistency:
             element = finding.answer.element() if finding.answer is not None else None
             if element is None:
                 return None
-            array[index[:1] if name == "C" else index] = element
+            array[place_of(name, index)] = element
         return array
 
     @property
@@ -88,14 +86,14 @@ class Consistency:
         """The number of joints."""
         return self.truth.description.n
 
-    def rates(self, kind: str) -> Elements:
-        """Return the student's variables' rates or accelerations."""
+    def rates(self, generator: Callable[[Ring, int], Element]) -> Elements:
+        """Return the rates (``Ring.rate``) or accelerations of the student's variables, shape (n,)."""
         ring = self.truth.lagrangian.arm.ring
-        own = np.array([getattr(ring, kind)(i) for i in range(self.n)], dtype=object)
-        return self.truth.coordinates.rates(own)
+        return self.truth.coordinates.rates(element_array([generator(ring, i) for i in range(self.n)]))
 
 
 Route = Callable[[Consistency], Elements | None]
+"""Derives a quantity from the sheet's others; None if one of them is outside the ring."""
 
 
 def _gradient(parts: Consistency) -> Elements | None:
@@ -124,7 +122,7 @@ def _velocity_torques(parts: Consistency) -> Elements | None:
     M = parts.own("M")
     if M is None:
         return None
-    rates, by = parts.rates("rate"), parts.truth.coordinates.by_position
+    rates, by = parts.rates(Ring.rate), parts.truth.coordinates.by_position
     momenta = M @ rates
     K = rates @ momenta / 2
     ring = parts.truth.lagrangian.arm.ring
@@ -140,7 +138,7 @@ def _torques(parts: Consistency) -> Elements | None:
     M, h, g = parts.own("M"), parts.own("h"), parts.own("g")
     if M is None or h is None or g is None:
         return None
-    torques = M @ parts.rates("acceleration") + h + g
+    torques = M @ parts.rates(Ring.acceleration) + h + g
     friction = parts.truth.coordinates.in_y("tau", parts.truth.viscous) if parts.truth.friction else 0
     return torques + friction
 
@@ -164,7 +162,7 @@ def _product(parts: Consistency) -> Elements | None:
 
 
 def _jacobian(parts: Consistency) -> Elements | None:
-    """Return what moves with each variable: the velocity of T's origin, and that of its axes, dR/dq R^T."""
+    """Return the derivatives of T's origin by the variables, and the axes of dR/dq R^T, shape (6, n)."""
     T = parts.own("T")
     if T is None:
         return None
@@ -176,14 +174,14 @@ def _jacobian(parts: Consistency) -> Elements | None:
     return np.array(columns, dtype=object).T
 
 
-_ROUTES: Mapping[str, tuple[tuple[tuple[str, ...], Route], ...]] = {
-    "M": ((("K",), _hessian),),
-    "C": ((("M",), _velocity_torques),),
-    "h": ((("M",), _velocity_torques),),
-    "g": ((("V",), _gradient),),
-    "tau": ((("M", "C", "h", "g"), _torques),),
-    "L": ((("K", "V"), _lagrangian),),
-    "T": ((tuple(f"A{i}" for i in range(1, 33)), _product),),
-    "J": ((("T",), _jacobian),),
+_ROUTES: Mapping[str, tuple[tuple[str, ...], Route]] = {
+    "M": (("K",), _hessian),
+    "C": (("M",), _velocity_torques),
+    "h": (("M",), _velocity_torques),
+    "g": (("V",), _gradient),
+    "tau": (("M", "C", "h", "g"), _torques),
+    "L": (("K", "V"), _lagrangian),
+    "T": (tuple(f"A{i}" for i in range(1, 33)), _product),
+    "J": (("T",), _jacobian),
 }
-"""By quantity the quantities that it is made of, and how."""
+"""By quantity: the quantities that it is derived from, and the derivation."""

@@ -1,8 +1,9 @@
-"""Joint angles as students count them: each from the link before, or all from one fixed direction."""
+"""Joint variables of students: angles from the previous link, or from a fixed direction."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -14,20 +15,20 @@ from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.ring import Element, Elements, angle_name, translated
 
 ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
-"""A sine or a cosine as formulas are printed: c12."""
+"""A sine or cosine in a printed formula: c12."""
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The student's joint variables y = S q as sums of the robot's.
+    """Student's joint variables y = S q, sums of the robot's joint variables q.
 
-    Torques belong to coordinates: y's are B^T tau with q = B y, so that power stays the same; mass matrices become
-    B^T M B (Siciliano et al., Robotics, 2009, section 7.8, for any linear change of coordinates).
+    With q = B y, the torques of y are B^T tau, so that power stays the same, and the mass matrix is B^T M B (Siciliano
+    et al., Robotics, 2009, section 7.8, for any linear change of coordinates).
 
     Attributes
     ----------
     sums
-        Of each variable the joints, from 0, that it is the sum of.
+        For each variable, the joints, from 0, whose variables it is the sum of.
     """
 
     sums: tuple[tuple[int, ...], ...]
@@ -47,12 +48,12 @@ class Coordinates:
 
     @property
     def is_relative(self) -> bool:
-        """Whether they are the robot's own."""
+        """Whether the variables are the robot's own."""
         return all(len(joints) == 1 for joints in self.sums)
 
     @cached_property
     def S(self) -> Elements:
-        """Shape (n, n), of whole numbers: y = S q."""
+        """Matrix of y = S q, shape (n, n), of integers."""
         matrix = np.zeros((len(self.sums), len(self.sums)), dtype=object)
         for i, joints in enumerate(self.sums):
             matrix[i, list(joints)] = 1
@@ -60,11 +61,11 @@ class Coordinates:
 
     @cached_property
     def B(self) -> Elements:
-        """Shape (n, n), of whole numbers: q = B y; S is lower triangular with ones on its diagonal."""
+        """Matrix of q = B y, shape (n, n), of integers, since S is lower triangular with ones on its diagonal."""
         return np.rint(np.linalg.inv(self.S.astype(float))).astype(int).astype(object)
 
     def in_y(self, quantity: str, truth: Elements) -> Elements:
-        """Return the robot's M, C, h, g, tau or J in these coordinates, still written in q."""
+        """Return the robot's M, C, h, g, tau or J in these coordinates, written in q; other quantities stay."""
         if self.is_relative:
             return truth
         if quantity in ("M", "C"):
@@ -74,11 +75,11 @@ class Coordinates:
         return truth @ self.B if quantity == "J" else truth
 
     def rates(self, rates: Elements) -> Elements:
-        """Return the variables' rates, or accelerations, from the joints'."""
+        """Return the rates or accelerations of the variables from those of the joints, shape (n,)."""
         return rates if self.is_relative else self.S @ rates
 
     def in_own_rates(self, element: Element) -> Element:
-        """Return what is written in the joints' rates and accelerations in the variables', to be shown."""
+        """Return an element with the joints' rates and accelerations replaced by the variables', for printing."""
         if self.is_relative:
             return element
         ring, places = element.ring, dict[int, Element]()
@@ -88,28 +89,29 @@ class Coordinates:
         return translated(element, ring, places)
 
     def in_own_angles(self, text: str) -> str:
-        """Return a formula's text with c12 as the cosine of a variable, or of the difference of two."""
+        """Return a printed formula with c12 written as the cosine of a variable, or of the difference of two."""
         if self.is_relative:
             return text
         angles = {angle_name(joints): f"q{j + 1}" for j, joints in enumerate(self.sums)}
-        for (j, more), (k, less) in product(enumerate(self.sums), repeat=2):
-            if len(less) < len(more) and more[: len(less)] == less:
-                angles.setdefault(angle_name(more[len(less) :]), f"q{j + 1} - q{k + 1}")
+        for (j, long), (k, short) in product(enumerate(self.sums), repeat=2):
+            if len(short) < len(long) and long[: len(short)] == short:
+                angles.setdefault(angle_name(long[len(short) :]), f"q{j + 1} - q{k + 1}")
 
-        def own(found: re.Match[str]) -> str:
-            angle = angles.get(found[2])
-            return f"{'cos' if found[1] == 'c' else 'sin'}({angle})" if angle else found[0]
+        def written(match: re.Match[str]) -> str:
+            angle = angles.get(match[2])
+            return f"{'cos' if match[1] == 'c' else 'sin'}({angle})" if angle else match[0]
 
-        return ANGLE.sub(own, text)
+        return ANGLE.sub(written, text)
 
     def by_position(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i."""
-        return self._by(element, i, "by_position")
+        return self._differentiate(Element.by_position, element, i)
 
     def by_rate(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i's rate."""
-        return self._by(element, i, "by_rate")
+        return self._differentiate(Element.by_rate, element, i)
 
-    def _by(self, element: Element, i: int, what: str) -> Element:
+    def _differentiate(self, derivative: Callable[[Element, int], Element], element: Element, i: int) -> Element:
+        """Return the derivative by variable i, or its rate: the chain rule for q = B y."""
         ring = element.ring
-        return ring.sum(getattr(element, what)(j) * int(self.B[j, i]) for j in range(ring.n) if self.B[j, i])
+        return ring.sum(derivative(element, j) * int(self.B[j, i]) for j in range(ring.n) if self.B[j, i])

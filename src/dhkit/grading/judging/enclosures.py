@@ -1,63 +1,69 @@
-"""The real number that a syntax tree stands for, by interval arithmetic, in as many digits as it needs.
+"""Real values of syntax trees by interval arithmetic, in as many digits as are needed.
 
-Digits alone prove nothing: ``(10^250 + V) - 10^250`` and ``(cos(10^-120) - 1)*10^240`` are zero in two hundred of them.
-An interval that is too wide says so, and the tree is worked out again in more digits (Moore, Kearfott & Cloud,
-Introduction to Interval Analysis, 2009). Functions are real: a root of a negative number has no value.
+A large number of digits alone proves nothing: ``(10^250 + V) - 10^250`` and ``(cos(10^-120) - 1)*10^240`` are zero in
+two hundred digits. An interval shows by its width that digits are lost, and the tree is then worked out again in more
+digits (Moore, Kearfott & Cloud, Introduction to Interval Analysis, 2009). Functions are real: the root of a negative
+number has no value.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.syntax import Tree
+from dhkit.grading.judging.numeric import Evaluation
 
 if TYPE_CHECKING:
     from mpmath import mpf
 
 PRECISIONS = (60, 250, 1000, 6000)
-"""Digits in which a tree is worked out, one after the other until its value is known."""
+"""Decimal digits in which a tree is worked out, one after the other until its value is known."""
 MAX_WORK = 1_000_000
-"""Parts of a tree times digits, beyond the first precision: a second's work at most."""
-RELATIVE = 26
-"""Digits of a value that are enough to tell it from another one."""
-LARGEST, LARGEST_POWER = 2_000, 100_000
-"""Bits: of a function's argument, and of a power."""
+"""Largest product of a tree's parts and digits, beyond the first precision: about a second's work."""
+RELATIVE_DIGITS = 26
+"""Known leading digits that are enough to tell a value from another one."""
+MAX_ARGUMENT_BITS, MAX_POWER_BITS = 2_000, 100_000
+"""Largest integer part of a function's argument or an exponent, and largest power, in bits."""
+TOO_LARGE = "a number too large to be worked out"
 
 Interval = Any
 """An interval of mpmath, which has no types."""
 
 
 class TooLargeError(AnswerError):
-    """A number that would fill the memory if it were worked out."""
+    """A number so large that it would fill the memory."""
 
 
 class LostDigitsError(AnswerError):
-    """A tree whose value is not known to the digits that are asked for."""
+    """A tree whose value is not known to the digits that are needed."""
 
 
 class _UndecidedError(Exception):
-    """An interval that is too wide for a function: it holds zero, or the end of the function's domain."""
+    """An interval too wide for a function: it holds a divisor's zero, or the end of the function's domain."""
 
 
-def enclosed(tree: Tree, parts: int, values: Mapping[str, mpf], tolerance: mpf, shares: bool = True) -> tuple[mpf, int]:
-    """Return a tree's value, known to ``tolerance``, and in how many digits it was worked out.
+def enclosed(
+    tree: Tree, parts: int, values: Mapping[str, mpf], tolerance: mpf, relative: bool = True
+) -> tuple[mpf, int]:
+    """Return the value of a tree, known to a tolerance, and the decimal digits in which it was worked out.
 
     Parameters
     ----------
     tree
         An answer as :func:`dhkit.grading.answers.read_answer` reads it.
     parts
-        How many it has.
+        Number of the tree's parts.
     values
-        Numbers of mpmath by name; ``pi`` and units need not be given.
+        Numbers of mpmath by name, SI units and rad; ``pi`` and units need not be given.
     tolerance
-        By how much the value may be off.
-    shares
-        Whether a value whose first :data:`RELATIVE` digits are known is known well enough, however large it is.
+        Largest absolute error of the value.
+    relative
+        Whether a value is known well enough if its first :data:`RELATIVE_DIGITS` digits are, however large it is.
 
     Raises
     ------
@@ -66,75 +72,31 @@ def enclosed(tree: Tree, parts: int, values: Mapping[str, mpf], tolerance: mpf, 
     TooLargeError
         A number that is too large to be worked out.
     LostDigitsError
-        No number of digits in :data:`PRECISIONS` gives it within the work that is allowed: they cancel, or a function
-        has no value nearby.
+        No precision in :data:`PRECISIONS` gives the value within :data:`MAX_WORK`: digits cancel, or a function has no
+        value nearby.
     """
     import mpmath
 
     for digits in PRECISIONS:
         if digits > PRECISIONS[0] and parts * digits > MAX_WORK:
             break
-        iv, before = mpmath.iv, mpmath.iv.dps
+        iv, previous = mpmath.iv, mpmath.iv.dps
         iv.dps = digits
         try:
-            interval = _Evaluation(values).of(tree)
+            units = {name: _rational(unit.rational) for name, unit in CONSTANTS.items() if unit.rational is not None}
+            units |= {"pi": +iv.pi, "deg": iv.pi / 180}
+            numbers = {**units, **{name: iv.mpf(x) for name, x in values.items()}}
+            interval = Evaluation(numbers, _rational, _functions(), _power, _divide).of(tree)
             with mpmath.workdps(digits):
                 middle, width = mpmath.mpf(interval.mid), mpmath.mpf(interval.delta.b)
-            allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE) if shares else tolerance
+            allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE_DIGITS) if relative else tolerance
             if mpmath.isfinite(width) and width <= allowed:
                 return middle, digits
         except _UndecidedError:
             continue
         finally:
-            iv.dps = before
+            iv.dps = previous
     raise LostDigitsError("its digits cancel so far that they do not decide it")
-
-
-class _Evaluation:
-    """One walk over a tree, in the precision that is set."""
-
-    def __init__(self, values: Mapping[str, mpf]) -> None:
-        from mpmath import iv
-
-        self.iv = iv
-        units = {name: _rational(unit.rational) for name, unit in CONSTANTS.items() if unit.rational is not None}
-        self.values = {**units, "pi": +iv.pi, "deg": iv.pi / 180, **{name: iv.mpf(x) for name, x in values.items()}}
-        self.shared: dict[int, Interval] = {}
-
-    def of(self, tree: Tree) -> Interval:
-        # CasADi's graphs share what is used twice.
-        if id(tree) not in self.shared:
-            self.shared[id(tree)] = self._value(tree)
-        return self.shared[id(tree)]
-
-    def _value(self, tree: Tree) -> Interval:
-        match tree:
-            case Number(value=value):
-                return _rational(value)
-            case Name(text):
-                if text not in self.values:
-                    raise AnswerError(f"{text} has no value")
-                return self.values[text]
-            case Call(function, arguments):
-                if function not in _FUNCTIONS:
-                    raise AnswerError(f"unknown function {function!r}; known are {', '.join(_FUNCTIONS)}")
-                found = [self.of(argument) for argument in arguments]
-                if any(_bits(x) > LARGEST for x in found):
-                    raise TooLargeError("a number too large to be worked out")
-                return _FUNCTIONS[function](*found)
-            case Power(base, exponent):
-                return _power(self.of(base), self.of(exponent))
-            case Sum(terms):
-                total = self.iv.mpf(0)
-                for added, term in terms:
-                    total = total + self.of(term) if added else total - self.of(term)
-                return total
-            case Product(factors):
-                product = self.iv.mpf(1)
-                for multiplied, factor in factors:
-                    x = self.of(factor)
-                    product = product * x if multiplied else _quotient(product, x)
-                return product
 
 
 def _rational(value: Fraction) -> Interval:
@@ -144,7 +106,7 @@ def _rational(value: Fraction) -> Interval:
 
 
 def _magnitudes(x: Interval) -> list[int]:
-    """Return the binary magnitudes of an interval's bounds; those of zeros are left out."""
+    """Return the binary magnitudes of an interval's bounds, without those of zeros."""
     import mpmath
 
     bounds = [mpmath.mpf(bound) for bound in (x.a, x.b)]
@@ -153,20 +115,20 @@ def _magnitudes(x: Interval) -> list[int]:
     return [int(mpmath.mag(bound)) for bound in bounds if bound]
 
 
-def _bits(x: Interval) -> int:
-    """Return how many bits the larger bound has before its point; negative for numbers below 1/2."""
+def _integer_bits(x: Interval) -> int:
+    """Return the bits of the larger bound before its point; negative for numbers below 1/2."""
     return max(_magnitudes(x), default=0)
 
 
 def _refuse_below(x: Interval, bound: int) -> None:
-    """Refuse an argument that lies outside a function's domain, for certain or perhaps."""
+    """Refuse an argument below the lower end of a function's domain, and one that may be below it."""
     if x.b < bound:
         raise AnswerError("no real value")
     if x.a < bound:
         raise _UndecidedError
 
 
-def _quotient(x: Interval, y: Interval) -> Interval:
+def _divide(x: Interval, y: Interval) -> Interval:
     if 0 in y:
         if y.a == y.b:
             raise AnswerError("no finite value")
@@ -177,15 +139,15 @@ def _quotient(x: Interval, y: Interval) -> Interval:
 def _power(base: Interval, exponent: Interval) -> Interval:
     import mpmath
 
-    if _bits(exponent) > LARGEST:
-        raise TooLargeError("a number too large to be worked out")
+    if _integer_bits(exponent) > MAX_ARGUMENT_BITS:
+        raise TooLargeError(TOO_LARGE)
     size = max(map(abs, _magnitudes(base)), default=0)
     power = mpmath.mpf(exponent.mid)
-    if size * abs(power) > LARGEST_POWER:
-        raise TooLargeError("a number too large to be worked out")
+    if size * abs(power) > MAX_POWER_BITS:
+        raise TooLargeError(TOO_LARGE)
     if exponent.a == exponent.b and power == int(power):
         whole = int(power)
-        return base**whole if whole >= 0 else _quotient(mpmath.iv.mpf(1), base**-whole)
+        return base**whole if whole >= 0 else _divide(mpmath.iv.mpf(1), base**-whole)
     if base.a == base.b == 0 and exponent.a > 0:
         return base
     _refuse_below(base, 0)
@@ -194,75 +156,55 @@ def _power(base: Interval, exponent: Interval) -> Interval:
     return mpmath.iv.exp(exponent * mpmath.iv.log(base))
 
 
-def _square_root(x: Interval) -> Interval:
+@lru_cache(maxsize=1)
+def _functions() -> Mapping[str, Callable[..., Interval]]:
+    """Return the functions of :data:`dhkit.grading.judging.numeric.FUNCTIONS` for intervals."""
     from mpmath import iv
 
-    _refuse_below(x, 0)
-    return iv.sqrt(x)
+    def square_root(x: Interval) -> Interval:
+        _refuse_below(x, 0)
+        return iv.sqrt(x)
 
+    def other_leg(x: Interval) -> Interval:
+        """Return sqrt(1 - x^2): the cosine of an arc sine, and the sine of an arc cosine."""
+        _refuse_below(1 - abs(x), 0)
+        return square_root((1 - x) * (1 + x))
 
-def _other_side(x: Interval) -> Interval:
-    """Return the cosine of an arc sine: the other side of a triangle whose longest side is 1."""
-    _refuse_below(1 - abs(x), 0)
-    return _square_root((1 - x) * (1 + x))
+    def arc_tangent(y: Interval, x: Interval) -> Interval:
+        if 0 in x and 0 in y:
+            if x.a == x.b and y.a == y.b:
+                raise AnswerError("no finite value")
+            raise _UndecidedError
+        return iv.atan2(y, x)
 
+    def sign(x: Interval) -> Interval:
+        if 0 in x and x.a != x.b:
+            raise _UndecidedError
+        return iv.mpf(int(x.a > 0) - int(x.a < 0))
 
-def _arc_tangent(y: Interval, x: Interval) -> Interval:
-    from mpmath import iv
+    def bounded(function: Callable[..., Interval]) -> Callable[..., Interval]:
+        """Return a function that refuses arguments too large to be worked out."""
 
-    if 0 in x and 0 in y:
-        if x.a == x.b and y.a == y.b:
-            raise AnswerError("no finite value")
-        raise _UndecidedError
-    return iv.atan2(y, x)
+        def apply(*arguments: Interval) -> Interval:
+            if any(_integer_bits(x) > MAX_ARGUMENT_BITS for x in arguments):
+                raise TooLargeError(TOO_LARGE)
+            return function(*arguments)
 
+        return apply
 
-def _tangent(x: Interval) -> Interval:
-    from mpmath import iv
-
-    return _quotient(iv.sin(x), iv.cos(x))
-
-
-def _sign(x: Interval) -> Interval:
-    from mpmath import iv
-
-    if 0 in x and x.a != x.b:
-        raise _UndecidedError
-    return iv.mpf(int(x.a > 0) - int(x.a < 0))
-
-
-def _ordered(choose: Callable[..., Interval]) -> Callable[..., Interval]:
-    """Return the smallest or the largest of intervals."""
-
-    def chosen(*arguments: Interval) -> Interval:
-        from mpmath import iv
-
-        return iv.mpf([choose(x.a for x in arguments), choose(x.b for x in arguments)])
-
-    return chosen
-
-
-def _of_iv(name: str) -> Callable[[Interval], Interval]:
-    def function(x: Interval) -> Interval:
-        from mpmath import iv
-
-        return getattr(iv, name)(x)
-
-    return function
-
-
-_FUNCTIONS: Mapping[str, Callable[..., Interval]] = {
-    "sin": _of_iv("sin"),
-    "cos": _of_iv("cos"),
-    "tan": _tangent,
-    "asin": lambda x: _arc_tangent(x, _other_side(x)),
-    "acos": lambda x: _arc_tangent(_other_side(x), x),
-    "atan": lambda x: _arc_tangent(x, _rational(Fraction(1))),
-    "atan2": _arc_tangent,
-    "sqrt": _square_root,
-    "abs": abs,
-    "sign": _sign,
-    "exp": _of_iv("exp"),
-    "min": _ordered(min),
-    "max": _ordered(max),
-}
+    functions: dict[str, Callable[..., Interval]] = {
+        "sin": iv.sin,
+        "cos": iv.cos,
+        "tan": lambda x: _divide(iv.sin(x), iv.cos(x)),
+        "asin": lambda x: arc_tangent(x, other_leg(x)),
+        "acos": lambda x: arc_tangent(other_leg(x), x),
+        "atan": lambda x: arc_tangent(x, _rational(Fraction(1))),
+        "atan2": arc_tangent,
+        "sqrt": square_root,
+        "abs": abs,
+        "sign": sign,
+        "exp": iv.exp,
+        "min": lambda *x: iv.mpf([min(y.a for y in x), min(y.b for y in x)]),
+        "max": lambda *x: iv.mpf([max(y.a for y in x), max(y.b for y in x)]),
+    }
+    return {name: bounded(function) for name, function in functions.items()}

@@ -1,9 +1,9 @@
-"""One entry held against the truth: proved equal, equal within rounding, sampled, or different with a witness."""
+"""Comparison of one entry with the truth: proved equal, equal within rounding, sampled, or different with a witness."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -12,21 +12,11 @@ import numpy as np
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Number, Sum, Tree
+from dhkit.grading.judging import sampling
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
 from dhkit.grading.judging.numeric import doubles, names_of, parts_of, state_arrays
-from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
+from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, RingReader
 from dhkit.grading.judging.rounding import Residuals, rounding_share
-from dhkit.grading.judging.sampling import (
-    DIGITS,
-    LEAST,
-    SAMPLES,
-    TOLERANCE,
-    Sample,
-    differ,
-    element_value,
-    samples,
-    show_state,
-)
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import latex_text, plain_text
@@ -34,68 +24,79 @@ from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, RingError, element_array
 
 MAX_WRITTEN_TERMS = 400
-"""Terms of a difference that is written out."""
-MAX_DIVISORS = 3
-"""Divisors that a statement names."""
+"""Largest number of terms of a difference that is written in the angles which make it shortest."""
+MAX_NAMED_DIVISORS = 3
+"""Largest number of divisors that a statement names."""
 PROVED = "proved equal"
-ALWAYS = ", for every state and every value of the parameters"
 
 
-def EXACT(answer: Quotient, truth: Element) -> Sequence[Element]:
-    """Return the difference itself."""
+def exact_difference(answer: Quotient, truth: Element) -> Sequence[Element]:
+    """Return the numerator of the difference: the residual of quantities that are determined exactly."""
     return [answer.numerator_of_difference(truth)]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """How answers are held against the truth.
+    """Rules by which answers are compared with the truth.
 
     Attributes
     ----------
     arm
         The robot in the ring.
-    reading
-        Reads answers into it.
+    reader
+        Reads answers into the ring.
     digits
         Significant digits from which a decimal may have been rounded.
     numbers
         Parameters that stand for their numbers in the file.
     residuals
-        What must be zero.
+        Elements that are zero for a right answer.
     seed
-        Of the random states that answers outside the ring are tried at.
+        Seed of the random states at which answers outside the ring are tried.
     up_to_constant
-        Whether answers outside the ring may be off by a constant; None where they cannot be tried.
+        Whether answers outside the ring may be off by a constant; None if they cannot be tried.
     """
 
     arm: ExactArm
-    reading: Reading
+    reader: RingReader
     digits: int = 4
     numbers: frozenset[str] = frozenset()
-    residuals: Residuals = EXACT
+    residuals: Residuals = exact_difference
     seed: int = 0
     up_to_constant: bool | None = False
 
     @property
-    def place(self) -> str:
-        """At which parameter values a verdict holds, in words; empty where it holds for all."""
+    def condition(self) -> str:
+        """Parameter values at which a verdict holds, in words; empty if it holds for all."""
         values = self.arm.parameters
         listed = ", ".join(f"{name} = {values[name]:g}" for name in sorted(self.numbers))
         return f" at {listed}" if listed else ""
 
+    def passes(self, answer: Quotient, truth: Element) -> bool:
+        """Whether all residuals are zero.
+
+        Raises
+        ------
+        RingError
+            A residual is too long to be multiplied out.
+        """
+        return all(residual.is_zero for residual in self.residuals(answer, truth))
+
 
 @dataclass(frozen=True)
 class Finding:
-    """What is found of one entry.
+    """Verdict on one entry, with what was computed for it.
 
     Attributes
     ----------
     verdict, statement, witness
         As in :class:`dhkit.grading.report.Entry`.
     answer
-        The answer in the ring; None where it is outside.
+        The answer in the ring; None if it is outside.
     difference
-        Answer less truth, an element where the division leaves no remainder.
+        Answer less truth as an element; None if the division leaves a remainder.
+    texts
+        The difference as text and in LaTeX.
     """
 
     verdict: Verdict
@@ -103,40 +104,39 @@ class Finding:
     answer: Quotient | None = None
     difference: Element | None = None
     witness: Witness | None = None
-    texts: tuple[str | None, str] = field(default=(None, ""))
-    """The difference as text and in LaTeX."""
+    texts: tuple[str | None, str] = (None, "")
 
 
 def compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
-    """Decide one entry.
+    """Judge one entry.
 
     Raises
     ------
     AnswerError
-        It has no value, or costs too much work.
+        The answer has no value, or takes too much work.
     """
     try:
-        return _compared(tree, truth, by)
+        return _compare(tree, truth, by)
     except (RingError, RecursionError) as error:
         raise AnswerError(f"too long to be judged: {error}"[:200]) from None
 
 
-def _compared(tree: Tree, truth: Element, by: Comparison) -> Finding:
+def _compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
     try:
-        answer = by.reading.read(tree)
+        answer = by.reader.read(tree)
     except OutsideTheRingError as reason:
-        return _sampled(tree, truth, by, str(reason))
-    divisors = list(by.reading.divisors)
+        return _sample(tree, truth, by, str(reason))
+    divisors = list(by.reader.divisors)
     try:
-        is_equal = all(residual.is_zero for residual in by.residuals(answer, truth))
+        is_equal = by.passes(answer, truth)
     except RingError:
-        return _sampled(tree, truth, by, "it multiplies out to too many terms")
+        return _sample(tree, truth, by, "it multiplies out to too many terms")
     if is_equal:
-        return Finding(Verdict.CORRECT, _proved(by, divisors), answer)
-    share = rounding_share(tree, truth, by.reading, by.residuals, by.digits)
+        return Finding(Verdict.CORRECT, _proof_statement(by, divisors), answer)
+    share = rounding_share(tree, truth, by.reader, by.residuals, by.digits)
     if share is not None:
         statement = (
-            f"equal within rounding{by.place}: each coefficient is off by at most {max(share, 0.01):.2f} of half a "
+            f"equal within rounding{by.condition}: each coefficient is off by at most {max(share, 0.01):.2f} of half a "
             f"unit in the last place of its coarsest decimal of {by.digits} digits or more"
         )
         return Finding(Verdict.ROUNDED, statement, answer)
@@ -146,38 +146,40 @@ def _compared(tree: Tree, truth: Element, by: Comparison) -> Finding:
         "proved different",
         answer,
         difference,
-        _witness(tree, truth, by),
-        _texts(by.arm, answer, truth, difference),
+        _find_witness(tree, truth, by),
+        _difference_texts(by.arm, answer, truth, difference),
     )
 
 
-def _proved(by: Comparison, divisors: Sequence[Element]) -> str:
-    """Say for which states an answer is proved: where it divides by zero it has no value."""
-    held = by.place or ALWAYS
+def _proof_statement(by: Comparison, divisors: Sequence[Element]) -> str:
+    """Return for which states an answer is proved: it has no value where it divides by zero."""
     if not divisors:
-        return f"{PROVED}{held}{', for every state' if by.place else ''}"
-    shown = [plain_text(readable(by.arm, one)) for one in divisors[:MAX_DIVISORS] if len(one) <= MAX_WRITTEN_TERMS]
-    more = " or another divisor is 0" if len(shown) < len(divisors) else ""
-    where = " or ".join(f"{text} = 0" for text in shown) + more
-    return f"{PROVED}{by.place} wherever the answer is defined: it has no value where {where}"
+        parameters = "" if by.condition else " and every value of the parameters"
+        return f"{PROVED}{by.condition}, for every state{parameters}"
+    texts = [plain_text(readable(by.arm, x)) for x in divisors[:MAX_NAMED_DIVISORS] if len(x) <= MAX_WRITTEN_TERMS]
+    more = " or another divisor is 0" if len(texts) < len(divisors) else ""
+    zeros = " or ".join(f"{text} = 0" for text in texts) + more
+    return f"{PROVED}{by.condition} wherever the answer is defined: it has no value where {zeros}"
 
 
 def equal(tree: Tree, truth: Element, by: Comparison) -> bool:
-    """Whether an answer is an element, exactly or within the rounding of its decimals."""
+    """Whether an answer equals an element, exactly or within the rounding of its decimals."""
     try:
-        if all(residual.is_zero for residual in by.residuals(by.reading.read(tree), truth)):
+        if by.passes(by.reader.read(tree), truth):
             return True
-        return rounding_share(tree, truth, by.reading, by.residuals, by.digits) is not None
+        return rounding_share(tree, truth, by.reader, by.residuals, by.digits) is not None
     except (OutsideTheRingError, AnswerError, RingError):
         return False
 
 
 def readable(arm: ExactArm, element: Element) -> Element:
-    """Return an element in the angles that make it shortest."""
+    """Return an element in the sums of angles that make it shortest."""
     return shortened(arm, element_array(element)).item()  # type: ignore[no-any-return]
 
 
-def _texts(arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None) -> tuple[str | None, str]:
+def _difference_texts(
+    arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None
+) -> tuple[str | None, str]:
     if difference is not None:
         if len(difference) > MAX_WRITTEN_TERMS:
             return plain_text(difference), ""
@@ -195,38 +197,29 @@ def _texts(arm: ExactArm, answer: Quotient, truth: Element, difference: Element 
 
 # Witnesses
 
-MAX_NODES = 20_000
-MAX_EVALUATIONS = 300_000
-"""Nodes times states that an answer outside the ring is evaluated at."""
-MAX_WORK = 60 * MAX_EVALUATIONS
-"""Nodes times digits, of all states together."""
-LEAST_STATES = 15
-"""An answer too long to be evaluated at so many states cannot be judged."""
-TRIED = 24
-GROUP = 5
-"""States that share parameters where an energy's zero is free: the first of them sets it, the others are compared.
-
-Few, for many sets of parameters: a difference may be there in a part of their range alone.
-"""
+WITNESS_TRIALS = 24
+"""Number of states from which a witness is chosen; the second half has other parameters than the file's."""
 
 
-def _witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
-    """Return a state of short numbers, parameters as in the file, in which both differ most."""
+def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
+    """Return a state of short numbers at which answer and truth differ clearly, with the file's parameters if possible.
+
+    All numbers are in SI units and rad.
+    """
     arm, rng = by.arm, np.random.default_rng(7)
     best: tuple[float, Witness] | None = None
     used = names_of(tree) | names_in(truth)
-    for k in range(TRIED):
+    for k in range(WITNESS_TRIALS):
         state = {
             f"{kind}{i + 1}": float(np.round(rng.uniform(-1.5, 1.5), 1))
             for kind in ("q", "qd", "qdd")
             for i in range(arm.n)
         }
         parameters = dict(arm.parameters)
-        if k >= TRIED // 2:
+        if k >= WITNESS_TRIALS // 2:
             parameters |= {p: float(np.round(v * rng.uniform(0.5, 2.0), 3)) for p, v in parameters.items()}
         value = float(doubles(tree, {**parameters, **state}))
-        values = arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))
-        right = float(truth.value(values))
+        right = float(truth.value(arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))))
         gap = abs(value - right) if np.isfinite(value) else float("inf")
         if best is None or gap > 1.5 * best[0]:
             shown = {name: x for name, x in {**state, **parameters}.items() if name in used}
@@ -240,18 +233,29 @@ def names_in(element: Element) -> set[str]:
     """Return the names of joint variables and constants that an element depends on."""
     names: set[str] = set()
     for monomial in element.terms:
-        for k, exponent in enumerate(monomial):
+        for generator, exponent in zip(element.ring.generators, monomial, strict=True):
             if exponent:
-                generator = element.ring.generators[k]
-                names |= {f"q{j + 1}" for j in generator.joints} if generator.joints else {generator.text}
+                names |= {f"q{j + 1}" for j in generator.joints} or {generator.text}
     return names
 
 
-# Outside the ring
+# Answers outside the ring
+
+MAX_NODES = 20_000
+"""Largest number of nodes of an answer that is tried at random states."""
+MAX_EVALUATIONS = 300_000
+"""Largest product of nodes and states."""
+MAX_WORK = 60 * MAX_EVALUATIONS
+"""Largest product of nodes and digits, over all states."""
+MIN_STATES = 15
+"""Smallest number of states: an answer too long for them cannot be judged."""
+STATES_PER_SET = 5
+"""States that share parameters if an energy's zero is free: the first of them sets it, the others are compared. A small
+number leaves many sets of parameters: a difference may exist in a part of their range alone."""
 
 
-def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
-    """Hold an answer against the truth at many states, each to 25 digits."""
+def _sample(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
+    """Compare an answer with the truth at many random states, to 25 digits each."""
     import mpmath
 
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
@@ -259,24 +263,25 @@ def _sampled(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding
         raise AnswerError(f"outside the exact ring ({reason}), where L is not judged up to a total derivative")
     if nodes > MAX_NODES:
         raise AnswerError(f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors")
-    with mpmath.workdps(DIGITS):
-        count = max(LEAST_STATES, min(SAMPLES, MAX_EVALUATIONS // nodes))
-        states = samples(by.arm, by.numbers, by.seed, every=GROUP if by.up_to_constant else 1, count=count)
+    with mpmath.workdps(sampling.DIGITS):
+        count = max(MIN_STATES, min(sampling.MAX_SAMPLES, MAX_EVALUATIONS // nodes))
+        every = STATES_PER_SET if by.up_to_constant else 1
+        states = sampling.samples(by.arm, by.numbers, by.seed, every=every, count=count)
         try:
-            found = _first_difference(tree, nodes, truth, by, reason, states)
+            result = _first_difference(tree, nodes, truth, by, reason, states)
         except (TooLargeError, LostDigitsError) as error:
             raise AnswerError(f"outside the exact ring ({reason}), and {error}") from None
-    if isinstance(found, Finding):
-        return found
+    if isinstance(result, Finding):
+        return result
     return Finding(
         Verdict.UNDECIDED,
-        f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.place} at {found} random "
-        "states, to 25 digits",
+        f"not proved, since it is outside the exact ring ({reason}); equal to the truth{by.condition} at {result} "
+        "random states, to 25 digits",
     )
 
 
-def _divided(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]:
-    """Return a sum without its terms that do not depend on the state, and these."""
+def _split_constants(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]:
+    """Return a sum without its terms that do not depend on the state, and these terms."""
     if names_of(tree) <= constants:
         return Number(Fraction(0), "0", 0), [tree]
     if not isinstance(tree, Sum):
@@ -284,46 +289,46 @@ def _divided(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]:
     kept: list[tuple[bool, Tree]] = []
     left_out: list[Tree] = []
     for added, term in tree.terms:
-        varying, still = _divided(term, constants)
-        left_out += still
+        varying, constant = _split_constants(term, constants)
+        left_out += constant
         if not (isinstance(varying, Number) and not varying.value):
             kept.append((added, varying))
     return Sum(tuple(kept)), left_out
 
 
 def _first_difference(
-    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Sequence[Sample]
+    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Sequence[sampling.Sample]
 ) -> Finding | int:
-    """Return what the first state shows at which an answer differs from the truth; at how many it does not, if none."""
+    """Return the finding at the first state where answer and truth differ; if none does, the number of states tried."""
     used = names_of(tree) | names_in(truth)
     shift: Any = 0
     work, constants = 0, list[Tree]()
+
+    def differs(state: sampling.Sample, value: Any, right: Any, why: str) -> Finding:
+        witness = Witness(sampling.show_state(state, used), _finite(value), _finite(right))
+        return Finding(Verdict.WRONG, f"a state shows it: {why}", witness=witness)
+
     if by.up_to_constant:  # energies count from any zero, however large, if it is a number at all
-        tree, constants = _divided(tree, {*by.arm.parameters, *CONSTANTS})
+        tree, constants = _split_constants(tree, {*by.arm.parameters, *CONSTANTS})
     for k, state in enumerate(states):
-        right = element_value(truth, state)
+        right = sampling.element_value(truth, state)
         try:
-            for constant in constants if k % GROUP == 0 else ():
-                enclosed(constant, nodes, state.names, LEAST)
-            tolerance = TOLERANCE / 10 * max(abs(right), LEAST)
-            value, digits = enclosed(tree, nodes, state.names, tolerance, shares=not by.up_to_constant)
+            for constant in constants if k % STATES_PER_SET == 0 else ():
+                enclosed(constant, nodes, state.names, sampling.MIN_SIZE)
+            tolerance = sampling.TOLERANCE / 10 * max(abs(right), sampling.MIN_SIZE)
+            value, digits = enclosed(tree, nodes, state.names, tolerance, relative=not by.up_to_constant)
         except (TooLargeError, LostDigitsError):
             raise
         except AnswerError as error:
-            return _different(state, used, None, right, f"{error} there")
-        if by.up_to_constant and k % GROUP == 0:
+            return differs(state, None, right, f"{error} there")
+        if by.up_to_constant and k % STATES_PER_SET == 0:
             shift = value - right
-        if differ(value - shift, right):
-            return _different(state, used, value - shift, right, f"outside the exact ring ({reason})")
+        if sampling.differ(value - shift, right):
+            return differs(state, value - shift, right, f"outside the exact ring ({reason})")
         work += nodes * digits
-        if work > MAX_WORK and k + 1 >= LEAST_STATES:
+        if work > MAX_WORK and k + 1 >= MIN_STATES:
             return k + 1
     return len(states)
-
-
-def _different(state: Sample, used: set[str], value: Any, right: Any, why: str) -> Finding:
-    witness = Witness(show_state(state, used), _finite(value), _finite(right))
-    return Finding(Verdict.WRONG, f"a state shows it: {why}", witness=witness)
 
 
 def _finite(value: Any) -> float | None:

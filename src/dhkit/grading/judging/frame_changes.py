@@ -1,4 +1,4 @@
-"""How the frames and joint variables of a table differ from the file's where both tables are one arm."""
+"""Changes of frames and joint variables between two tables of one arm."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from dhkit.description import Array
 
 SAME = 1e-9
-"""rad, or share of the reach: two arms whose poses differ by less, in every state tried, are one arm."""
+"""Tolerance in rad, and relative to the reach: arms whose poses differ by less at every tried state are one arm."""
 
 
 class Change(Enum):
-    """What is another choice, with the sentence that says so."""
+    """Kind of a change, with the text that a report prints."""
 
     Z_REVERSED = "frame {number}'s z axis points the other way"
     Z_ELSEWHERE = "frame {number}'s z axis points elsewhere: along {vector} of the file's frame {number}"
@@ -31,22 +31,22 @@ class Change(Enum):
 
     @property
     def concerns_joint(self) -> bool:
-        """Whether a joint variable is meant, and not a frame."""
+        """Whether the change is one of a joint variable, and not of a frame."""
         return self in (Change.JOINT_REVERSED, Change.JOINT_HALF_TURN, Change.JOINT_TURNED, Change.JOINT_SLID)
 
 
 @dataclass(frozen=True)
 class FrameChange:
-    """One choice of a table that is not the file's.
+    """Choice of a frame or joint variable that is not the file's.
 
     Attributes
     ----------
     change
-        What is another choice.
+        Kind of the change.
     number
-        Of the frame, from 0, or of the joint, from 1.
+        Number of the frame, from 0, or of the joint, from 1.
     values
-        By how much, m or degrees; a direction or a point as three numbers.
+        Size of the change, m or degrees; three numbers for a direction or a point.
     """
 
     change: Change
@@ -54,15 +54,15 @@ class FrameChange:
     values: tuple[float, ...] = ()
 
     def __str__(self) -> str:
-        """Return the choice in words."""
+        """Return the text of the change."""
         vector = "(" + ", ".join(f"{x:.4g}" for x in self.values) + ")"
         return self.change.value.format(number=self.number, vector=vector, first=next(iter(self.values), 0.0))
 
 
 def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
-    """Yield how frame i differs from the file's; D is its pose in the file's frame i, shape (4, 4).
+    """Yield the changes of frame i; D is its pose in the file's frame i, shape (4, 4), m.
 
-    Lengths that differ by the tolerance, m, are the same.
+    Lengths that differ by no more than the tolerance, m, are equal.
     """
     if abs(abs(D[2, 2]) - 1) > SAME:
         yield FrameChange(Change.Z_ELSEWHERE, i, _vector(D[:3, 2]))
@@ -82,9 +82,9 @@ def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
 
 
 def joint_changes(i: int, is_revolute: bool, sense: float, offset: float, tolerance: float) -> Iterator[FrameChange]:
-    """Yield how joint i, from 1, counts: its sense, +1 or -1, and the file's value at its zero, rad or m.
+    """Yield the changes of joint i, from 1: by its sense, +1 or -1, and the file's value at its zero, rad or m.
 
-    Lengths that differ by the tolerance, m, are the same.
+    Lengths that differ by no more than the tolerance, m, are equal.
     """
     if sense < 0:
         yield FrameChange(Change.JOINT_REVERSED, i)
@@ -102,5 +102,5 @@ def wrapped(angle: float) -> float:
 
 
 def _vector(vector: Array) -> tuple[float, ...]:
-    """Return a vector without the rounding of its zeros."""
+    """Return a vector whose rounding errors about zero are removed, shape (3,)."""
     return tuple(float(x) + 0.0 for x in np.where(np.abs(vector) < SAME, 0.0, vector))

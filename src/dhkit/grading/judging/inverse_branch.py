@@ -1,4 +1,4 @@
-"""One branch of inverse kinematics worked out for many poses: which it closes, and which joint is wrong first."""
+"""A branch of inverse kinematics evaluated at many poses: the poses it reaches, and the first wrong joint."""
 
 from __future__ import annotations
 
@@ -16,25 +16,26 @@ from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
 
-RARE = 0.01
-"""Share of poses: solutions that a branch meets less often are met by chance."""
-UNFOUND = 0.1
+CHANCE_SHARE = 0.01
+"""Share of poses up to which a branch agrees with a solution by chance."""
+MISSED_SHARE = 0.1
 """Share of the failing poses for which Newton's method may have missed a solution."""
 Repair: TypeAlias = Callable[[Array], Array]
+"""Changes the values of one joint at all poses, shape (S,), rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One branch worked out for all poses.
+    """A branch evaluated at all poses.
 
     Attributes
     ----------
     poses
-        What it is tried on.
+        Poses at which it is tried.
     trees
-        A formula a joint.
+        Formulas, one for each joint.
     repairs
-        Joints with what is done to their results before later joints use them.
+        Joints, from 0, with changes of their values before later joints use them.
     """
 
     poses: Poses
@@ -48,23 +49,23 @@ class Branch:
 
     @cached_property
     def order(self) -> tuple[int, ...]:
-        """The joints in the order in which their formulas are worked out."""
+        """Joints, from 0, in the order in which their formulas are evaluated."""
         return joint_order(self.trees)
 
     def rank(self, joint: int) -> int:
-        """Return when a joint's turn comes."""
+        """Return the position of a joint in the order."""
         return self.order.index(joint)
 
     @cached_property
     def q(self) -> Array:
-        """What the formulas give, shape (S, n); NaN where they have no value."""
+        """Joint values by the formulas, shape (S, n), rad and m; NaN where they have no value."""
         values, columns = dict(self.poses.values), np.empty((len(self.poses.T), self.n))
         for k in self.order:
             columns[:, k] = values[f"q{k + 1}"] = self.repaired(k, doubles(self.trees[k], values))
         return columns
 
     def repaired(self, joint: int, numbers: Array | float) -> Array:
-        """Return a formula's numbers for all poses, shape (S,), put right where that is known; NaN for no value."""
+        """Return the values of a joint's formula after its repairs, shape (S,), rad or m; NaN for no value."""
         x = np.array(np.broadcast_to(np.asarray(numbers, dtype=float), len(self.poses.T)))
         for other, repair in self.repairs:
             x = repair(x) if other == joint else x
@@ -72,7 +73,7 @@ class Branch:
         return x
 
     def independent(self, joint: int) -> list[int]:
-        """Return the joints whose formulas do not need a joint's: its own may use them."""
+        """Return the joints whose formulas do not depend on a joint's, so that its own may use them."""
         needing = {joint}
         for k in self.order:
             if names_of(self.trees[k]) & {f"q{other + 1}" for other in needing}:
@@ -80,22 +81,22 @@ class Branch:
         return [k for k in range(self.n) if k not in needing]
 
     def editable(self, joint: int) -> EditedDoubles:
-        """Return a joint's formula worked out, ready for changes."""
-        found = {f"q{k + 1}": self.q[:, k] for k in self.independent(joint)}
-        return EditedDoubles(self.trees[joint], {**self.poses.values, **found})
+        """Return the evaluation of a joint's formula, for trying changes."""
+        others = {f"q{k + 1}": self.q[:, k] for k in self.independent(joint)}
+        return EditedDoubles(self.trees[joint], {**self.poses.values, **others})
 
     @cached_property
     def closed(self) -> Mask:
-        """Which poses it closes, shape (S,)."""
+        """Which poses it reaches, shape (S,)."""
         return self.poses.closes(self.q)
 
     @cached_property
     def reachable(self) -> Mask:
-        """Which poses it should close, shape (S,): all but those that none of the solutions it follows reaches."""
+        """Which poses it should reach, shape (S,): all but those that none of the solutions it follows reaches."""
         solutions = self.poses.solutions
         if not np.any(self.closed) or not self.poses.has_closed_form:
             return np.ones(len(self.closed), dtype=bool)
-        follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > RARE
+        follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > CHANCE_SHARE
         if not np.any(follows):
             return np.ones(len(self.closed), dtype=bool)
         reached: Mask = self.closed | np.any(np.isfinite(solutions[:, follows, 0]), axis=1)
@@ -103,17 +104,17 @@ class Branch:
 
     @cached_property
     def failing(self) -> Mask:
-        """Which poses it should close and does not, shape (S,)."""
+        """Which poses it should reach and does not, shape (S,)."""
         return self.reachable & ~self.closed
 
     @property
     def is_right(self) -> bool:
-        """Whether it closes every pose that it should."""
+        """Whether it reaches every pose that it should."""
         return not np.any(self.failing)
 
     @cached_property
     def agreement(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Of each pose the turn of the first joint that no solution agrees with so far (n: none), and the nearest."""
+        """For each pose, (S,): rank of the first joint that agrees with no solution (n: none), nearest solution."""
         truths = self.poses.truths
         first = np.full(len(truths), self.n)
         nearest = np.argmax(np.all(np.isfinite(truths), axis=-1), axis=1)
@@ -128,7 +129,7 @@ class Branch:
 
     @cached_property
     def alive(self) -> list[Mask]:
-        """Of each turn which solutions, shape (S, B + 1), agree with the joints before it; all once none does."""
+        """By rank: which solutions, (S, B + 1), agree with all preceding joints; if none does, those that last did."""
         truths = self.poses.truths
         alive = [np.all(np.isfinite(truths), axis=-1)]
         for k in self.order:
@@ -137,30 +138,30 @@ class Branch:
         return alive
 
     def agrees(self, joint: int, x: Array) -> Mask:
-        """Return whether values of a joint, shape (S,), are those of a solution that agrees with the joints before."""
+        """Return where values of a joint, shape (S,), are those of a solution that agrees with the preceding joints."""
         gap = self.poses.gaps(x[:, None], self.poses.truths[..., joint], joint)
         near: Mask = np.any(self.alive[self.rank(joint)] & (gap < MATCHES), axis=1)
         return near
 
     def wrong_joint(self) -> int | None:
-        """Return the first joint that is wrong on some pose that should close; None where all are right.
+        """Return the first joint that is wrong at a pose that should be reached; None if all are right.
 
-        Solutions that Newton's method found may not be all: a joint is wrong then where it is on a good part of them.
+        Newton's method may have missed solutions: a joint must then be wrong at a good part of the poses.
         """
         first = np.sort(self.agreement[0][self.failing])
         if not len(first) or not self.poses.isolated:
             return None
-        spared = 0 if self.poses.has_closed_form else int(UNFOUND * len(first))
+        spared = 0 if self.poses.has_closed_form else int(MISSED_SHARE * len(first))
         turn = int(first[spared])
         return self.order[turn] if turn < self.n else None
 
     def sample(self, most: int) -> Branch:
-        """Return the branch on so many poses that it should close and does not, and on as many that it closes."""
+        """Return the branch at up to so many poses that it fails to reach, and at up to as many that it reaches."""
         chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
         return Branch(self.poses.at(chosen), self.trees)
 
     def with_repair(self, joint: int, repair: Repair) -> Branch:
-        """Return the branch with something done to a joint's result."""
+        """Return the branch with a change of a joint's values."""
         return replace(self, repairs=(*self.repairs, (joint, repair)))
 
     def with_tree(self, joint: int, tree: Tree) -> Branch:
@@ -173,7 +174,7 @@ class Branch:
 
 
 def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:
-    """Return the joints, from 0, in an order in which each formula uses those before it: q2 may be found first.
+    """Return the joints, from 0, in an order in which each formula uses only preceding ones; q2 may come first.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Single local changes of a formula of inverse kinematics, each with the mistake that it puts right.
+"""Single local changes of a formula of inverse kinematics, each with the mistake that it corrects.
 
-One literal, one function, one order of arguments, one exponent, one name, one sign. They are tried in the order of
-:data:`ORDER`: where two changes give the same values, the mistake that is made more often is named.
+A change concerns one literal, one function, one order of arguments, one exponent, one name or one sign. Changes are
+tried in the order of :data:`ORDER`: if two give the same values, the more frequent mistake is named.
 """
 
 from __future__ import annotations
@@ -13,20 +13,8 @@ from itertools import chain, combinations, islice, permutations
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
-from dhkit.grading.judging.changed_formulas import (
-    applied,
-    exchanged,
-    has_call,
-    leaf_text,
-    minus,
-    operands,
-    product_of,
-    renamed,
-    square_of,
-    times,
-    with_calls_changed,
-    with_operands,
-)
+from dhkit.grading.judging import changed_formulas as formulas
+from dhkit.grading.judging.changed_formulas import applied, minus, square_of, times
 from dhkit.grading.judging.numeric import names_of, parts_of
 
 ORDER = (
@@ -59,21 +47,21 @@ ORDER = (
     "term_extra",
 )
 """Mistakes in the order in which they are tried."""
-MOST_EDITS = 4_000
-"""Of one formula: a PUMA's longest, 200 nodes, has 2,500."""
-MOST_LENGTHS = 12
-"""Lengths of the robot that are tried as a missing offset."""
+MAX_EDITS = 4_000
+"""Largest number of changes of one formula; a PUMA's longest, of 200 nodes, has 2,500."""
+MAX_LENGTHS = 12
+"""Largest number of lengths of the robot that are tried as a missing offset."""
 POSITIONS = POSE_NAMES[:3]
 ROTATIONS = POSE_NAMES[3:]
 ARCS = ("acos", "asin", "atan")
 ROOTS = ("sqrt", "acos", "asin")
-"""Functions that know one sign of two."""
-SMALLEST = 10
-"""Degrees or millimetres: smaller numbers are factors and exponents."""
-MOST_LAW_TERMS = 8
-"""Terms of which pairs of signs are tried."""
-LAW_TERMS = 3
-"""Terms of the numerator in a law of cosines, at least: two squares of links, and a squared distance."""
+"""Functions that give one of two signs."""
+MIN_MEASURE = 10
+"""Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
+MAX_LAW_TERMS = 8
+"""Largest number of terms of which pairs of signs are tried."""
+MIN_LAW_TERMS = 3
+"""Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +71,11 @@ class Edit:
     Attributes
     ----------
     mistake
-        The identity of the mistake that the change puts right.
+        Identity of the mistake that the change corrects.
     tree
         The changed formula.
     old, new
-        The part that is changed, as it was and as it is now: the same part may stand in other formulas too.
+        The changed part before and after the change; the same part may occur in other formulas.
     """
 
     mistake: str
@@ -98,14 +86,14 @@ class Edit:
 
 @dataclass(frozen=True)
 class Lengths:
-    """Names and numbers of a robot that formulas may hold.
+    """Names and numbers of a robot that formulas may contain.
 
     Attributes
     ----------
     parameters
         Names of the robot's parameters.
     trees
-        What may be a missing offset: parameters, and lengths of the table, of base and of tool that are none.
+        Possible missing offsets: parameters, and those lengths of table, base and tool that are no parameters; m.
     """
 
     parameters: tuple[str, ...]
@@ -115,36 +103,36 @@ class Lengths:
 def edits(
     tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float], lengths: Lengths
 ) -> list[Edit]:
-    """Return the changes of a formula in the order in which they are tried, :data:`MOST_EDITS` at most.
+    """Return the changes of a formula in the order in which they are tried, :data:`MAX_EDITS` at most.
 
     Parameters
     ----------
     tree
         The formula.
     is_revolute
-        Whether it is that of an angle.
+        Whether the formula gives an angle.
     others
-        Variables of joints of the same kind, turning or sliding, that it may use.
+        Variables of joints of the same kind, turning or sliding, that the formula may use.
     offsets
-        By how much it may be off, rad or m.
+        Possible constant errors, rad or m.
     lengths
-        The robot's.
+        Lengths of the robot.
     """
     whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
-    found = [
+    changes = [
         *(Edit(mistake, new, tree, new) for mistake, new in whole),
-        *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MOST_EDITS),
+        *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MAX_EDITS),
         *(
             Edit(mistake, new, tree, new)
             for mistake, change in renamings([tree], lengths)
-            if (new := renamed(tree, change)) is not tree
+            if (new := formulas.renamed(tree, change)) is not tree
         ),
     ]
-    return sorted(found, key=lambda edit: ORDER.index(edit.mistake))[:MOST_EDITS]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
 
 
 def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, dict[str, Tree]]]:
-    """Yield what names of some formulas may stand for: another component, another length, one less an offset."""
+    """Yield replacements of names in formulas: another component, another length, a component less an offset."""
     names = set().union(*map(names_of, trees))
     if any(f"r{i}{j}" in names for i in "123" for j in "123" if i != j):
         yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i in "123" for j in "123"}
@@ -152,11 +140,13 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
     parts = [part for tree in trees for part in parts_of(tree) if isinstance(part, Number)]
-    numbers = {leaf_text(number) for number in parts if number.value.denominator != 1}  # whole ones are exponents
-    known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
-    for first, second in combinations(known[:MOST_LENGTHS], 2):
-        yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
-    for length in lengths.trees[:MOST_LENGTHS]:
+    numbers = {
+        formulas.leaf_text(number) for number in parts if number.value.denominator != 1
+    }  # integers are exponents
+    known = [length for length in lengths.trees if formulas.leaf_text(length) in names | numbers]
+    for first, second in combinations(known[:MAX_LENGTHS], 2):
+        yield "lengths_exchanged", {formulas.leaf_text(first): second, formulas.leaf_text(second): first}
+    for length in lengths.trees[:MAX_LENGTHS]:
         for subtracted in (True, False):
             for p in POSITIONS:
                 if p in names:
@@ -176,8 +166,8 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
     for edit in _of_parts(tree, alone, lambda part: part, in_law=False):
         if edit.mistake == "elbow_sign":
             yield edit.tree
-    if has_call(tree, ROOTS):
-        yield with_calls_changed(tree, ROOTS, minus)
+    if formulas.has_call(tree, ROOTS):
+        yield formulas.with_calls_changed(tree, ROOTS, minus)
 
 
 # Changes of a whole formula
@@ -202,8 +192,11 @@ def _of_the_whole(
         yield "arc_function_forgotten", applied(arc, tree)
         yield "arc_function_forgotten", minus(applied(arc, tree))
     yield "root_forgotten", applied("sqrt", tree)
-    for mistake, functions, change in (("elbow_sign", ROOTS, minus), ("atan2_arguments", ("atan2",), exchanged)):
-        new = with_calls_changed(tree, functions, change)
+    for mistake, functions, change in (
+        ("elbow_sign", ROOTS, minus),
+        ("atan2_arguments", ("atan2",), formulas.exchange_arguments),
+    ):
+        new = formulas.with_calls_changed(tree, functions, change)
         if new is not tree:
             yield mistake, new
 
@@ -220,7 +213,7 @@ def _with_triangle(
         return
     for name in others:
         c, s = applied("cos", Name(name, 0)), applied("sin", Name(name, 0))
-        for a, b in permutations(lengths.trees[:MOST_LENGTHS], 2):
+        for a, b in permutations(lengths.trees[:MAX_LENGTHS], 2):
             beta = Call("atan2", (times(b, s), Sum(((True, a), (True, times(b, c))))), 0)
             for added in (False, True):
                 yield "triangle_angle_forgotten", Sum(((True, tree), (added, beta)))
@@ -239,25 +232,25 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
     tree
         The part.
     lengths
-        The robot's.
+        Lengths of the robot.
     rebuild
-        From a changed part to the whole formula.
+        Returns the whole formula for a changed part.
     in_law
-        Whether the part stands in a law of cosines.
+        Whether the part belongs to a law of cosines.
     """
     for mistake, new in _changes(tree, lengths, in_law):
         yield Edit(mistake, rebuild(new), tree, new)
-    children = operands(tree)
+    children = formulas.operands(tree)
     for k, child in enumerate(children):
 
         def around(part: Tree, k: int = k) -> Tree:
-            return rebuild(with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
+            return rebuild(formulas.with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
 
         yield from _of_parts(child, lengths, around, in_law or _is_law(child))
 
 
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
-    """Yield what a part may have to be."""
+    """Yield mistakes in a part, each with the part corrected."""
     match tree:
         case Number():
             yield from _of_number(tree, in_law)
@@ -271,7 +264,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
         case Product(factors):
             yield from _scaled(tree, in_law)
             for k in range(len(factors)):
-                yield "term_factor", product_of([*factors[:k], *factors[k + 1 :]])
+                yield "term_factor", formulas.product_of([*factors[:k], *factors[k + 1 :]])
         case Sum(terms):
             yield from _of_sum(terms, in_law)
 
@@ -279,7 +272,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
 def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if number.value == 1:
         return
-    if number.value >= SMALLEST:
+    if number.value >= MIN_MEASURE:
         yield "degrees_for_radians", times(number, Name("deg", 0))
         yield "millimetres_for_metres", times(number, Name("mm", 0))
     yield "cosine_law_squares" if in_law else "square_forgotten", square_of(number)
@@ -293,7 +286,7 @@ def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
         if other != text:
             yield "term_parameter" if text in lengths.parameters else "axis_exchanged", Name(other, 0)
     if text in POSITIONS:
-        for length in lengths.trees[:MOST_LENGTHS]:
+        for length in lengths.trees[:MAX_LENGTHS]:
             for added in (False, True):
                 yield "offset_forgotten", Sum(((True, Name(text, 0)), (added, length)))
 
@@ -304,16 +297,19 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
     match call.function:
         case "atan2":
             second = call.arguments[-1]
-            yield "atan2_arguments", exchanged(call)
+            yield "atan2_arguments", formulas.exchange_arguments(call)
             for signs in ((False, True), (True, False), (False, False)):
                 signed = tuple(x if sign else minus(x) for sign, x in zip(signs, (first, second), strict=True))
                 yield "term_sign", replace(call, arguments=signed)
         case "sin" | "cos":
             yield "term_function", replace(call, function="cos" if call.function == "sin" else "sin")
         case "atan":
-            if isinstance(first, Product) and any(not up for up, _ in first.factors):
-                above, below = ([(True, x) for up, x in first.factors if up is way] for way in (True, False))
-                yield "quadrant", Call("atan2", (product_of(above), product_of(below)), 0)
+            if isinstance(first, Product) and not all(is_factor for is_factor, _ in first.factors):
+                y, x = (
+                    formulas.product_of([(True, part) for is_factor, part in first.factors if is_factor is wanted])
+                    for wanted in (True, False)
+                )
+                yield "quadrant", Call("atan2", (y, x), 0)
         case "acos" | "asin":
             yield "elbow_sign", minus(call)
             yield "supplement", replace(call, arguments=(minus(first), *call.arguments[1:]))
@@ -326,10 +322,10 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
 
 def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tuple[str, Tree]]:
     yield "root_forgotten", applied("sqrt", Sum(terms))
-    for count in (1, 2) if in_law and len(terms) <= MOST_LAW_TERMS else (1,):
+    for count in (1, 2) if in_law and len(terms) <= MAX_LAW_TERMS else (1,):
         for chosen in combinations(range(len(terms)), count):
-            turned = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
-            yield "cosine_law_sign" if in_law else "term_sign", Sum(turned)
+            changed = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
+            yield "cosine_law_sign" if in_law else "term_sign", Sum(changed)
     for k in range(len(terms)) if len(terms) > 1 else ():
         yield "term_extra", Sum((*terms[:k], *terms[k + 1 :]))
     bare = [k for k, (_, term) in enumerate(terms) if isinstance(term, Name | Number | Sum)]
@@ -344,12 +340,12 @@ def _scaled(tree: Tree, in_law: bool) -> Iterator[tuple[str, Tree]]:
 
 
 def _is_law(tree: Tree) -> bool:
-    """Whether a part looks like a law of cosines: a sum of three terms at least over a product."""
-    if not isinstance(tree, Product) or all(up for up, _ in tree.factors):
+    """Whether a part looks like a law of cosines: a sum of at least three terms over a product."""
+    if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
         return False
-    return any(up and _count(factor) >= LAW_TERMS for up, factor in tree.factors)
+    return any(is_factor and _count_terms(part) >= MIN_LAW_TERMS for is_factor, part in tree.factors)
 
 
-def _count(tree: Tree) -> int:
-    """Return the number of terms, those of sums in a sum included."""
-    return sum(_count(term) for _, term in tree.terms) if isinstance(tree, Sum) else 1
+def _count_terms(tree: Tree) -> int:
+    """Return the number of terms of a sum, with those of sums in it."""
+    return sum(_count_terms(term) for _, term in tree.terms) if isinstance(tree, Sum) else 1

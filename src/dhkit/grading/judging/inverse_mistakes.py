@@ -1,9 +1,9 @@
-"""Which mistakes explain a branch of inverse kinematics that does not reach the poses asked for.
+"""Search for the mistakes in a branch of inverse kinematics that does not reach the requested poses.
 
-The best explanation is a single local change of the formula that is wrong first which makes the whole branch right;
-then one in a formula before it, or of the same part in several formulas; then a sign or a quadrant that is lost for
-some poses. A joint is never blamed whose value agrees with a solution, given the joints before it. The search is
-bounded by counted changes, never by time.
+The best explanation is a single local change of the first wrong formula that makes the whole branch right; then one of
+a preceding formula, or of the same part in several formulas; then a sign or quadrant that is lost at some poses. A
+joint whose value agrees with a solution, given the preceding joints, is never blamed. The search is bounded by counted
+changes, never by time.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
 from dhkit.grading.judging.numeric import parts_of
 
-MOST_POSES = 100
-"""Poses that fail, and poses that close, on which mistakes are looked for."""
-MOST_WORK = 4_000_000
-"""Changes that are worked out for one answer, each times the parts of its formula: a few seconds' work at most."""
-MOST_PARTS = 1_000
-"""Parts of a formula, at most, in which mistakes are looked for: a PUMA's longest has 200."""
-AGREEING = 0.5
-"""Share of the poses: a change whose values are a solution's less often is not followed further."""
-SUBSTANTIAL = 0.3
-"""Share of the failing poses: a mistake that explains so many is one, though others are made besides."""
+MAX_POSES = 100
+"""Largest number of poses that fail, and of poses that are reached, at which mistakes are looked for."""
+MAX_WORK = 4_000_000
+"""Largest number of changes for one answer, each times the parts of its formula: a few seconds' work."""
+MAX_PARTS = 1_000
+"""Largest number of parts of a formula in which mistakes are looked for; a PUMA's longest has 200."""
+MIN_AGREEING_SHARE = 0.5
+"""Share of the poses at which the values of a change must be a solution's for the change to be followed further."""
+MIN_EXPLAINED_SHARE = 0.3
+"""Share of the failing poses that a mistake must explain to be named, though others are made besides."""
 FREQUENT = frozenset(
     ("atan2_arguments", "quadrant", "elbow_sign", "degrees_for_radians", "millimetres_for_metres", "joint_sign")
 )
-"""Mistakes that are named where they explain a good part of the poses alone."""
+"""Mistakes that are named if they explain a good part of the poses by themselves."""
 
 
 ARCS: Mapping[str, tuple[str, Callable[[Call], Tree]]] = {
@@ -51,7 +51,7 @@ ARCS: Mapping[str, tuple[str, Callable[[Call], Tree]]] = {
     "asin": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (False, call)))),
     "atan": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (True, call)))),
 }
-"""What functions that know half a turn lose, and their value in the other half."""
+"""By function whose values cover half a turn: the mistake of using it, and its value in the other half."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +61,13 @@ class Explanation:
     Attributes
     ----------
     mistake
-        The identity of a mistake of the library; None where none is found.
+        Identity of a mistake of the library; None if none is known.
     joint
-        Whose formula is meant, from 0; None where it is several formulas, or none in particular.
+        Joint of the wrong formula, from 0; None for several formulas, or none in particular.
     repaired
-        The branch with the mistake put right; None where there is none.
+        The branch with the mistake corrected; None without a mistake.
     is_near
-        Whether all joint values are near to a solution, but the tool is not near enough to the pose.
+        Whether all joint values are near a solution, but the tool is not near enough to the pose.
     """
 
     mistake: str | None
@@ -77,7 +77,7 @@ class Explanation:
 
 
 class Search:
-    """The search for mistakes in the branches of one answer.
+    """Search for mistakes in the branches of one answer.
 
     Parameters
     ----------
@@ -88,19 +88,19 @@ class Search:
     def __init__(self, description: Description) -> None:
         self.revolute = [kind == "R" for kind in description.kinds]
         self.lengths = lengths_of(description)
-        self.left = MOST_WORK
+        self.left = MAX_WORK
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:
-        """Yield what went wrong, each mistake put right before the next is looked for."""
-        current: Branch | None = branch.sample(MOST_POSES)
+        """Yield the mistakes of a branch; each is corrected before the next is looked for."""
+        current: Branch | None = branch.sample(MAX_POSES)
         while current is not None and not current.is_right:
             joint = current.wrong_joint()
-            found = self._anywhere(current) if joint is None else self._explained(current, joint)
-            yield found
-            current = found.repaired
+            explanation = self._explain_anywhere(current) if joint is None else self._explain(current, joint)
+            yield explanation
+            current = explanation.repaired
 
-    def _anywhere(self, branch: Branch) -> Explanation:
-        """Return a change that makes a branch right whose wrong joint is not known."""
+    def _explain_anywhere(self, branch: Branch) -> Explanation:
+        """Return a change that makes a branch with an unknown wrong joint right."""
         for joint in branch.order if not branch.poses.isolated else ():
             for edit in self._edits(branch, joint):
                 repaired = branch.with_tree(joint, edit.tree)
@@ -108,22 +108,23 @@ class Search:
                     return Explanation(edit.mistake, joint, repaired)
         return Explanation(None, None, is_near=branch.poses.isolated)
 
-    def _explained(self, branch: Branch, joint: int) -> Explanation:
-        """Return a mistake, given the first joint that is wrong."""
-        here = self._agreeing(branch, joint)
+    def _explain(self, branch: Branch, joint: int) -> Explanation:
+        """Return the mistake of a branch with a known first wrong joint."""
+        here = self._agreeing_edits(branch, joint)
         candidates = [Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree)) for edit in here]
         halves = [
             Explanation(mistake, other, repaired)
             for other in branch.order[: branch.rank(joint) + 1]
             for mistake, repaired in _lost_halves(branch, other, joint)
         ]
-        for found in chain(candidates, self._before(branch, joint), self._in_several(branch, here), halves):
-            if found.repaired is not None and found.repaired.is_right:
-                return found
-        for found in (*candidates, *halves):
-            following = found.repaired.wrong_joint() if found.repaired is not None else joint
+        others = chain(self._explain_earlier(branch, joint), self._explain_several(branch, here))
+        for candidate in chain(candidates, others, halves):
+            if candidate.repaired is not None and candidate.repaired.is_right:
+                return candidate
+        for candidate in (*candidates, *halves):
+            following = candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
             if following is None or branch.rank(following) > branch.rank(joint):
-                return found
+                return candidate
         frequent = [
             Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree))
             for edit in self._edits(branch, joint)
@@ -131,24 +132,24 @@ class Search:
         ]
         best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
-        return best if gained > SUBSTANTIAL * np.sum(branch.failing) else Explanation(None, joint)
+        return best if gained > MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
 
     def _edits(self, branch: Branch, joint: int) -> list[Edit]:
-        """Return the changes of a joint's formula, as many as are left to try."""
+        """Return the changes of a joint's formula, as many as the bound on the work leaves."""
         same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
         offsets = _offsets(branch, joint)
         names = [f"q{k + 1}" for k in same_kind]
         tree = branch.trees[joint]
         size = sum(1 for _ in parts_of(tree))
-        if size > MOST_PARTS:
+        if size > MAX_PARTS:
             return []
-        found = edits(tree, self.revolute[joint], names, offsets, self.lengths)[: self.left // size]
-        self.left -= len(found) * size
-        return found
+        changes = edits(tree, self.revolute[joint], names, offsets, self.lengths)[: self.left // size]
+        self.left -= len(changes) * size
+        return changes
 
-    def _agreeing(self, branch: Branch, joint: int) -> list[Edit]:
-        """Return the changes of a joint's formula that give values of a solution where the branch should close."""
-        formula, found = branch.editable(joint), list[Edit]()
+    def _agreeing_edits(self, branch: Branch, joint: int) -> list[Edit]:
+        """Return the changes of a joint's formula that give a solution's values at poses that should be reached."""
+        formula, agreeing = branch.editable(joint), list[Edit]()
         asked = branch.reachable
         tree = branch.trees[joint]
         equal = equal_parts([tree])
@@ -158,21 +159,21 @@ class Search:
                 trees.append(replaced_everywhere(tree, equal[id(edit.old)], edit.new))
             for changed in trees:
                 x = branch.repaired(joint, formula.of(changed))
-                if np.mean(branch.agrees(joint, x)[asked]) >= AGREEING:
-                    found.append(replace(edit, tree=changed))
+                if np.mean(branch.agrees(joint, x)[asked]) >= MIN_AGREEING_SHARE:
+                    agreeing.append(replace(edit, tree=changed))
                     break
-        return found
+        return agreeing
 
-    def _before(self, branch: Branch, joint: int) -> Iterator[Explanation]:
-        """Yield changes of formulas before the first wrong joint: their values may be those of another solution."""
+    def _explain_earlier(self, branch: Branch, joint: int) -> Iterator[Explanation]:
+        """Yield changes of formulas before the first wrong joint, whose values may be those of another solution."""
         for other in branch.order[: branch.rank(joint)]:
-            for edit in self._agreeing(branch, other):
+            for edit in self._agreeing_edits(branch, other):
                 yield Explanation(edit.mistake, other, branch.with_tree(other, edit.tree))
 
-    def _in_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
+    def _explain_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
         size = sum(1 for tree in branch.trees for _ in parts_of(tree))
-        if size > MOST_PARTS * branch.n:
+        if size > MAX_PARTS * branch.n:
             return
         equal = equal_parts(branch.trees)
         for edit in agreeing:
@@ -187,32 +188,32 @@ class Search:
 
 
 def lengths_of(description: Description) -> Lengths:
-    """Return what formulas for a robot may hold as lengths."""
+    """Return the lengths that formulas for a robot may contain, m."""
     parameters = tuple(description.parameters)
     numbers, values = description.numbers, description.numbers.values
     known = [*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]]
-    found: list[Name | Number] = [Name(name, 0) for name in parameters]
+    trees: list[Name | Number] = [Name(name, 0) for name in parameters]
     seen = {round(abs(float(values[name])), 12) for name in parameters} | {0.0}
     for length in known:
         size = round(abs(float(length)), 12)
         if size not in seen:
             seen.add(size)
-            found.append(Number(Fraction(str(size)), str(size), 0))
-    return Lengths(parameters, tuple(found))
+            trees.append(Number(Fraction(str(size)), str(size), 0))
+    return Lengths(parameters, tuple(trees))
 
 
-def _count_of_closed(found: Explanation) -> int:
-    return int(np.sum(found.repaired.closed)) if found.repaired is not None else 0
+def _count_of_closed(explanation: Explanation) -> int:
+    return int(np.sum(explanation.repaired.closed)) if explanation.repaired is not None else 0
 
 
 def _wrong(branch: Branch, joint: int) -> Mask:
-    """Return on which poses a joint is the first that is wrong."""
+    """Return at which poses a joint is the first wrong one, shape (S,)."""
     wrong: Mask = branch.failing & (branch.agreement[0] == branch.rank(joint))
     return wrong
 
 
 def _offsets(branch: Branch, joint: int) -> list[float]:
-    """Return by how much a joint may be off, from the first pose where it is wrong."""
+    """Return possible constant errors of a joint, rad or m, from the first pose where it is wrong."""
     wrong = _wrong(branch, joint) & np.isfinite(branch.q[:, joint])
     if not np.any(wrong):
         return []
@@ -222,15 +223,15 @@ def _offsets(branch: Branch, joint: int) -> list[float]:
 
 
 def _with_part_repaired(branch: Branch, joint: int, wrong: Mask, changed: Tree) -> Branch:
-    """Return the branch whose joint has the values of a changed formula on some poses, shape (S,)."""
+    """Return the branch whose joint has the values of a changed formula at the poses of a mask, shape (S,)."""
     values = branch.repaired(joint, branch.editable(joint).of(changed))
     return branch.with_repair(joint, lambda x: np.where(wrong, values, x))
 
 
 def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Branch]]:
-    """Return what the branch would be if a joint knew the whole turn: atan, asin and acos know one half.
+    """Return the branch with a joint's values in the other half turn: atan, asin and acos cover one half alone.
 
-    The wrong half may be the value of another solution, and then a later joint is the first that is wrong.
+    The wrong half may be the value of another solution; a later joint is then the first wrong one.
     """
     wrong, tree = _wrong(branch, first), branch.trees[joint]
     revolute = branch.poses.description.kinds[joint] == "R"
@@ -239,16 +240,16 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
     def where_wrong(change: Array) -> Array:
         return np.where(wrong, change, 0.0)
 
-    found = []
+    branches = []
     if revolute and (own or has_call(tree, ("atan", "asin"))):
-        found.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))))
-        found.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
+        branches.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))))
+        branches.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
     if own or has_call(tree, ("acos",)):
-        found.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
+        branches.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
     arcs = [function for function in ARCS if has_call(tree, (function,))]
     if own and len(arcs) == 1 and not isinstance(tree, Call):
         mistake, change = ARCS[arcs[0]]
         changed = with_calls_changed(tree, arcs, change)
-        found.append((mistake, _with_part_repaired(branch, joint, wrong, changed)))
-    # Both may give a solution: what the formula's own function does not know is meant.
-    return found[::-1] if has_call(tree, ("acos",)) and not has_call(tree, ("atan", "asin")) else found
+        branches.append((mistake, _with_part_repaired(branch, joint, wrong, changed)))
+    # Both may give a solution: the half that the formula's own function does not cover comes first.
+    return branches[::-1] if has_call(tree, ("acos",)) and not has_call(tree, ("atan", "asin")) else branches

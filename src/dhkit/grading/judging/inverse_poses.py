@@ -1,4 +1,4 @@
-"""Random poses that formulas of inverse kinematics are tried on, with the solutions that are known of them."""
+"""Random poses at which formulas of inverse kinematics are tried, with their known solutions."""
 
 from __future__ import annotations
 
@@ -15,52 +15,55 @@ from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.kinematics import classify, inverse_kinematics, jacobian
 
 CLOSES = 1e-9
-"""rad, and share of the reach: how near to a pose joint values have to bring the tool."""
+"""Largest distance of the tool from a pose that is reached, in entries of the rotation and relative to the reach."""
 MATCHES = 1e-6
-"""rad, and share of the reach: joint values this near to a solution's are its: poses near singular ones widen gaps."""
+"""Largest distance of joint values from a solution they are taken for, rad and relative to the reach: it exceeds CLOSES
+because gaps widen at poses near singular ones."""
 TOOL_AXES = {f"pitch of the tool's {axis} axis": k for k, axis in enumerate("xyz")}
-"""Which column of the tool's rotation an arm meets that meets this part of a pose."""
+"""By part of a pose that an arm reaches: the column of the tool's rotation that it determines."""
 FEW_JOINTS = 3
-"""An arm of so many joints, without a closed form, is asked for positions alone where these determine its joints."""
+"""Largest number of joints at which an arm without a closed form is asked for positions alone, if these determine its
+joints."""
 STARTS, STEPS = 12, 30
-"""Of Newton's method for one pose: random joint values to begin at, and steps from each."""
+"""Newton's method for one pose: number of random starts, and of steps from each."""
 DAMPING = 1e-9
-"""Levenberg's, in units of the squared singular values: keeps steps finite at singular poses."""
+"""Levenberg's damping, in units of squared singular values: keeps steps finite at singular poses."""
 DIFFERENCE = 1e-7
-"""rad and m: of finite differences; Newton's method then converges linearly, by this factor a step."""
+"""Step of finite differences, rad and m; Newton's method then converges linearly, by this factor in each step."""
 
 Mask: TypeAlias = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Random poses, with the solutions that are known of them.
+    """Random poses with their known solutions.
 
     Attributes
     ----------
     description
         The robot.
     q
-        Joint values that the poses come from, shape (S, n), rad and m.
+        Joint values from which the poses are computed, shape (S, n), rad and m.
     T
-        The poses, world to tool, shape (S, 4, 4).
+        The poses of the tool in the world, shape (S, 4, 4), m.
     solutions
-        Those of the closed form, shape (S, B, n), NaN where a branch does not reach; B = 0 without a closed form.
-    met
-        The parts of a pose that the closed form meets; empty without one.
+        Solutions of the closed form, shape (S, B, n), rad and m, NaN where a branch does not reach a pose; B = 0
+        without a closed form.
+    pose_parts
+        Parts of a pose that the closed form reaches; empty without one.
     asks_rotation
         Whether the tool's whole rotation is asked for.
     axis
-        Which of the tool's axes is asked for besides the position, from 0; None if none is.
+        Axis of the tool, from 0, that is asked for besides the position; None if none is.
     lower, upper
-        The range of joint values, shape (n,), rad and m.
+        Range of joint values, shape (n,), rad and m.
     """
 
     description: Description
     q: Array
     T: Array
     solutions: Array
-    met: tuple[str, ...]
+    pose_parts: tuple[str, ...]
     asks_rotation: bool
     axis: int | None
     lower: Array
@@ -68,7 +71,7 @@ class Poses:
 
     @classmethod
     def random(cls, description: Description, samples: int, seed: int) -> Poses:
-        """Return poses of random joint values in :func:`joint_ranges`."""
+        """Return the poses of random joint values in :func:`joint_ranges`."""
         lower, upper = joint_ranges(description)
         q = np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
         T = world_to_tool(description, q)
@@ -76,12 +79,13 @@ class Poses:
             known = np.empty((samples, 0, description.n))
             whole = not _positions_determine_joints(description, q[0])
             return cls(description, q, T, known, (), whole, None, lower, upper)
-        found = inverse_kinematics(description, T)
-        solutions = np.where(found.valid[..., None], found.q, np.nan)
+        closed_form = inverse_kinematics(description, T)
+        parts = closed_form.met
+        solutions = np.where(closed_form.valid[..., None], closed_form.q, np.nan)
         # A yaw with all positions is all that a planar arm or a SCARA leaves open.
-        whole = len(found.met) == 6 or "yaw" in found.met
-        axis = next((TOOL_AXES[part] for part in found.met if part in TOOL_AXES), None)
-        return cls(description, q, T, solutions, found.met, whole, axis, lower, upper)
+        whole = len(parts) == 6 or "yaw" in parts
+        axis = next((TOOL_AXES[part] for part in parts if part in TOOL_AXES), None)
+        return cls(description, q, T, solutions, parts, whole, axis, lower, upper)
 
     def at(self, chosen: Sequence[int] | NDArray[np.intp]) -> Poses:
         """Return some of the poses."""
@@ -90,37 +94,37 @@ class Poses:
 
     @property
     def has_closed_form(self) -> bool:
-        """Whether the solutions are those of a closed form, all of them."""
+        """Whether the solutions are all of them, from a closed form."""
         return bool(self.solutions.shape[1])
 
     @cached_property
     def scale(self) -> float:
-        """The reach, m; 1 where there is none."""
+        """The reach, m; 1 if the arm has none."""
         reach = self.description.reach
         return reach if np.isfinite(reach) and reach > 0 else 1.0
 
     @cached_property
     def values(self) -> dict[str, Array | float]:
-        """Values by name: of the poses, shape (S,), and of parameters."""
+        """Values by name: px ... r33 of the poses, shape (S,), and parameters; SI units and rad."""
         entries = [*np.moveaxis(self.T[:, :3, 3], -1, 0), *self.T[:, :3, :3].reshape(-1, 9).T]
         return {**self.description.numbers.values, **dict(zip(POSE_NAMES, entries, strict=True))}
 
     @cached_property
     def truths(self) -> Array:
-        """All solutions known, the joint values that a pose comes from last, shape (S, B + 1, n)."""
-        known = self.solutions if self.has_closed_form else self._found()
+        """All known solutions, last the joint values from which a pose is computed, shape (S, B + 1, n), rad and m."""
+        known = self.solutions if self.has_closed_form else self._search()
         return np.concatenate([known, self.q[:, None]], axis=1)
 
     @cached_property
     def isolated(self) -> bool:
-        """Whether solutions do not move: an arm with more joints than it is asked for has whole curves of them."""
+        """Whether solutions are single points: an arm with more joints than it is asked for has curves of them."""
         if self.has_closed_form:
             return True
         J = self._derivatives(self.q[:1], self.T[:1])[0]
         return int(np.linalg.matrix_rank(J, 1e-5)) == self.description.n
 
-    def _found(self) -> Array:
-        """Return solutions found by Newton's method from random starts, shape (S, STARTS, n); NaN where none is."""
+    def _search(self) -> Array:
+        """Return solutions by Newton's method from random starts, (S, STARTS, n), rad and m; NaN for no solution."""
         S, n = self.q.shape
         if not self.isolated:
             return np.empty((S, 0, n))
@@ -133,8 +137,8 @@ class Poses:
             step = np.linalg.solve(normal, -np.einsum("sij,si->sj", J, gap)[..., None])[..., 0]
             longest = np.max(np.abs(step / stroke), axis=1, keepdims=True)
             q = q + step * np.minimum(1.0, 1.0 / np.maximum(longest, 1e-300))
-        met = np.max(np.abs(self.residuals(q, T)), axis=1) <= CLOSES
-        return np.where(met[:, None], q, np.nan).reshape(S, STARTS, n)
+        converged = np.max(np.abs(self.residuals(q, T)), axis=1) <= CLOSES
+        return np.where(converged[:, None], q, np.nan).reshape(S, STARTS, n)
 
     def _derivatives(self, q: Array, T: Array) -> Array:
         """Return the derivatives of :meth:`residuals` by the joint values, shape (S, k, n)."""
@@ -143,7 +147,7 @@ class Poses:
         return np.stack([(self.residuals(q + unit, T) - at) / DIFFERENCE for unit in units], axis=-1)
 
     def residuals(self, q: Array, T: Array) -> Array:
-        """Return how far joint values (S, n) are from what is asked of poses: shape (S, k), lengths over the reach."""
+        """Return the errors of joint values (S, n) in what is asked of poses, (S, k), lengths relative to the reach."""
         gap = world_to_tool(self.description, np.where(np.isfinite(q), q, np.nan)) - T
         columns = [gap[:, :3, 3] / self.scale]
         if self.asks_rotation:
@@ -153,33 +157,33 @@ class Poses:
         return np.concatenate(columns, axis=1)
 
     def closes(self, q: Array) -> Mask:
-        """Return which poses joint values of shape (S, n) bring the tool to."""
+        """Return which poses are reached by joint values of shape (S, n), rad and m; shape (S,)."""
         near: Mask = np.max(np.abs(self.residuals(q, self.T)), axis=1) <= CLOSES
         return near
 
     def gaps(self, a: Array, b: Array, joint: int | slice = slice(None)) -> Array:
-        """Return how far joint values are apart: angles the short way round, slides over the reach."""
+        """Return the distances of joint values: angles the short way round in rad, slides relative to the reach."""
         prismatic = self.description.numbers.prismatic[joint]
         with np.errstate(invalid="ignore"):
             turned = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
             return np.where(prismatic, np.abs(a - b) / self.scale, turned)
 
     def matches(self, q: Array, solutions: Array) -> Mask:
-        """Return which solutions, shape (S, B, n), joint values of shape (S, n) are."""
+        """Return which solutions, of shape (S, B, n), joint values of shape (S, n) equal; shape (S, B)."""
         near: Mask = np.all(self.gaps(q[:, None], solutions) < MATCHES, axis=-1)
         return near
 
     def same(self, a: Array, b: Array) -> bool:
-        """Return whether two branches give the same joint values wherever both have some."""
+        """Whether the joint values of two branches, shape (S, n), are equal wherever both have values."""
         both = np.all(np.isfinite(a) & np.isfinite(b), axis=1)
         return bool(np.any(both) and np.all(self.gaps(a[both], b[both]) < MATCHES))
 
 
 def joint_ranges(description: Description) -> tuple[Array, Array]:
-    """Return the joint values that poses are drawn from, shape (n,) each, rad and m.
+    """Return the lower and upper ends of the random joint values, shape (n,) each, rad and m.
 
-    A joint's limits; without both of them a whole turn about zero, or a slide of a metre outwards from zero: people
-    mean slides to be positive unless limits say otherwise.
+    They are a joint's limits; without both of them a turn about zero, or a metre outwards from zero, because slides are
+    positive by custom.
     """
     numbers = description.numbers
     width = np.where(numbers.prismatic, 1.0, 2 * np.pi)
@@ -190,7 +194,7 @@ def joint_ranges(description: Description) -> tuple[Array, Array]:
 
 
 def _positions_determine_joints(description: Description, q: Array) -> bool:
-    """Whether the tool's position alone determines an arm's joints: three at most, and none only turns the tool."""
+    """Whether the tool's position determines the joints near q, shape (n,): no joint only turns the tool."""
     if description.n > FEW_JOINTS:
         return False
     return bool(np.linalg.matrix_rank(jacobian(description, q)[:3], 1e-9) == description.n)

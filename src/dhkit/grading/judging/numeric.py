@@ -1,9 +1,11 @@
-"""The doubles that a syntax tree stands for, over batches; nothing is ever executed."""
+"""Values of syntax trees in doubles, over batches; nothing is ever executed."""
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -13,10 +15,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 
-FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sqrt", "abs", "sign", "exp", "min", "max")
-"""What an answer may call; secants and the like are read as quotients of these."""
-
-_NUMPY: Mapping[str, Callable[..., Any]] = {
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sin": np.sin,
     "cos": np.cos,
     "tan": np.tan,
@@ -31,67 +30,129 @@ _NUMPY: Mapping[str, Callable[..., Any]] = {
     "min": np.minimum,
     "max": np.maximum,
 }
+"""Functions that an answer may call; secants and the like are read as quotients of these."""
+UNITS = {name: float(constant) for name, constant in CONSTANTS.items()}
+"""Values of pi, deg, mm, cm and inch, in rad and m."""
 
 
-_UNITS = {name: float(constant) for name, constant in CONSTANTS.items()}
-"""pi, deg, mm, cm and inch."""
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One walk over trees in some arithmetic: doubles, arrays of them, or intervals.
+
+    A part that occurs more than once is worked out once: CasADi's graphs share parts.
+
+    Attributes
+    ----------
+    values
+        Values of names.
+    number
+        Converts a rational number.
+    functions
+        Functions that trees may call.
+    power, divide
+        Operations of the arithmetic; sums, differences and products are Python's.
+    shared
+        Values of the parts met so far, by their ids.
+    """
+
+    values: Mapping[str, Any]
+    number: Callable[[Fraction], Any] = lambda value: np.float64(float(value))
+    functions: Mapping[str, Callable[..., Any]] = field(default_factory=lambda: FUNCTIONS)
+    power: Callable[[Any, Any], Any] = operator.pow
+    divide: Callable[[Any, Any], Any] = operator.truediv
+    shared: dict[int, Any] = field(default_factory=dict)
+
+    def of(self, tree: Tree) -> Any:
+        """Return the value of a tree.
+
+        Raises
+        ------
+        AnswerError
+            A name without value, or an unknown function.
+        """
+        if id(tree) not in self.shared:
+            self.shared[id(tree)] = self._value(tree)
+        return self.shared[id(tree)]
+
+    def _value(self, tree: Tree) -> Any:
+        match tree:
+            case Number(value=value):
+                return self.number(value)
+            case Name(text):
+                if text not in self.values:
+                    raise AnswerError(f"{text} has no value")
+                return self.values[text]
+            case Call(function, arguments):
+                if function not in self.functions:
+                    raise AnswerError(f"unknown function {function!r}; known are {', '.join(self.functions)}")
+                return self.functions[function](*map(self.of, arguments))
+            case Power(base, exponent):
+                return self.power(self.of(base), self.of(exponent))
+            case Sum(terms):
+                total = self.number(Fraction(0))
+                for added, term in terms:
+                    total = total + self.of(term) if added else total - self.of(term)
+                return total
+            case Product(factors):
+                product = self.number(Fraction(1))
+                for is_factor, factor in factors:
+                    value = self.of(factor)
+                    product = product * value if is_factor else self.divide(product, value)
+                return product
 
 
 def doubles(tree: Tree, values: Mapping[str, Any]) -> Any:
-    """Return the number, or array (...), that a tree stands for; NaN or infinite where it has no value.
+    """Return the value of a tree as a double, or as an array (...) of them; NaN or infinite where it has none.
 
     Parameters
     ----------
     tree
         An answer as :func:`dhkit.grading.answers.read_answer` reads it.
     values
-        Doubles or arrays by name; ``pi`` need not be given.
+        Doubles or arrays (...) by name, SI units and rad; ``pi`` and units need not be given.
 
     Raises
     ------
     AnswerError
-        A name without value, or a function that is not known.
+        A name without value, or an unknown function.
     """
-    with np.errstate(all="ignore"):
-        # Floats of Python's own would raise where NumPy's give infinity.
-        arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**_UNITS, **values}.items()}
-        return _Evaluation(arrays).of(tree)
+    return EditedDoubles(tree, values).numbers
 
 
 class EditedDoubles:
-    """The numbers of trees that differ from one tree in a place or two: what they share is worked out once.
+    """Values of trees that differ from one tree in a few places; the parts they share are worked out once.
 
     Parameters
     ----------
     tree
-        What is changed later.
+        The first tree.
     values
-        Doubles or arrays by name, as for :func:`doubles`.
+        Doubles or arrays (...) by name, as for :func:`doubles`.
     """
 
     def __init__(self, tree: Tree, values: Mapping[str, Any]) -> None:
-        arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**_UNITS, **values}.items()}
-        self._evaluation = _Evaluation(arrays)
-        self._tree = tree  # keeps the parts alive, which are known by their ids
+        # Python's own floats would raise where NumPy's give infinity.
+        arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**UNITS, **values}.items()}
+        self._evaluation = Evaluation(arrays)
+        self._tree = tree  # keeps its parts alive, whose ids are used
         with np.errstate(all="ignore"):
             self.numbers = self._evaluation.of(tree)
 
     def of(self, edited: Tree) -> Any:
-        """Return the number, or array (...), of a tree that shares parts with the first one."""
-        evaluation = _Evaluation(self._evaluation.values)
-        evaluation.shared = dict(self._evaluation.shared)
+        """Return the value, a double or an array (...), of a tree that shares parts with the first one."""
+        evaluation = replace(self._evaluation, shared=dict(self._evaluation.shared))
         with np.errstate(all="ignore"):
             return evaluation.of(edited)
 
 
 def general_state(n: int) -> dict[str, float]:
-    """Return a state in general position, by name."""
+    """Return values of q1 ... qn, qd1 ... and qdd1 ... in general position, SI units and rad."""
     turns = np.random.default_rng(11).uniform(-1.5, 1.5, (3, n))
     return {f"{kind}{i + 1}": float(turns[k, i]) for k, kind in enumerate(("q", "qd", "qdd")) for i in range(n)}
 
 
 def state_arrays(state: Mapping[str, float], n: int) -> tuple[Array, Array, Array]:
-    """Return q, qd and qdd, shape (n,) each, of a state by name."""
+    """Return q, qd and qdd, shape (n,) each, of a state given by name, SI units and rad."""
     q, qd, qdd = (np.array([state[f"{kind}{i + 1}"] for i in range(n)]) for kind in ("q", "qd", "qdd"))
     return q, qd, qdd
 
@@ -102,14 +163,14 @@ def names_of(tree: Tree) -> set[str]:
 
 
 def parts_of(tree: Tree, coefficients: bool = False) -> Iterator[Tree]:
-    """Yield every node of a tree once: CasADi's graphs share what is used twice.
+    """Yield every node of a tree once, also those that CasADi's graphs share.
 
     Parameters
     ----------
     tree
-        Any.
+        Any tree.
     coefficients
-        Whether arguments of functions and exponents are left out.
+        Whether to leave out arguments of functions and exponents.
     """
     seen: set[int] = set()
     left = [tree]
@@ -126,43 +187,3 @@ def parts_of(tree: Tree, coefficients: bool = False) -> Iterator[Tree]:
                 left += [base] if coefficients else [base, exponent]
             case Call(_, arguments):
                 left += () if coefficients else arguments
-
-
-class _Evaluation:
-    """One walk over a tree."""
-
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        self.values = values
-        self.shared: dict[int, Any] = {}
-
-    def of(self, tree: Tree) -> Any:
-        # CasADi's graphs share what is used twice.
-        if id(tree) not in self.shared:
-            self.shared[id(tree)] = self._value(tree)
-        return self.shared[id(tree)]
-
-    def _value(self, tree: Tree) -> Any:
-        match tree:
-            case Number(value=value):
-                return np.float64(float(value))
-            case Name(text):
-                if text not in self.values:
-                    raise AnswerError(f"{text} has no value")
-                return self.values[text]
-            case Call(function, arguments):
-                if function not in _NUMPY:
-                    raise AnswerError(f"unknown function {function!r}; known are {', '.join(FUNCTIONS)}")
-                return _NUMPY[function](*(self.of(argument) for argument in arguments))
-            case Power(base, exponent):
-                return operator.pow(self.of(base), self.of(exponent))
-            case Sum(terms):
-                total: Any = np.float64(0)
-                for added, term in terms:
-                    total = total + self.of(term) if added else total - self.of(term)
-                return total
-            case Product(factors):
-                product: Any = np.float64(1)
-                for multiplied, factor in factors:
-                    value = self.of(factor)
-                    product = product * value if multiplied else product / value
-                return product

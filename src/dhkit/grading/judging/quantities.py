@@ -1,49 +1,51 @@
-"""Quantities held against the truth entry by entry: M, C, h, g, tau, K, V, L and the table's transforms."""
+"""Comparison of quantities with the truth, entry by entry: M, C, h, g, tau, K, V, L and the table's transforms."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Product, Sum, Tree
 from dhkit.grading.answers.given import LEFT_EMPTY, Given
-from dhkit.grading.answers.sheet import Task
+from dhkit.grading.answers.sheet import Requirements
 from dhkit.grading.judging.coordinates import Coordinates
-from dhkit.grading.judging.findings import EXACT, Comparison, Finding, compare, names_in
+from dhkit.grading.judging.findings import Comparison, Finding, compare, exact_difference, names_in
 from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
-from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, Reading
+from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient
 from dhkit.grading.judging.rounding import Residuals
-from dhkit.grading.judging.truth import Truth, exact_number, substituted
+from dhkit.grading.judging.truth import Truth, exact_number
 from dhkit.grading.report import Verdict
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import Element, Elements, RingError
 
-Index = tuple[int, ...]
-NEAR = 5e-3
-"""Relative: decimals of four digits are off by less."""
+Index: TypeAlias = tuple[int, ...]
+"""Indices of an entry in its quantity, from 0."""
+ROUNDED_DECIMALS = 5e-3
+"""Relative tolerance that decimals of four digits stay below."""
 
 
 @dataclass(frozen=True, eq=False)
 class JudgedQuantity:
-    """What is found of a quantity.
+    """A quantity that was compared with the truth.
 
     Attributes
     ----------
     name
-        Which.
+        Name of the quantity.
     given
-        What was handed in.
+        Entries that were handed in.
     findings
-        By index; of C those of the rows' products with the rates.
+        Findings by index; those of C concern the rows' products with the rates.
     truth
-        What is right, with numbers where the answer has them.
+        Right value, with numbers where the answer has them.
     numbers
         Parameters that the answer has as numbers.
     contradictions
-        Entries of which a chain ``V = a = b`` has sides that differ.
+        Entries with a chain ``V = a = b`` whose sides differ.
     """
 
     name: str
@@ -55,12 +57,17 @@ class JudgedQuantity:
 
     @property
     def wrong(self) -> int:
-        """How many entries are wrong."""
-        return sum(finding.verdict is Verdict.WRONG for finding in self.findings.values())
+        """Number of wrong entries."""
+        return len(self.wrong_indices)
 
     def right(self, index: Index) -> Element:
-        """Return what an entry should be; of C the row's torque."""
-        return self.truth[index[:1] if self.name == "C" else index]  # type: ignore[no-any-return]
+        """Return the right value of an entry; of C that of the row's torque."""
+        return self.truth[place_of(self.name, index)]  # type: ignore[no-any-return]
+
+    @property
+    def wrong_indices(self) -> list[Index]:
+        """Indices of the wrong entries."""
+        return [index for index, finding in self.findings.items() if finding.verdict is Verdict.WRONG]
 
     @property
     def is_zero(self) -> bool:
@@ -71,18 +78,18 @@ class JudgedQuantity:
 
     @property
     def answers(self) -> Mapping[Index, Quotient] | None:
-        """The answer in the ring; None where an entry is not in it."""
-        found = {index: finding.answer for index, finding in self.findings.items()}
-        return None if any(answer is None for answer in found.values()) else found  # type: ignore[return-value]
+        """The answer in the ring; None if an entry is outside."""
+        answers = {index: finding.answer for index, finding in self.findings.items()}
+        return None if any(answer is None for answer in answers.values()) else answers  # type: ignore[return-value]
 
     @property
     def differences(self) -> Mapping[Index, Element] | None:
-        """Answer less truth of the entries that were handed in, zero where one is right.
+        """Answer less truth of the entries that were handed in, zero for right ones.
 
-        None where an entry's difference is no element of the ring.
+        None if the difference of an entry is no element of the ring.
         """
-        found: dict[Index, Element] = {}
-        rows = {index[0] for index, finding in self.findings.items() if finding.verdict is Verdict.WRONG and index}
+        differences: dict[Index, Element] = {}
+        rows = {index[0] for index in self.wrong_indices if index}
         for index, finding in self.findings.items():
             if finding.verdict is Verdict.INCOMPLETE:
                 continue
@@ -91,29 +98,34 @@ class JudgedQuantity:
             element = zero if passes else finding.difference
             if element is None:
                 return None
-            found[index] = element
-        return found
+            differences[index] = element
+        return differences
+
+
+def place_of(quantity: str, index: Index) -> Index:
+    """Return the index at which an entry is judged: the row's for C, which is judged by C qd."""
+    return index[:1] if quantity == "C" else index
 
 
 def judge_quantity(
-    name: str, given: tuple[Given, ...], truth: Truth, task: Task, digits: int = 4, seed: int = 0
+    name: str, given: tuple[Given, ...], truth: Truth, task: Requirements, digits: int = 4, seed: int = 0
 ) -> JudgedQuantity:
-    """Judge a quantity, with its parameters as symbols or, where it has none of one, with the file's number.
+    """Judge a quantity with its parameters as symbols; a parameter that the answer lacks is replaced by its number.
 
     Parameters
     ----------
     name
-        Which.
+        Name of the quantity.
     given
         All its entries.
     truth
-        What is right.
+        The right answers.
     task
-        What was asked for.
+        The task, for friction and total derivatives.
     digits
         Significant digits from which a decimal may have been rounded.
     seed
-        Of the random states that answers outside the ring are tried at.
+        Seed of the random states at which answers outside the ring are tried.
 
     Raises
     ------
@@ -122,22 +134,22 @@ def judge_quantity(
     """
     arm = truth.arm(name)
     right = truth.of("h" if name == "C" else name)
-    reading = Reading(arm.ring, others=truth.others(name))
+    reader = truth.reader(name)
     up_to_constant = None if name == "L" and task.total_derivative else name in ("V", "L")
-    by = Comparison(arm, reading, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
+    by = Comparison(arm, reader, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
     judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth), right)
-    missing = _missing(truth, right, given)
+    missing = _missing_parameters(truth, right, given)
     all_numbers = bool(missing) and missing == parameters_in(right, truth)
     likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
     if judged.wrong and not judged.is_zero and (all_numbers or likely or (missing and name == "C")):
-        in_numbers = _at_numbers(truth, name, right, missing)
+        in_numbers = truth.with_numbers(name, right, missing)
         findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth)
         other = JudgedQuantity(name, given, findings, in_numbers, missing)
         judged = other if all_numbers or other.wrong < judged.wrong else judged
     if name != "C" and judged.wrong:
         judged = _with_mixed_numbers(judged, missing, truth, by)
-    differing = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
-    return replace(judged, contradictions=differing)
+    contradictions = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
+    return replace(judged, contradictions=contradictions)
 
 
 def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
@@ -147,7 +159,7 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
     verdict = judged.findings[entry.index].verdict
     for side in entry.earlier:
         try:
-            if by.reading.read(side).equals(by.reading.read(entry.tree)):
+            if by.reader.read(side).equals(by.reader.read(entry.tree)):
                 continue
             right = compare(side, judged.right(entry.index), replace(by, numbers=judged.numbers))
             if not (right.verdict.passes and verdict.passes):
@@ -155,55 +167,51 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
         except (OutsideTheRingError, AnswerError, RingError):
             values = {**by.arm.parameters, **general_state(by.arm.n)}
             first, last = float(doubles(side, values)), float(doubles(entry.tree, values))
-            if not abs(first - last) <= NEAR * max(abs(first), abs(last), 1e-9):
+            if not abs(first - last) <= ROUNDED_DECIMALS * max(abs(first), abs(last), 1e-9):
                 return True
     return False
 
 
 def _is_near(judged: JudgedQuantity, entry: Given, arm: ExactArm) -> bool:
-    """Whether a wrong entry is nearly right with the file's numbers, in one state."""
+    """Whether a wrong entry is nearly right with the file's numbers, at one state."""
     if entry.tree is None or judged.findings[entry.index].verdict is not Verdict.WRONG or judged.name == "C":
         return False
     state = general_state(arm.n)
     answer = float(doubles(entry.tree, {**arm.parameters, **state}))
     right = float(arm.evaluate(judged.right(entry.index), *state_arrays(state, arm.n)))
-    return judged.name in ("V", "L") or bool(abs(answer - right) <= NEAR * max(abs(right), 1e-9))
-
-
-def _at_numbers(truth: Truth, name: str, right: Elements, numbers: frozenset[str]) -> Elements:
-    ring = truth.arm(name).ring
-    values = {p: ring.number(exact_number(truth.description, p)) for p in numbers}
-    return substituted(right, values, ring)
+    return judged.name in ("V", "L") or bool(abs(answer - right) <= ROUNDED_DECIMALS * max(abs(right), 1e-9))
 
 
 def _with_mixed_numbers(judged: JudgedQuantity, tried: frozenset[str], truth: Truth, by: Comparison) -> JudgedQuantity:
-    """Judge wrong entries with numbers that stand where other entries have symbols.
+    """Judge wrong entries with numbers for parameters that they lack, though other entries have the symbols.
 
-    A number that is 1 is never seen in a product: a parameter worth 1 that is missing is then missing.
+    A parameter whose number is 1 counts as missing: in a product its number cannot be seen.
     """
     findings, mixed = dict(judged.findings), set(judged.numbers)
     for entry in judged.given:
         if not _is_near(judged, entry, by.arm):
             continue
         right = np.array([judged.right(entry.index)], dtype=object)
-        numbers = frozenset(p for p in _missing(truth, right, [entry]) if exact_number(truth.description, p) != 1)
+        numbers = frozenset(
+            p for p in _missing_parameters(truth, right, [entry]) if exact_number(truth.description, p) != 1
+        )
         if not numbers or numbers == tried:
             continue
-        finding = _finding(entry.tree, entry.error, _at_numbers(truth, judged.name, right, numbers)[0], by)
+        finding = _finding(entry.tree, entry.error, truth.with_numbers(judged.name, right, numbers)[0], by)
         if finding.verdict in (Verdict.CORRECT, Verdict.ROUNDED):
             findings[entry.index] = finding
             mixed |= numbers
     return replace(judged, findings=findings, numbers=frozenset(mixed)) if mixed != judged.numbers else judged
 
 
-def _missing(truth: Truth, right: Elements, given: Sequence[Given]) -> frozenset[str]:
-    """Return the parameters that the truth has, and no entry of the answer."""
+def _missing_parameters(truth: Truth, right: Elements, given: Sequence[Given]) -> frozenset[str]:
+    """Return the parameters that occur in the truth and in no entry of the answer."""
     used = [names_of(entry.tree) for entry in given if entry.tree is not None]
     return parameters_in(right, truth).difference(*used)
 
 
 def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:
-    """Return the file's parameters that elements have."""
+    """Return the file's parameters that occur in elements."""
     return frozenset().union(*map(names_in, array.flat)) & frozenset(truth.description.parameters)
 
 
@@ -223,12 +231,12 @@ def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> F
 
 
 def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
-    """Judge C by C qd: each row's entries share what is found of their sum with the rates."""
-    found: dict[Index, Finding] = {}
+    """Judge C by C qd: the entries of a row share the finding on their sum with the rates."""
+    findings: dict[Index, Finding] = {}
     for i in range(len(right)):
         row = [entry for entry in given if entry.index[0] == i]
         if any(entry.is_missing for entry in row):
-            found |= _part_of_row(row, by, truth)
+            findings |= _judge_partial_row(row, by, truth)
             continue
         error = next((entry.error for entry in row if entry.tree is None), "")
         terms = tuple(
@@ -239,16 +247,16 @@ def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth
             finding = replace(
                 finding, statement=f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
             )
-        found |= {entry.index: finding for entry in row}
+        findings |= {entry.index: finding for entry in row}
         if finding.verdict is Verdict.WRONG:
-            found |= _right_in_wrong_row(row, finding, by, truth)
-    return found
+            findings |= _judge_wrong_row(row, finding, by, truth)
+    return findings
 
 
-def _right_in_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth: Truth) -> dict[Index, Finding]:
-    """Return what is right in a wrong row of C: the entries of the Christoffel factorization.
+def _judge_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth: Truth) -> dict[Index, Finding]:
+    """Return the right entries of a wrong row of C: those of the Christoffel factorization.
 
-    Zeros are right beside others only: a row of zeros is a row that was left out.
+    Zeros are right only beside other entries: a row of zeros is a row that was left out.
     """
     christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
     alike = [e for e in row if _finding(e.tree, e.error, christoffel[e.index], by).verdict is Verdict.CORRECT]
@@ -260,20 +268,20 @@ def _right_in_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, tr
     return {entry.index: right for entry in alike}
 
 
-def _part_of_row(row: Sequence[Given], by: Comparison, truth: Truth) -> dict[Index, Finding]:
-    """Judge a row of C that lacks entries: what is there is right if it is the Christoffel factorization's.
+def _judge_partial_row(row: Sequence[Given], by: Comparison, truth: Truth) -> dict[Index, Finding]:
+    """Judge a row of C that lacks entries: those of the Christoffel factorization are right.
 
-    Another factorization may be right too, but its row alone would show that.
+    Another factorization may be right too, but only the whole row could show it.
     """
     christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
     lacking = ", ".join(f"C{entry.index[0] + 1}{entry.index[1] + 1}" for entry in row if entry.is_missing)
-    found: dict[Index, Finding] = {}
+    findings: dict[Index, Finding] = {}
     for entry in row:
         finding = _finding(entry.tree, entry.error, christoffel[entry.index], by)
         if finding.verdict is Verdict.WRONG:
             finding = Finding(Verdict.INCOMPLETE, f"not judged: C is judged by rows of C qd, and {lacking} is missing")
-        found[entry.index] = finding
-    return found
+        findings[entry.index] = finding
+    return findings
 
 
 def _rate(coordinates: Coordinates, j: int) -> Tree:
@@ -282,30 +290,30 @@ def _rate(coordinates: Coordinates, j: int) -> Tree:
     return names[0][1] if len(names) == 1 else Sum(names)
 
 
-# What must vanish
+# Residuals
 
 
-def _residuals(name: str, task: Task) -> Residuals:
-    """Return what must be zero: energies count from any zero, L perhaps up to a total derivative."""
+def _residuals(name: str, task: Requirements) -> Residuals:
+    """Return the residuals of a quantity: energies count from any zero, L perhaps up to a total derivative."""
     if name == "V":
         return _slopes
     if name == "L":
         return _euler_lagrange if task.total_derivative else _slopes
-    return EXACT
+    return exact_difference
 
 
 def _slopes(answer: Quotient, truth: Element) -> Sequence[Element]:
-    """Return the derivatives of the difference by the state, times the square of the denominator."""
+    """Return the derivatives of the difference by q and qd, times the square of the denominator."""
     numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
     if _accelerates(numerator) or _accelerates(denominator):
         return [numerator]
     slopes = []
-    for derivative in ("by_position", "by_rate"):
+    for derivative in (Element.by_position, Element.by_rate):
         for i in range(truth.ring.n):
-            change = getattr(numerator, derivative)(i)
+            slope = derivative(numerator, i)
             if not answer.is_polynomial:
-                change = change * denominator - numerator * getattr(denominator, derivative)(i)
-            slopes.append(change)
+                slope = slope * denominator - numerator * derivative(denominator, i)
+            slopes.append(slope)
     return slopes
 
 

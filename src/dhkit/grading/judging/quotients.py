@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -11,23 +11,25 @@ from dhkit.expressions import CONSTANTS, Budget, Expression, exact_angle
 from dhkit.expressions.exact import Atom
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.symbolic.ring import Element, Ring, RingError
+from dhkit.symbolic.ring import Direction, Element, Ring, RingError
 
 MAX_EXPONENT = 64
+"""Largest exponent, and largest multiple of a joint variable in an angle, that is multiplied out."""
 MAX_WORK = 300_000
-"""Work that reading one entry may take: pairs of terms in products, weighted by the size of their coefficients. A
-PUMA's longest entry takes 60,000; the bound is about a second on sympy's rings."""
-WEIGHED_BITS = 256
+"""Largest work of reading one entry: pairs of terms in products, weighted by the size of their coefficients. A PUMA's
+longest entry takes 60,000; the bound is about a second on sympy's rings."""
+WEIGHTED_BITS = 256
 """Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
 MAX_TERMS = 60_000
-MAX_BITS = 8_192
+"""Largest number of terms of a product."""
+MAX_COEFFICIENT_BITS = 8_192
 """Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
 MAX_DIVISORS = 16
-"""Divisors that are kept, to say where an entry is undefined."""
-CHECKED = 64
-"""Terms of a sum after which its coefficients' size is measured."""
-TOO_LONG = "a number too long to be kept exactly"
-TOO_MUCH = "it multiplies out to too many terms"
+"""Largest number of divisors that are kept, to say where an entry is undefined."""
+CHECK_INTERVAL = 64
+"""Terms of a sum after which the size of its coefficients is measured."""
+NUMBER_TOO_LONG = "a number too long to be kept exactly"
+TOO_MANY_TERMS = "it multiplies out to too many terms"
 
 
 class OutsideTheRingError(Exception):
@@ -36,7 +38,7 @@ class OutsideTheRingError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Quotient:
-    """An answer as a quotient; its denominator is not zero."""
+    """An answer as a quotient of ring elements; its denominator is not zero."""
 
     numerator: Element
     denominator: Element
@@ -57,7 +59,7 @@ class Quotient:
         return (self.numerator * other.denominator - other.numerator * self.denominator).is_zero
 
     def element(self) -> Element | None:
-        """Return the element that this is, where the division leaves no remainder."""
+        """Return this quotient as an element; None if the division leaves a remainder."""
         if self.is_polynomial:
             return self.numerator
         ring = self.numerator.ring
@@ -65,46 +67,41 @@ class Quotient:
         return None if polynomial is None else Element(ring, polynomial).reduced()
 
 
-class Reading:
+class RingReader:
     """Reads syntax trees into a ring.
 
     Parameters
     ----------
     ring
-        Where the truth is.
-    others
-        Numbers of the file's parameters that the ring does not have.
-    degrees
-        Whether the joint variables in angles are multiplied by a factor that is to be taken off: what an answer would
-        be if its angles were not confused with degrees.
-
-    Raises
-    ------
-    AnswerError
-        A division by zero.
+        Ring of the truth.
+    numbers
+        Values of the file's parameters that the ring does not have, in SI units and rad.
+    angle_factor
+        Factor, 1/180 or 180, by which joint variables in angles are multiplied besides pi or 1/pi, and which is taken
+        off: the answer is read as if its angles had not been confused with degrees. None if there is no such factor.
     """
 
     def __init__(
-        self, ring: Ring, degrees: Fraction | None = None, others: Mapping[str, Fraction] | None = None
+        self, ring: Ring, angle_factor: Fraction | None = None, numbers: Mapping[str, Fraction] | None = None
     ) -> None:
         self.ring = ring
-        self.others = others or {}
-        self.degrees = degrees
+        self.numbers = numbers or {}
+        self.angle_factor = angle_factor
         self.divisors: list[Element] = []
-        """What the last entry divides by, numbers left out: where one is zero, the entry is undefined."""
+        """Divisors of the last entry, numbers left out: the entry is undefined at states where one is zero."""
         self._work = 0
         self._shared: dict[int, Quotient] = {}
-        self._angles: dict[Expression, tuple[Element, Element]] = {}
+        self._angles: dict[Expression, Direction] = {}
         self._names = [f"q{i + 1}" for i in range(ring.n)]
         self._constants = set(ring.constants)
 
     def read(self, tree: Tree) -> Quotient:
-        """Return what a tree in the robot's own names is.
+        """Return a tree in the robot's own names as a quotient.
 
         Raises
         ------
         OutsideTheRingError
-            It cannot be written in the ring, or only with too much work.
+            The tree cannot be written in the ring, or only with too much work.
         AnswerError
             A division by zero.
         """
@@ -114,22 +111,22 @@ class Reading:
         try:
             return self._quotient(tree)
         except RingError:
-            raise OutsideTheRingError(TOO_MUCH) from None
+            raise OutsideTheRingError(TOO_MANY_TERMS) from None
 
     def _quotient(self, tree: Tree) -> Quotient:
         # CasADi's graphs share what is used twice.
-        found = self._shared.get(id(tree))
-        if found is None:
-            found = self._shared[id(tree)] = self._read(tree)
-        return found
+        quotient = self._shared.get(id(tree))
+        if quotient is None:
+            quotient = self._shared[id(tree)] = self._read(tree)
+        return quotient
 
     def _read(self, tree: Tree) -> Quotient:
         match tree:
             case Number(value=value):
                 bits = value.numerator.bit_length() + value.denominator.bit_length()
-                return Quotient(self.ring.number(value), self.ring.one, bits)
+                return self._polynomial(self.ring.number(value), bits)
             case Name(text):
-                return self._whole(self._name(text))
+                return self._polynomial(self._name(text))
             case Sum(terms):
                 return self._sum(terms)
             case Product(factors):
@@ -139,15 +136,12 @@ class Reading:
             case Call(function, arguments):
                 return self._call(function, arguments)
 
-    def _whole(self, element: Element) -> Quotient:
-        return Quotient(element, self.ring.one)
-
     def _name(self, text: str) -> Element:
         ring = self.ring
         if text in self._constants:
             return ring.constant(text)
-        if text in self.others:
-            return ring.number(self.others[text])
+        if text in self.numbers:
+            return ring.number(self.numbers[text])
         if text in CONSTANTS:
             unit = CONSTANTS[text].rational
             if unit is None:
@@ -162,48 +156,58 @@ class Reading:
                 return Element(ring, ring.polynomials.generator(place))
         raise OutsideTheRingError(f"{text}, which the equations do not have,")
 
+    def _polynomial(self, element: Element, bits: int = 1) -> Quotient:
+        return Quotient(element, self.ring.one, bits)
+
     def _sum(self, terms: tuple[tuple[bool, Tree], ...]) -> Quotient:
-        """Add terms, those over 1 first."""
+        """Add terms; those with denominator 1 are collected and added in groups."""
         one = self.ring.one
-        whole: list[Element] = []
-        over_one = Quotient(self.ring.zero, one)
-        total: Quotient | None = None
+        pending: list[Element] = []
+        polynomials = Quotient(self.ring.zero, one)
+        fractions: Quotient | None = None
         for k, (added, term) in enumerate(terms, start=1):
             quotient = self._quotient(term)
-            above = quotient.numerator if added else -quotient.numerator
+            signed = Quotient(quotient.numerator if added else -quotient.numerator, quotient.denominator, quotient.bits)
             if quotient.denominator is one:
-                whole.append(above)
-                over_one = Quotient(over_one.numerator, one, over_one.bits + quotient.bits)
-            elif total is None:
-                total = Quotient(above, quotient.denominator, quotient.bits)
-            elif total.denominator.polynomial == quotient.denominator.polynomial:
-                total = Quotient(total.numerator + above, total.denominator, total.bits + quotient.bits)
+                pending.append(signed.numerator)
+                polynomials = Quotient(polynomials.numerator, one, polynomials.bits + quotient.bits)
             else:
-                above = self._times(total.numerator, quotient.denominator) + self._times(above, total.denominator)
-                below = self._times(total.denominator, quotient.denominator)
-                total = self._bounded(Quotient(above, below, total.bits + quotient.bits))
-            if k % CHECKED == 0 or k == len(terms):
-                over_one = self._bounded(Quotient(self.ring.sum([over_one.numerator, *whole]), one, over_one.bits))
-                whole = []
-        if total is None:
-            return over_one
-        above = total.numerator + self._times(over_one.numerator, total.denominator)
-        return self._bounded(Quotient(above, total.denominator, total.bits + over_one.bits))
+                fractions = signed if fractions is None else self._add_fractions(fractions, signed)
+            if k % CHECK_INTERVAL == 0 or k == len(terms):
+                total = self.ring.sum([polynomials.numerator, *pending])
+                polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits))
+                pending = []
+        if fractions is None:
+            return polynomials
+        numerator = fractions.numerator + self._multiply(polynomials.numerator, fractions.denominator)
+        bits = fractions.bits + polynomials.bits
+        return self._bound_coefficients(Quotient(numerator, fractions.denominator, bits))
+
+    def _add_fractions(self, a: Quotient, b: Quotient) -> Quotient:
+        bits = a.bits + b.bits
+        if a.denominator.polynomial == b.denominator.polynomial:
+            return Quotient(a.numerator + b.numerator, a.denominator, bits)
+        numerator = self._multiply(a.numerator, b.denominator) + self._multiply(b.numerator, a.denominator)
+        denominator = self._multiply(a.denominator, b.denominator)
+        return self._bound_coefficients(Quotient(numerator, denominator, bits))
 
     def _product(self, factors: tuple[tuple[bool, Tree], ...]) -> Quotient:
-        product = Quotient(self.ring.one, self.ring.one)
-        for multiplied, factor in factors:
+        product = self._polynomial(self.ring.one)
+        for is_factor, factor in factors:
             quotient = self._quotient(factor)
-            if not multiplied:
-                self._divides_by(quotient.numerator)
-            top, bottom = (
-                (quotient.numerator, quotient.denominator) if multiplied else (quotient.denominator, quotient.numerator)
+            parts = (quotient.numerator, quotient.denominator)
+            if not is_factor:
+                self._note_divisor(quotient.numerator)
+                parts = parts[::-1]
+            numerator, denominator = (
+                self._multiply(old, part)
+                for old, part in zip((product.numerator, product.denominator), parts, strict=True)
             )
-            above, below = self._times(product.numerator, top), self._times(product.denominator, bottom)
-            product = self._bounded(Quotient(above, below, product.bits + quotient.bits))
-        return self._divided(product.numerator, product.denominator, product.bits)
+            product = self._bound_coefficients(Quotient(numerator, denominator, product.bits + quotient.bits))
+        return self._divide(product.numerator, product.denominator, product.bits)
 
-    def _divided(self, numerator: Element, denominator: Element, bits: int = 1) -> Quotient:
+    def _divide(self, numerator: Element, denominator: Element, bits: int = 1) -> Quotient:
+        """Return a quotient of elements, a polynomial if the denominator is a number."""
         if denominator is self.ring.one:
             return Quotient(numerator, denominator, bits)
         if denominator.is_zero:
@@ -211,65 +215,81 @@ class Reading:
         number = _rational(denominator)
         if number is None:
             return Quotient(numerator, denominator, bits)
-        return Quotient(numerator * (1 / number), self.ring.one, bits)
+        return self._polynomial(numerator * (1 / number), bits)
 
-    def _divides_by(self, element: Element) -> None:
-        """Note a divisor that is no number."""
+    def _note_divisor(self, element: Element) -> None:
+        """Keep a divisor unless it is a number."""
         if _rational(element) is not None or len(self.divisors) >= MAX_DIVISORS:
             return
         if not any(element.polynomial == other.polynomial for other in self.divisors):
             self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:
-        quotient = self._quotient(base)
-        if quotient.bits * abs(exponent) > MAX_BITS:
-            quotient = self._bounded(Quotient(quotient.numerator, quotient.denominator, MAX_BITS + 1))
-            if quotient.bits * abs(exponent) > 4 * MAX_BITS:
-                raise OutsideTheRingError(TOO_LONG)
-        above, below = (self._raised(part, abs(exponent)) for part in (quotient.numerator, quotient.denominator))
+        quotient, power = self._quotient(base), abs(exponent)
+        if quotient.bits * power > MAX_COEFFICIENT_BITS:
+            quotient = self._bound_coefficients(
+                Quotient(quotient.numerator, quotient.denominator, MAX_COEFFICIENT_BITS + 1)
+            )
+            if quotient.bits * power > 4 * MAX_COEFFICIENT_BITS:
+                raise OutsideTheRingError(NUMBER_TOO_LONG)
+        numerator, denominator = (self._raise(part, power) for part in (quotient.numerator, quotient.denominator))
         if exponent < 0:
-            self._divides_by(quotient.numerator)
-            above, below = below, above
-        return self._bounded(self._divided(above, below, max(1, quotient.bits * abs(exponent))))
+            self._note_divisor(quotient.numerator)
+            numerator, denominator = denominator, numerator
+        return self._bound_coefficients(self._divide(numerator, denominator, max(1, quotient.bits * power)))
 
-    def _bounded(self, quotient: Quotient) -> Quotient:
-        """Refuse coefficients of thousands of digits, whose arithmetic nobody waits for."""
-        if quotient.bits <= MAX_BITS:
+    def _bound_coefficients(self, quotient: Quotient) -> Quotient:
+        """Return a quotient whose coefficients are short enough, with their size measured if it was not known.
+
+        Raises
+        ------
+        OutsideTheRingError
+            A coefficient exceeds :data:`MAX_COEFFICIENT_BITS`.
+        """
+        if quotient.bits <= MAX_COEFFICIENT_BITS:
             return quotient
-        bits = max((_bits(element) for element in (quotient.numerator, quotient.denominator)), default=1)
-        if bits > MAX_BITS:
-            raise OutsideTheRingError(TOO_LONG)
+        bits = max(_bits(quotient.numerator), _bits(quotient.denominator))
+        if bits > MAX_COEFFICIENT_BITS:
+            raise OutsideTheRingError(NUMBER_TOO_LONG)
         return Quotient(quotient.numerator, quotient.denominator, bits)
 
-    def _raised(self, element: Element, exponent: int) -> Element:
+    def _raise(self, element: Element, exponent: int) -> Element:
+        """Return a power by repeated squaring."""
         result = self.ring.one
         for bit in f"{exponent:b}" if exponent else "":
-            result = self._times(result, result)
+            result = self._multiply(result, result)
             if bit == "1":
-                result = self._times(result, element)
+                result = self._multiply(result, element)
         return result
 
-    def _times(self, left: Element, right: Element) -> Element:
+    def _multiply(self, left: Element, right: Element) -> Element:
+        """Return a product, its work counted.
+
+        Raises
+        ------
+        OutsideTheRingError
+            The entry exceeds :data:`MAX_WORK`, or the product :data:`MAX_TERMS`.
+        """
         if left is self.ring.one:
             return right
         if right is self.ring.one:
             return left
         pairs = len(left) * len(right)
-        self._work += pairs + (pairs * _bits(right) // WEIGHED_BITS if pairs > CHECKED else 0)
+        self._work += pairs + (pairs * _bits(right) // WEIGHTED_BITS if pairs > CHECK_INTERVAL else 0)
         if self._work > MAX_WORK:
-            raise OutsideTheRingError(TOO_MUCH)
+            raise OutsideTheRingError(TOO_MANY_TERMS)
         product = left * right
         if len(product) > MAX_TERMS:
-            raise OutsideTheRingError(TOO_MUCH)
+            raise OutsideTheRingError(TOO_MANY_TERMS)
         return product
 
     def exponent(self, tree: Tree) -> int:
-        """Return the whole number that an exponent is.
+        """Return the value of an exponent.
 
         Raises
         ------
         OutsideTheRingError
-            It is none, or too large to multiply out.
+            The exponent is no whole number, or exceeds :data:`MAX_EXPONENT`.
         """
         try:
             number = value_of(tree, ()).rational
@@ -282,100 +302,107 @@ class Reading:
         return int(number)
 
     def _call(self, function: str, arguments: tuple[Tree, ...]) -> Quotient:
-        if function in ("sin", "cos", "tan"):
-            cosine, sine = self._direction(arguments[0])
-            if function == "tan":
-                self._divides_by(cosine)
-                return self._divided(sine, cosine)
-            return self._whole(cosine if function == "cos" else sine)
-        if function in ("sign", "abs", "sqrt", "asin", "acos", "atan", "atan2"):
-            return self._constant(function, arguments)
+        match function:
+            case "sin" | "cos" | "tan":
+                cosine, sine = self._direction(arguments[0])
+                if function != "tan":
+                    return self._polynomial(cosine if function == "cos" else sine)
+                self._note_divisor(cosine)
+                return self._divide(sine, cosine)
+            case "sign" | "abs" | "sqrt" | "asin" | "acos" | "atan" | "atan2":  # of parameters and numbers
+                try:
+                    with Budget():
+                        expression = value_of(Call(function, arguments, 0), [*self._constants, *self._names])
+                    return self._polynomial(self.ring.read(expression))
+                except (ExpressionError, RingError):
+                    pass
         raise OutsideTheRingError(f"{function}()")
 
-    def _constant(self, function: str, arguments: tuple[Tree, ...]) -> Quotient:
-        """Read a function of parameters alone: a root of a number, or what the file has too."""
+    def _direction(self, angle: Tree) -> Direction:
+        """Return cosine and sine of a sum of whole multiples of joint variables and constant angles."""
+        symbols = {name for constant in self.ring.given for name in constant.symbols}
         try:
             with Budget():
-                expression = value_of(Call(function, arguments, 0), [*self._constants, *self._names])
-            return self._whole(self.ring.read(expression))
-        except (ExpressionError, RingError):
-            raise OutsideTheRingError(f"{function}()") from None
-
-    def _direction(self, angle: Tree) -> tuple[Element, Element]:
-        """Return cosine and sine of whole multiples of joint variables and of constant angles."""
-        try:
-            with Budget():
-                expression = exact_angle(value_of(angle, [*self._symbols, *self._names]))
+                expression = exact_angle(value_of(angle, [*symbols, *self._names]))
         except ExpressionError:
             raise OutsideTheRingError("an angle that is no sum") from None
         if expression not in self._angles:
-            self._angles[expression] = self._turned(expression)
+            self._angles[expression] = self._direction_of(expression)
         return self._angles[expression]
 
-    @property
-    def _symbols(self) -> set[str]:
-        return {name for constant in self.ring.given for name in constant.symbols}
-
-    def _turned(self, angle: Expression) -> tuple[Element, Element]:
-        c, s = self.ring.one, self.ring.zero
+    def _direction_of(self, angle: Expression) -> Direction:
+        direction = self.ring.one, self.ring.zero
         rest = []
         for monomial, coefficient in angle.terms:
-            name = monomial[0][0].name if monomial else ""
-            if name in self._names and monomial == ((Atom(name), 1),) and self.degrees is None:
-                turn = self._multiple(int(name[1:]) - 1, coefficient)
-            elif self.degrees is not None and (own := _with_degrees(monomial, coefficient, self.degrees)):
-                turn = self._multiple(own[0], own[1])
-            else:
+            joint_multiple = self._joint_multiple(monomial, coefficient)
+            if joint_multiple is None:
                 rest.append((monomial, coefficient))
-                continue
-            c, s = self._turn((c, s), turn)
+            else:
+                direction = self._add_angles(direction, self._multiple_angle(*joint_multiple))
         if rest:
+            constant = Expression(tuple(rest))
             try:
-                constant = self.ring.direction(exact_angle(Expression(tuple(rest))))
+                direction = self._add_angles(direction, self.ring.direction(exact_angle(constant)))
             except (RingError, ExpressionError):
-                raise OutsideTheRingError(f"an angle of {Expression(tuple(rest))}") from None
-            c, s = self._turn((c, s), constant)
-        return c, s
+                raise OutsideTheRingError(f"an angle of {constant}") from None
+        return direction
 
-    def _multiple(self, i: int, times: Fraction) -> tuple[Element, Element]:
-        """Return cosine and sine of a whole multiple of joint i's variable."""
-        if times.denominator != 1 or i not in self.ring.angles:
-            raise OutsideTheRingError(
-                f"an angle of {times} q{i + 1}" if i in self.ring.angles else f"an angle of q{i + 1}"
-            )
+    def _joint_multiple(
+        self, monomial: tuple[tuple[Atom, int], ...], coefficient: Fraction
+    ) -> tuple[int, Fraction] | None:
+        """Return joint (from 0) and multiple of a term k q, or of k pi/180 q or k 180/pi q; None for other terms."""
+        powers = {atom.name: exponent for atom, exponent in monomial}
+        joints = [name for name in powers if name.startswith("q") and name[1:].isdecimal()]
+        if len(joints) != 1 or powers[joints[0]] != 1:
+            return None
+        joint = int(joints[0][1:]) - 1
+        if self.angle_factor is None:
+            return (joint, coefficient) if joints[0] in self._names and len(monomial) == 1 else None
+        unit = {"pi": 1 if self.angle_factor < 1 else -1}
+        return (joint, coefficient / self.angle_factor) if powers == {joints[0]: 1, **unit} else None
+
+    def _multiple_angle(self, i: int, times: Fraction) -> Direction:
+        """Return cosine and sine of a whole multiple of the variable of joint i, from 0."""
+        if i not in self.ring.angles:
+            raise OutsideTheRingError(f"an angle of q{i + 1}")
+        if times.denominator != 1:
+            raise OutsideTheRingError(f"an angle of {times} q{i + 1}")
         if abs(times) > MAX_EXPONENT:
             raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {MAX_EXPONENT} times")
-        one = (self.ring.cosine(i), self.ring.sine(i))
-        turn = (self.ring.one, self.ring.zero)
+        single = (self.ring.cosine(i), self.ring.sine(i))
+        cosine, sine = self.ring.one, self.ring.zero
         for _ in range(abs(int(times))):
-            turn = self._turn(turn, one)
-        return turn if times > 0 else (turn[0], -turn[1])
+            cosine, sine = self._add_angles((cosine, sine), single)
+        return (cosine, sine if times > 0 else -sine)
 
-    def _turn(self, a: tuple[Element, Element], b: tuple[Element, Element]) -> tuple[Element, Element]:
-        times = self._times
+    def _add_angles(self, a: Direction, b: Direction) -> Direction:
+        """Return cosine and sine of a sum of angles, the work counted."""
+        times = self._multiply
         return times(a[0], b[0]) - times(a[1], b[1]), times(a[1], b[0]) + times(a[0], b[1])
 
 
+def multiple_angle(ring: Ring, joint: int, times: int) -> Direction:
+    """Return cosine and sine of a multiple of the variable of a turning joint, from 0."""
+    single = (ring.cosine(joint), ring.sine(joint) * (1 if times > 0 else -1))
+    return sum_of_angles(ring, [single] * abs(times))
+
+
+def sum_of_angles(ring: Ring, directions: Iterable[Direction]) -> Direction:
+    """Return cosine and sine of a sum of angles."""
+    c, s = ring.one, ring.zero
+    for x, y in directions:
+        c, s = c * x - s * y, s * x + c * y
+    return c, s
+
+
 def _rational(element: Element) -> Fraction | None:
-    """Return the number that an element is."""
+    """Return an element's value; None if it is no number."""
     if len(element) != 1:
         return None
     ((monomial, coefficient),) = element.terms.items()
     return None if any(monomial) else coefficient
 
 
-def _with_degrees(
-    monomial: tuple[tuple[Atom, int], ...], coefficient: Fraction, factor: Fraction
-) -> tuple[int, Fraction] | None:
-    """Return the joint, from 0, and its multiple, of a term q pi/180 or q 180/pi; nothing of another term."""
-    powers = {atom.name: exponent for atom, exponent in monomial}
-    joints = [name for name in powers if name.startswith("q") and name[1:].isdecimal()]
-    if len(joints) != 1 or powers[joints[0]] != 1:
-        return None
-    expected = {"pi": 1} if factor < 1 else {"pi": -1}
-    return (int(joints[0][1:]) - 1, coefficient / factor) if powers == {joints[0]: 1, **expected} else None
-
-
 def _bits(element: Element) -> int:
-    """Return how long the longest coefficient is."""
+    """Return the size of the longest coefficient in bits."""
     return max((c.numerator.bit_length() + c.denominator.bit_length() for c in element.terms.values()), default=1)

@@ -1,11 +1,11 @@
-"""Whether decimals that were rounded allow the truth, coefficient by coefficient.
+"""Rounding: whether an answer's decimals, moved within their last digit, make it the truth, coefficient by coefficient.
 
-An answer is multiplied out as it was typed: sines and cosines of the angles that stand there are left as they are, no
+An answer is multiplied out as it was typed: sines and cosines of the angles that it contains are left as they are, no
 relation between them is used, and each coefficient keeps a relative allowance, half a unit in the last place of its
 coarsest decimal. The answer is right within rounding if coefficients within their allowances make it equal to the
-truth, which is a linear program. Cancellation grants nothing: where contributions of both signs meet in a coefficient,
-it is allowed no more than the finest of them; and what the answer differs by in the ring's normal form must be small
-beside the truth's own coefficients, so that sines and cosines that cancel by an identity grant nothing either.
+truth, which is a linear program. Cancellation grants no allowance: a coefficient with contributions of both signs gets
+no more than the finest of them; and the answer's difference in the ring's normal form must be small beside the truth's
+own coefficients, so that sines and cosines that cancel by an identity grant none either.
 """
 
 from __future__ import annotations
@@ -19,47 +19,48 @@ import numpy as np
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.judging.numeric import parts_of
-from dhkit.grading.judging.quotients import Quotient, Reading
-from dhkit.symbolic.ring import Element, Ring, RingError
+from dhkit.grading.judging.quotients import Quotient, RingReader
+from dhkit.symbolic.ring import Element, RingError
+from dhkit.symbolic.ring.elements import PolynomialRing
 
 Residuals = Callable[[Quotient, Element], Sequence[Element]]
-"""What must be zero for an answer to be right, given the answer and the truth."""
+"""Returns elements that are zero for a right answer, given the answer and the truth."""
 Monomial = tuple[tuple[int, int], ...]
-"""Atoms by their numbers with their exponents: names, and sines and cosines of whole angles."""
+"""Numbers of atoms (names, sines and cosines of whole angles) with their exponents."""
 
 DOUBLE_DIGITS = 15
-"""Significant digits from which a decimal is taken for the print of a computed double."""
+"""Significant digits from which a decimal is taken for a printed double."""
 DOUBLE_ALLOWANCE = Fraction(8, 2**52)
-"""Relative: eight units in the last place of a double, what a few dozen operations may lose."""
+"""Relative allowance of a printed double: eight units in its last place, the loss of a few dozen operations."""
 MAX_WORK = 200_000
-"""Products of two terms that multiplying an answer out may take; a second."""
+"""Largest number of products of two terms in multiplying an answer out: about a second."""
 MAX_COEFFICIENTS = 2_000
-"""Coefficients with an allowance: a PUMA's longest entry in numbers has 300."""
-SLACK = Fraction(1, 10**9)
-"""Relative: what the linear program's doubles may differ by at the edge of an allowance."""
-NOISE = 1e-15
-"""Relative: equations without a rounded coefficient hold to this where the ring has numbers such as sqrt(2), which are
-doubles here; exactly elsewhere."""
+"""Largest number of coefficients with an allowance: a PUMA's longest entry in numbers has 300."""
+SOLVER_MARGIN = Fraction(1, 10**9)
+"""Relative error of the linear program's doubles at the edge of an allowance."""
+DOUBLE_NOISE = 1e-15
+"""Relative tolerance of equations without a rounded coefficient if the ring has numbers such as sqrt(2), which are
+doubles here; without such numbers they hold exactly."""
 
 
 class _TooLongError(Exception):
-    """Multiplying out takes more work than an allowance is worth."""
+    """Multiplying an answer out exceeds :data:`MAX_WORK`."""
 
 
 @dataclass(frozen=True)
 class _Coefficient:
-    """The contributions to one monomial, those of each sign added up.
+    """Sum of the contributions to the coefficient of one monomial, kept apart by their signs.
 
     Attributes
     ----------
     positive, negative
-        Sizes of the contributions of each sign.
+        Sums of the sizes of contributions of each sign.
     allowed
         Sum of the contributions' sizes, each times its relative allowance.
     finest, coarsest
-        The least and the largest relative allowance of a contribution.
+        Smallest and largest relative allowance of a contribution.
     is_printed
-        Whether a contribution holds the print of a computed double.
+        Whether a contribution contains a printed double.
     """
 
     positive: Fraction
@@ -103,17 +104,17 @@ Polynomial = dict[Monomial, _Coefficient]
 
 
 class _Expansion:
-    """Multiplies trees out in atoms, as pairs of numerator and denominator."""
+    """Multiplies trees out into pairs of numerator and denominator, polynomials in atoms."""
 
-    def __init__(self, reading: Reading, digits: int) -> None:
-        self.reading = reading
+    def __init__(self, reader: RingReader, digits: int) -> None:
+        self.reader = reader
         self.digits = digits
         self.work = 0
         self.atoms: list[Element] = []
         self.one: Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
         self._numbers: dict[Any, int] = {}
         self._shared: dict[int, tuple[Polynomial, Polynomial]] = {}
-        self._images: dict[Monomial, Element] = {(): reading.ring.one}
+        self._images: dict[Monomial, Element] = {(): reader.ring.one}
 
     def of(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
         # CasADi's graphs share what is used twice.
@@ -127,21 +128,21 @@ class _Expansion:
                 share = _allowance(value, text, self.digits)
                 return self._number(value, share, share == DOUBLE_ALLOWANCE), self.one
             case Name() | Call():
-                quotient = self.reading.read(tree)
+                quotient = self.reader.read(tree)
                 return self._atom(quotient.numerator), self._atom(quotient.denominator)
             case Power(base, exponent):
-                return self._power(self.of(base), self.reading.exponent(exponent))
+                return self._power(self.of(base), self.reader.exponent(exponent))
             case Sum(terms):
                 return self._sum(terms)
             case Product(factors):
                 top, bottom = self.one, self.one
-                for multiplied, factor in factors:
-                    above, below = self.of(factor) if multiplied else self.of(factor)[::-1]
-                    top, bottom = self._normalised(self._times(top, above), self._times(bottom, below))
+                for is_factor, factor in factors:
+                    numerator, denominator = self.of(factor) if is_factor else self.of(factor)[::-1]
+                    top, bottom = self._normalize(self._multiply(top, numerator), self._multiply(bottom, denominator))
                 return top, bottom
 
     def image(self, monomial: Monomial) -> Element:
-        """Return what a monomial is in the ring."""
+        """Return a monomial as an element of the ring."""
         if monomial not in self._images:
             (atom, exponent), *rest = monomial
             lower = (*(((atom, exponent - 1),) if exponent > 1 else ()), *rest)
@@ -164,18 +165,18 @@ class _Expansion:
         top: Polynomial = {}
         bottom = self.one
         for added, term in terms:
-            above, below = self.of(term)
+            numerator, denominator = self.of(term)
             if not added:
-                above = {m: -c for m, c in above.items()}
-            if not _same(bottom, below):
-                top, above = self._times(top, below), self._times(above, bottom)
-                bottom = self._times(bottom, below)
+                numerator = {m: -c for m, c in numerator.items()}
+            if not _same(bottom, denominator):
+                top, numerator = self._multiply(top, denominator), self._multiply(numerator, bottom)
+                bottom = self._multiply(bottom, denominator)
             top = dict(top)
-            for m, c in above.items():
+            for m, c in numerator.items():
                 top[m] = top[m] + c if m in top else c
         return top, bottom
 
-    def _times(self, left: Polynomial, right: Polynomial) -> Polynomial:
+    def _multiply(self, left: Polynomial, right: Polynomial) -> Polynomial:
         if left is self.one:
             return right
         if right is self.one:
@@ -189,23 +190,23 @@ class _Expansion:
                 value = x.value * y.value
                 if value:
                     m = _product(a, b)
-                    made = _Coefficient.of(value, max(x.share, y.share), x.is_printed or y.is_printed)
-                    product[m] = product[m] + made if m in product else made
+                    contribution = _Coefficient.of(value, max(x.share, y.share), x.is_printed or y.is_printed)
+                    product[m] = product[m] + contribution if m in product else contribution
         return product
 
-    def _normalised(self, top: Polynomial, bottom: Polynomial) -> tuple[Polynomial, Polynomial]:
-        """Divide by a denominator that is a number."""
+    def _normalize(self, top: Polynomial, bottom: Polynomial) -> tuple[Polynomial, Polynomial]:
+        """Return numerator and denominator, divided by the denominator if that is a number."""
         if bottom is self.one or set(bottom) != {()} or not bottom[()].value:
             return top, bottom
         divisor = bottom[()]
-        return self._times(top, self._number(1 / divisor.value, divisor.share, divisor.is_printed)), self.one
+        return self._multiply(top, self._number(1 / divisor.value, divisor.share, divisor.is_printed)), self.one
 
     def _power(self, base: tuple[Polynomial, Polynomial], exponent: int) -> tuple[Polynomial, Polynomial]:
-        above, below = base if exponent >= 0 else base[::-1]
+        numerator, denominator = base if exponent >= 0 else base[::-1]
         top, bottom = self.one, self.one
         for _ in range(abs(exponent)):
-            top, bottom = self._times(top, above), self._times(bottom, below)
-        return self._normalised(top, bottom)
+            top, bottom = self._multiply(top, numerator), self._multiply(bottom, denominator)
+        return self._normalize(top, bottom)
 
 
 def _product(a: Monomial, b: Monomial) -> Monomial:
@@ -216,35 +217,36 @@ def _product(a: Monomial, b: Monomial) -> Monomial:
 
 
 def has_decimals(tree: Tree, digits: int) -> bool:
-    """Whether an answer has a decimal, outside angles and exponents, of so many significant digits or more."""
+    """Whether an answer has a decimal of at least so many significant digits outside angles and exponents."""
     parts = parts_of(tree, coefficients=True)
     return any(isinstance(part, Number) and _allowance(part.value, part.text, digits) for part in parts)
 
 
-def rounding_share(tree: Tree, truth: Element, reading: Reading, residuals: Residuals, digits: int) -> float | None:
-    """Return how much of its allowance the most changed coefficient needs for an answer to be the truth.
+def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Residuals, digits: int) -> float | None:
+    """Return the smallest share of their allowances by which coefficients have to change to make an answer the truth.
 
     Parameters
     ----------
     tree
         The answer.
     truth
-        What is right.
-    reading
+        The right value.
+    reader
         Reads angles and names into the truth's ring.
     residuals
-        What must be zero; linear in the answer.
+        Returns what is zero for a right answer; linear in the answer.
     digits
         Significant digits from which a decimal may have been rounded.
 
     Returns
     -------
     float or None
-        At most 1; None where no coefficients within their allowances make the answer right.
+        Share of the most changed coefficient, at most 1; None if no coefficients within their allowances make the
+        answer right.
     """
     if not has_decimals(tree, digits):
         return None
-    expansion = _Expansion(reading, digits)
+    expansion = _Expansion(reader, digits)
     try:
         top, bottom = expansion.of(tree)
     except _TooLongError:
@@ -257,11 +259,11 @@ def rounding_share(tree: Tree, truth: Element, reading: Reading, residuals: Resi
     def whole(polynomial: Polynomial) -> Element:
         return ring.sum(expansion.image(m) * c.value for m, c in polynomial.items())
 
-    def vanishing(change: Element) -> list[Element]:
-        """Return by how much a change of the numerator moves what must be zero."""
+    def residual_changes(change: Element) -> list[Element]:
+        """Return the change of the residuals by a change of the numerator."""
         return [change] if is_quotient else list(residuals(Quotient(truth + change, ring.one), truth))
 
-    printed_zero = DOUBLE_ALLOWANCE * max((abs(c) for c in truth.terms.values()), default=Fraction(0))
+    largest = max((abs(c) for c in truth.terms.values()), default=Fraction(0))
     try:
         numerator, denominator = whole(top), whole(bottom)
         columns = []
@@ -270,10 +272,10 @@ def rounding_share(tree: Tree, truth: Element, reading: Reading, residuals: Resi
             for monomial, coefficient in polynomial.items():
                 allowed = abs(coefficient.value) * coefficient.share
                 if coefficient.is_printed and polynomial is top:
-                    allowed = max(allowed, printed_zero)  # cos(pi/2) prints as 6e-17
+                    allowed = max(allowed, DOUBLE_ALLOWANCE * largest)  # cos(pi/2) prints as 6e-17
                 if allowed:
                     change = expansion.image(monomial) * factor * allowed
-                    columns.append(_coefficients(vanishing(change), ring))
+                    columns.append(_coefficients(residual_changes(change), ring))
                     for group in _groups(change):
                         shares[group] = max(shares.get(group, Fraction(0)), coefficient.coarsest)
     except RingError:
@@ -285,26 +287,26 @@ def rounding_share(tree: Tree, truth: Element, reading: Reading, residuals: Resi
     is_energy = not is_quotient and not _is_plain(residuals, truth)
     if not _is_small(difference, reference, shares, is_energy):
         return None
-    here = vanishing(difference)
-    noise = Fraction(NOISE) * max((abs(c) for c in truth.terms.values()), default=Fraction(0)) if _numbers(ring) else 0
-    share = _least_share(_coefficients(here, ring), columns, Fraction(noise))
+    here = residual_changes(difference)
+    noise = Fraction(DOUBLE_NOISE) * largest if _numbers(ring) else Fraction(0)
+    share = _least_share(_coefficients(here, ring), columns, noise)
     return share if share is not None and share <= 1 + 1e-9 else None
 
 
 def _groups(element: Element) -> dict[Any, list[Fraction]]:
-    """Return the coefficients' sizes by what stands beside sines, cosines and numbers: parameters, rates, slides."""
+    """Return the sizes of coefficients, grouped by the factors besides sines and cosines: parameters, rates, slides."""
     beside = [generator.kind not in ("sine", "cosine") for generator in element.ring.generators]
-    found: dict[Any, list[Fraction]] = {}
+    groups: dict[Any, list[Fraction]] = {}
     for (_, monomial), coefficient in _coefficients([element], element.ring).items():
         group = tuple(e for e, counts in zip(monomial, beside, strict=True) if counts)
-        found.setdefault(group, []).append(abs(coefficient))
-    return found
+        groups.setdefault(group, []).append(abs(coefficient))
+    return groups
 
 
 def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Fraction], is_energy: bool) -> bool:
     """Whether a difference is within the coarsest decimals' allowance of the truth's own coefficients.
 
-    Of an energy the terms without state do not count: it is measured from any zero.
+    An energy's terms that do not depend on the state are left out: energies count from any zero.
     """
     ring = difference.ring
     if is_energy:
@@ -315,13 +317,13 @@ def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Frac
     for group, sizes in _groups(difference).items():
         share = shares.get(group, Fraction(0)) + DOUBLE_ALLOWANCE
         largest = max(sizes)
-        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + SLACK):
+        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + SOLVER_MARGIN):
             return False
     return True
 
 
 def _is_plain(residuals: Residuals, truth: Element) -> bool:
-    """Whether the difference itself must be zero: then quotients are linear in their coefficients too."""
+    """Whether the residual is the difference itself: then quotients are linear in their coefficients too."""
     one = truth.ring.one
     return list(residuals(Quotient(truth + one, one), truth)) == [one]
 
@@ -331,7 +333,7 @@ def _same(left: Polynomial, right: Polynomial) -> bool:
 
 
 def _allowance(value: Fraction, text: str, digits: int) -> Fraction:
-    """Return half a unit of a decimal's last digit relative to the decimal; 0 for other numbers and shorter ones."""
+    """Return half a unit of a decimal's last digit relative to the decimal; 0 for shorter ones and other numbers."""
     mantissa, _, exponent = text.lower().partition("e")
     significant = len(mantissa.replace(".", "").lstrip("0"))
     if not value or ("." not in mantissa and not exponent) or significant < digits:
@@ -344,21 +346,21 @@ def _allowance(value: Fraction, text: str, digits: int) -> Fraction:
 Coefficients = Mapping[Any, Fraction]
 
 
-def _coefficients(residuals: Sequence[Element], ring: Ring) -> Coefficients:
-    """Return coefficients by residual and monomial; roots and cosines that are numbers are part of coefficients."""
+def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> Coefficients:
+    """Return coefficients by residual and monomial; constants that are numbers, such as roots, go into coefficients."""
     numbers = _numbers(ring)
-    found: dict[Any, Fraction] = {}
+    sums: dict[Any, Fraction] = {}
     for k, element in enumerate(residuals):
         for monomial, coefficient in element.terms.items():
             for place, number in numbers.items():
                 coefficient *= number ** monomial[place]
             rest = tuple(0 if place in numbers else e for place, e in enumerate(monomial)) if numbers else monomial
-            found[k, rest] = found.get((k, rest), Fraction(0)) + coefficient
-    return {place: value for place, value in found.items() if value}
+            sums[k, rest] = sums.get((k, rest), Fraction(0)) + coefficient
+    return {place: value for place, value in sums.items() if value}
 
 
-def _numbers(ring: Ring) -> dict[int, Fraction]:
-    """Return the ring's constants that are numbers, by their places."""
+def _numbers(ring: PolynomialRing) -> dict[int, Fraction]:
+    """Return the values of the ring's constants that are numbers, by their places."""
     return {
         place: generator.meaning.value()
         for place, generator in enumerate(ring.generators)
@@ -367,7 +369,7 @@ def _numbers(ring: Ring) -> dict[int, Fraction]:
 
 
 def _least_share(here: Coefficients, columns: Sequence[Coefficients], noise: Fraction) -> float | None:
-    """Return the least largest |x| with here + sum x columns = 0; None where there is no such x.
+    """Return the smallest possible maximum of |x| with here + sum x columns = 0; None if there is no such x.
 
     Equations are scaled by their largest entry, so that the solver's tolerance is a share of an allowance.
     """
@@ -376,15 +378,15 @@ def _least_share(here: Coefficients, columns: Sequence[Coefficients], noise: Fra
         for place, value in column.items():
             size[place] = max(size.get(place, Fraction(0)), abs(value))
     if any(place not in size and abs(value) > noise for place, value in here.items()):
-        return None  # a coefficient that no decimal has a part in
+        return None  # a coefficient to which no decimal contributes
     if any(place in size and abs(value) > size[place] * len(columns) for place, value in here.items()):
         return None
     if all(len(column) == 1 for column in columns) and len(size) == len(columns):
         return max((float(abs(here.get(place, Fraction(0))) / most) for place, most in size.items()), default=0.0)
-    return _solved(here, columns, size)
+    return _solve(here, columns, size)
 
 
-def _solved(here: Coefficients, columns: Sequence[Coefficients], size: Mapping[Any, Fraction]) -> float | None:
+def _solve(here: Coefficients, columns: Sequence[Coefficients], size: Mapping[Any, Fraction]) -> float | None:
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, hstack, vstack
 

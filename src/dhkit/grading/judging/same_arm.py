@@ -1,4 +1,4 @@
-"""Whether two tables are one arm in different frames: their joint axes are laid over one another, numerically."""
+"""Decision whether two tables are one arm in different frames: by a motion that maps their joint axes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,27 @@ from dhkit.description import Array, Convention
 from dhkit.grading.judging.frame_changes import SAME, FrameChange, frame_changes, joint_changes, wrapped
 from dhkit.grading.judging.table_arms import TableArm
 
-STEPS = 12
-"""Of Newton's method, which takes five or six from within an eighth of a turn."""
+MAX_STEPS = 12
+"""Largest number of Newton steps; five or six are enough from within an eighth of a turn."""
 STATES = 4
-"""Draws of joint values and parameters where numbers decide."""
+"""Random joint values and parameters at which two arms are compared in doubles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """Two arms as one: truth(senses q + offsets) = B answer(q) W."""
+    """Relation between two arms that are one: truth(senses q + offsets) = B answer(q) W.
+
+    Attributes
+    ----------
+    truth, answer
+        The arms.
+    senses
+        +1 or -1 for each joint, shape (n,).
+    offsets
+        The truth's joint values at the answer's zero pose, shape (n,), rad and m.
+    B
+        Motion of the answer's frame 0 to the truth's, shape (4, 4), m; W is that of frame n.
+    """
 
     truth: TableArm
     answer: TableArm
@@ -32,13 +44,13 @@ class Overlay:
 
     @cached_property
     def differences(self) -> Array:
-        """The answer's frames in the truth's, shape (n + 1, 4, 4)."""
+        """Poses of the answer's frames in the truth's, shape (n + 1, 4, 4), m."""
         own = self.truth.frames(self.offsets)
         D: Array = np.linalg.inv(own) @ self.B @ self.answer.frames(np.zeros(self.answer.n))
         return D
 
     def holds(self, scale: float) -> bool:
-        """Return whether both arms move alike in states that were not used to find out."""
+        """Whether both arms move alike at joint values that were not used to find the relation."""
         W = np.linalg.inv(self.differences[-1])
         for q in np.random.default_rng(1).uniform(-2, 2, (STATES, self.answer.n)):
             gap = self.truth.frames(self.senses * q + self.offsets)[-1] - self.B @ self.answer.frames(q)[-1] @ W
@@ -48,17 +60,17 @@ class Overlay:
         return True
 
     def allowed(self, strict: bool, scale: float) -> bool:
-        """Return whether the ends differ as free choices do, and not by a wrong number.
+        """Whether frames 0 and n differ by free choices, and not by a wrong number.
 
-        Frames 0 and n may be elsewhere by the file's own numbers, which the answer then leaves to base and tool. A last
-        link of another length, where the file gives it one (``strict``), is wrong in any case.
+        They may differ by the file's own numbers, which the answer then leaves to base and tool. A last link of another
+        length is wrong in any case if the file gives its length (``strict``).
         """
         tolerance, standard = SAME * scale, self.answer.convention is Convention.STANDARD
         first, last = self.differences[0], self.differences[-1]
         numbers, own = self.answer.entries, self.truth.entries
         if strict and standard and abs(abs(numbers[-1, 2]) - abs(own[-1, 2])) > tolerance:
             return False
-        # A wrong length elsewhere is no other zero of a sliding joint, though that could make up for it.
+        # A wrong length is not another zero of a sliding joint, though such a zero could make up for it.
         if np.any(np.abs(self.offsets[~_free(self.answer, self.truth)]) > tolerance):
             return False
         turns = np.abs(np.concatenate([first[:3, :3].ravel(), last[:3, :3].ravel()]))
@@ -75,17 +87,17 @@ class Overlay:
         )
 
     def length(self) -> tuple[int, int]:
-        """Return how much there is to say: of all, and of joint variables."""
-        return len(self.changes), sum(found.change.concerns_joint for found in self.changes)
+        """Return the number of changes, and of those of joint variables."""
+        return len(self.changes), sum(change.change.concerns_joint for change in self.changes)
 
     @property
     def scale(self) -> float:
-        """The sum of the arm's lengths, m; 1 where there are none."""
+        """Sum of the arm's lengths, m; 1 if it has none."""
         return _scale(self.truth)
 
     @property
     def moves_zero(self) -> bool:
-        """Whether a joint variable counts from another zero, or the other way round."""
+        """Whether a joint variable has another zero or the opposite sense."""
         return any(
             sense < 0 or (abs(wrapped(offset)) > SAME if kind == "R" else abs(offset) > SAME * self.scale)
             for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True)
@@ -93,18 +105,18 @@ class Overlay:
 
     @cached_property
     def changes(self) -> tuple[FrameChange, ...]:
-        """Which frames and joint variables differ, and how."""
-        # A wrong number is no choice of frames: lengths are told apart as finely as arms are.
+        """Changes of frames and joint variables."""
+        # Lengths are compared as finely as arms are: a wrong number is no choice of frames.
         tolerance = SAME * self.scale
-        found = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D, tolerance)]
+        changes = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D, tolerance)]
         joints = zip(self.truth.kinds, self.senses, self.offsets, strict=True)
         for i, (kind, sense, offset) in enumerate(joints, start=1):
-            found += joint_changes(i, kind == "R", float(sense), float(offset), tolerance)
-        return tuple(found)
+            changes += joint_changes(i, kind == "R", float(sense), float(offset), tolerance)
+        return tuple(changes)
 
 
 def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
-    """Return which joints may count from another zero, shape (n,): not those that slide from the file's own d."""
+    """Return which joints may have another zero, shape (n,): all but sliding ones that keep the file's own d."""
     slides = np.array([kind != "R" for kind in truth.kinds])
     free: NDArray[np.bool_] = ~slides | (np.abs(answer.entries[:, 1] - truth.entries[:, 1]) > SAME)
     return free
@@ -115,15 +127,15 @@ def _scale(arm: TableArm) -> float:
 
 
 def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
-    """Return how two arms are one, with the fewest changes; None where they are not."""
+    """Return the relation between two arms with the fewest changes; None if they are two different arms."""
     scale = _scale(truth)
     matching = _Matching(answer, truth, scale)
     if not matching.links_agree:
         return None
     best = None
-    for senses, B, offsets in matching.found(np.ones(0), np.eye(4), np.zeros(truth.n)):
-        found = _at_the_ends(Overlay(truth, answer, senses, offsets, B), scale)
-        for overlay in (found, _slid(found), matching.fitted(found)):
+    for senses, B, offsets in matching.solutions(np.ones(0), np.eye(4), np.zeros(truth.n)):
+        aligned = _align_ends(Overlay(truth, answer, senses, offsets, B), scale)
+        for overlay in (aligned, _slide_along_first_axis(aligned), matching.fit_ends(aligned)):
             if overlay is not None and overlay.holds(scale) and overlay.allowed(strict, scale):
                 best = min(best or overlay, overlay, key=Overlay.length)
     return best
@@ -131,10 +143,10 @@ def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
 
 @dataclass(frozen=True, eq=False)
 class _Matching:
-    """The search for a rigid motion and joint values that bring the axes of one arm, or their reverses, to another's.
+    """Search for a rigid motion and joint values that map the axes of one arm, or their reverses, to another's.
 
-    Axis after axis: Newton's method in the rigid motion and the offsets of the joints before, from four positions a
-    quarter turn apart.
+    Axis after axis, Newton's method determines the rigid motion and the offsets of the preceding joints, from four
+    starts a quarter turn apart.
     """
 
     answer: TableArm
@@ -147,12 +159,12 @@ class _Matching:
 
     @property
     def links_agree(self) -> bool:
-        """Whether neighbouring axes lie alike in both arms: their angle and common normal, whatever the senses."""
+        """Whether neighbouring axes have the same angle and common normal in both arms, whatever the senses."""
         invariants = [_invariants(arm.screws(np.zeros(arm.n), self.scale)) for arm in (self.answer, self.truth)]
         return bool(np.max(np.abs(invariants[0] - invariants[1]), initial=0.0) < SAME)
 
-    def found(self, senses: Array, B: Array, offsets: Array) -> Iterator[tuple[Array, Array, Array]]:
-        """Yield senses, motion and offsets that match all axes, given those that match the first few."""
+    def solutions(self, senses: Array, B: Array, offsets: Array) -> Iterator[tuple[Array, Array, Array]]:
+        """Yield senses, motion and offsets that map all axes, given those that map the first few."""
         k = len(senses)
         if k == self.truth.n:
             yield senses, B, offsets
@@ -160,13 +172,13 @@ class _Matching:
         for sense in (1.0, -1.0):
             tried = np.append(senses, sense)
             for guess in self.guesses(k, B, offsets, sense):
-                solved = self.solved(tried, *guess)
+                solved = self.solve(tried, *guess)
                 if solved is not None:
-                    yield from self.found(tried, *solved)
+                    yield from self.solutions(tried, *solved)
                     break
 
     def guesses(self, k: int, B: Array, offsets: Array, sense: float) -> Iterator[tuple[Array, Array]]:
-        """Yield where to begin with axis k, from 0: the joint before it in four positions."""
+        """Yield starts for axis k, from 0: four positions of the preceding joint."""
         if k == 0:
             for turn in (np.eye(4), *(_half_turn(axis) for axis in range(3)), *_quarter_turns()):
                 yield turn @ B, offsets
@@ -184,10 +196,10 @@ class _Matching:
             turned[k - 1] += angle
             yield B, turned
 
-    def solved(self, senses: Array, B: Array, offsets: Array) -> tuple[Array, Array] | None:
-        """Return a rigid motion and offsets that match the first axes; None where there are none nearby."""
+    def solve(self, senses: Array, B: Array, offsets: Array) -> tuple[Array, Array] | None:
+        """Return the rigid motion and offsets near a start that map the first axes; None if there are none."""
         k = len(senses)
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             target = self.truth.screws(offsets, self.scale)[:k]
             moved = self.own[:k] @ _adjoint(B, self.scale).T
             gap = (moved - senses[:, None] * target).ravel()
@@ -195,29 +207,28 @@ class _Matching:
                 return None
             if np.max(np.abs(gap)) < SAME / 100:
                 return B, offsets
-            before = range(1, k - 1)
-            later = senses[:, None] * (np.arange(k) > np.array(before, dtype=int)[:, None])[..., None]
+            joints = np.arange(1, k - 1)
+            later = senses[:, None] * (np.arange(k) > joints[:, None])[..., None]
             later = later * _free(self.answer, self.truth)[1 : len(later) + 1, None, None]
             columns = np.concatenate([moved @ BRACKETS, -(target @ np.tensordot(target[1:-1], BRACKETS, 1)) * later])
-            step = -np.linalg.lstsq(columns.reshape(len(columns), -1).T, gap, rcond=1e-8)[0]
-            step *= min(1.0, 1.5 / max(float(np.max(np.abs(step))), 1e-300))
+            step = _newton_step(columns.reshape(len(columns), -1), gap)
             B = _exponential(step[:6], self.scale) @ B
             offsets = offsets.copy()
             offsets[1 : k - 1] += step[6:] * np.where([x == "R" for x in self.truth.kinds[1 : k - 1]], 1, self.scale)
         return None
 
-    def fitted(self, overlay: Overlay) -> Overlay | None:
-        """Bring frames 0 and n to the file's, where the axes leave that open: joints on one line share an offset.
+    def fit_ends(self, overlay: Overlay) -> Overlay | None:
+        """Move frames 0 and n to the file's, as far as the axes leave them free: joints on one line share an offset.
 
-        Newton's method as in :meth:`solved`, with the two frames next to the axes; None where they cannot be brought.
+        Newton's method as in :meth:`solve`, for the two frames together with the axes; None if it does not converge.
         """
-        ends = [_squared(D) for D in overlay.differences[[0, -1]]]
+        ends = [_nearest_square(D) for D in overlay.differences[[0, -1]]]
         B, offsets, senses = overlay.B, overlay.offsets, overlay.senses[:, None]
         last = self.answer.frames(np.zeros(self.answer.n))[-1]
         later = (np.arange(self.truth.n) > np.arange(self.truth.n)[:, None])[..., None] * senses
         stroke = np.where([kind == "R" for kind in self.truth.kinds], 1, self.scale)
         free = _free(self.answer, self.truth)
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             target, moved = self.truth.screws(offsets, self.scale), self.own @ _adjoint(B, self.scale).T
             given = _scaled(np.array([B, B @ last]), self.scale)
             wanted = _scaled(np.array([ends[0], self.truth.frames(offsets)[-1] @ ends[1]]), self.scale)
@@ -234,15 +245,21 @@ class _Matching:
                     np.hstack([turned.reshape(len(turned), -1), at_end.reshape(len(turned), -1)]),
                 ]
             )
-            step = -np.linalg.lstsq(columns.T, gap, rcond=1e-8)[0]
-            step *= min(1.0, 1.5 / max(float(np.max(np.abs(step))), 1e-300))
+            step = _newton_step(columns, gap)
             B = _exponential(step[:6], self.scale) @ B
             offsets = offsets + step[6:] * stroke
         return None
 
 
-def _squared(D: Array) -> Array:
-    """Return the nearest rotation by right angles, if there is one, without a translation, shape (4, 4)."""
+def _newton_step(columns: NDArray[np.floating[Any]], gap: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """Return the least-squares step that closes a gap, shape (k,), bounded by 1.5; columns has shape (k, len(gap))."""
+    step: NDArray[np.floating[Any]] = -np.linalg.lstsq(columns.T, gap, rcond=1e-8)[0]
+    step *= min(1.0, 1.5 / max(float(np.max(np.abs(step))), 1e-300))
+    return step
+
+
+def _nearest_square(D: Array) -> Array:
+    """Return the nearest rotation by right angles without a translation, shape (4, 4); the identity if none is near."""
     square = np.eye(4)
     turned = np.rint(D[:3, :3])
     if np.array_equal(turned @ turned.T, np.eye(3)):
@@ -251,34 +268,34 @@ def _squared(D: Array) -> Array:
 
 
 def _scaled(T: Array, scale: float) -> Array:
-    """Return transforms with lengths over a scale."""
+    """Return transforms, shape (..., 4, 4), with lengths divided by a scale."""
     scaled = T.copy()
     scaled[..., :3, 3] /= scale
     return scaled
 
 
 def _rate(screw: NDArray[np.floating[Any]]) -> Array:
-    """Return the matrix by which transforms change along a screw, shape (4, 4)."""
+    """Return the matrix of a screw, shape (4, 4): the derivative of a transform along it is the matrix times it."""
     rate = np.zeros((4, 4))
     rate[:3, :3], rate[:3, 3] = _skew(screw[:3]), screw[3:]
     return rate
 
 
-def _at_the_ends(overlay: Overlay, scale: float) -> Overlay:
-    """Choose the first and the last offset, which base and tool could take up, so that the frames agree."""
+def _align_ends(overlay: Overlay, scale: float) -> Overlay:
+    """Choose the first and last offset, which base and tool can take up, so that frames 0 and n agree."""
     truth, n = overlay.truth, overlay.truth.n
     own, other = truth.frames(overlay.offsets), overlay.B @ overlay.answer.frames(np.zeros(n))
     screws = truth.screws(overlay.offsets, 1.0)
-    first, last = (_amount(screws[k], own[k], other[k], scale) for k in (0, -1))
+    first, last = (_joint_travel(screws[k], own[k], other[k], scale) for k in (0, -1))
     offsets = overlay.offsets.copy()
-    # The first joint's move is one of the whole: truth(q + o1) = exp(o1) truth(q).
+    # Moving the first joint moves the whole arm: truth(q + o1) = exp(o1) truth(q).
     offsets[0] -= first
     offsets[-1] += last if n > 1 else 0.0
     return replace(overlay, offsets=offsets, B=_exponential(-screws[0] * first, 1.0) @ overlay.B)
 
 
-def _slid(overlay: Overlay) -> Overlay:
-    """Move all of the answer along the first axis until frames n are level: a choice where all axes are parallel."""
+def _slide_along_first_axis(overlay: Overlay) -> Overlay:
+    """Move the answer along the first axis until frames n are level, which is free if all axes are parallel."""
     screw = overlay.truth.screws(overlay.offsets, 1.0)[0]
     axis = screw[:3] if np.any(screw[:3]) else screw[3:]
     own = overlay.truth.frames(overlay.offsets)[-1]
@@ -288,29 +305,29 @@ def _slid(overlay: Overlay) -> Overlay:
     return replace(overlay, B=B)
 
 
-def _amount(screw: Array, start: Array, end: Array, scale: float) -> float:
-    """Return how far a joint moves to bring the origin of one frame to another's; its x axis where that is no help."""
+def _joint_travel(screw: Array, start: Array, end: Array, scale: float) -> float:
+    """Return the joint travel, rad or m, that moves a frame's origin, or on the axis its x axis, to another's."""
     axis, moment = screw[:3], screw[3:]
     if not np.any(axis):
         return float(moment @ (end[:3, 3] - start[:3, 3]))
     point = np.cross(axis, moment)
-    levers = [_across(axis, T[:3, 3] - point) for T in (start, end)]
+    levers = [_perpendicular_part(axis, T[:3, 3] - point) for T in (start, end)]
     if min(float(np.linalg.norm(lever)) for lever in levers) <= SAME * scale:
-        levers = [_across(axis, T[:3, 0]) for T in (start, end)]
+        levers = [_perpendicular_part(axis, T[:3, 0]) for T in (start, end)]
     a, b = levers
     return float(np.arctan2(axis @ np.cross(a, b), a @ b))
 
 
-def _across(axis: Array, vector: Array) -> Array:
-    """Return what of a vector is at right angles to an axis."""
-    across: Array = vector - (axis @ vector) * axis
-    return across
+def _perpendicular_part(axis: Array, vector: Array) -> Array:
+    """Return the part of a vector at right angles to a unit axis, shape (3,)."""
+    part: Array = vector - (axis @ vector) * axis
+    return part
 
 
 def _invariants(screws: Array) -> Array:
-    """Return what no motion and no sense changes of neighbouring screws, shape (n - 1, 3).
+    """Return invariants of neighbouring screws under motions and changes of sense, shape (n - 1, 3).
 
-    The sines and cosines of their angles, their distance times the sine, and for parallel ones the distance.
+    The cosines of their angles, their distances times the sines and, for parallel ones, their distances.
     """
     first, second = screws[:-1], screws[1:]
     angle = np.sum(first[:, :3] * second[:, :3], axis=1)
@@ -322,7 +339,7 @@ def _invariants(screws: Array) -> Array:
 
 
 def _brackets() -> Array:
-    """Return the matrices by which screws, as rows, change along each of the six unit screws, shape (6, 6, 6)."""
+    """Return the derivatives of screws, as rows, along each of the six unit screws, as matrices, shape (6, 6, 6)."""
     brackets = np.zeros((6, 6, 6))
     for k, unit in enumerate(np.eye(3)):
         crossed = _skew(unit).T
@@ -335,13 +352,13 @@ def _skew(p: NDArray[np.floating[Any]]) -> Array:
 
 
 def _adjoint(T: Array, scale: float) -> Array:
-    """Return what maps screws as a motion moves them, shape (6, 6)."""
+    """Return the matrix that maps screws as a motion moves them, shape (6, 6)."""
     R = T[:3, :3]
     return np.block([[R, np.zeros((3, 3))], [_skew(T[:3, 3]) @ R / scale, R]])
 
 
 def _exponential(screw: NDArray[np.floating[Any]], scale: float) -> Array:
-    """Return the motion along a screw (angles; lengths / scale), shape (4, 4)."""
+    """Return the motion along a screw (angles in rad; lengths in m over the scale), shape (4, 4), m."""
     w, v = screw[:3], screw[3:] * scale
     angle = float(np.linalg.norm(w))
     K = _skew(w)
@@ -367,4 +384,3 @@ def _quarter_turns() -> list[Array]:
 
 
 BRACKETS = _brackets()
-"""See :func:`_brackets`."""

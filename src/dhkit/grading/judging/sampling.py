@@ -1,10 +1,11 @@
-"""Answers that the exact ring does not have, held against the truth at many random states in many digits."""
+"""Random states at which answers outside the exact ring are compared with the truth, in many digits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,12 +17,15 @@ from dhkit.symbolic.ring import Element
 if TYPE_CHECKING:
     from mpmath import mpf
 
-SAMPLES = 1_000
+_Key = TypeVar("_Key")
+MAX_SAMPLES = 1_000
+"""Number of random states for one entry, unless it is long."""
 DIGITS = 50
-TOLERANCE, LEAST = 1e-25, 1e-3
-"""By what share two numbers may differ that are taken for one, and the least that it is a share of."""
+"""Decimal digits of the arithmetic."""
+TOLERANCE, MIN_SIZE = 1e-25, 1e-3
+"""Relative tolerance for taking two numbers for equal, and the smallest size that it is relative to."""
 NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
-"""Sizes of the states that are tried within one turn; rad or m, and seconds."""
+"""Ranges of the states within one turn, in rad or m and their derivatives by time in s."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Sample:
     Attributes
     ----------
     names
-        Values by name: q1, qd1, qdd1, parameters.
+        Values by name: q1, qd1, qdd1, parameters; SI units and rad.
     generators
         Values of the ring's generators, in their order.
     """
@@ -40,7 +44,9 @@ class Sample:
     generators: Sequence[Any]
 
 
-def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = SAMPLES) -> list[Sample]:
+def samples(
+    arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = MAX_SAMPLES
+) -> list[Sample]:
     """Return random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
 
     Parameters
@@ -48,20 +54,20 @@ def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, c
     arm
         The robot.
     numbers
-        Parameters that keep the file's values; others come within a factor of four of them, spread evenly over its
+        Parameters that keep the file's values. Others come within a factor of four of theirs, spread evenly over its
         logarithm: of S sets of parameters, each S-th of the range has one.
     seed
-        Of the random numbers. It must not be known to who writes answers: one that is wrong only far from the states
-        that are tried would pass.
+        Seed of the random numbers. It must not be known to the writer of an answer: one that is wrong only far from the
+        tried states would pass.
     every
-        After how many states parameters change.
+        Number of consecutive states that share parameters.
     count
-        How many.
+        Number of states.
     """
     import mpmath
 
     rng = np.random.default_rng(seed)
-    found = []
+    states = []
     sets = -(-count // every)
     factors = dict[str, Any]()
     for name in arm.parameters:
@@ -78,71 +84,66 @@ def samples(arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, c
             for kind, near in NEAR_SIZES.items():
                 size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
-        found.append(Sample(names, _generators(arm, names)))
-    return found
+        states.append(Sample(names, _generators(arm, names)))
+    return states
 
 
 def element_value(element: Element, sample: Sample) -> mpf:
-    """Return the number that an element is, in the digits that are set."""
+    """Return the value of an element at a sample, in mpmath's working precision."""
+    terms = ((enumerate(monomial), coefficient) for monomial, coefficient in element.terms.items())
+    return _sum_of_products(terms, sample.generators.__getitem__)
+
+
+def _sum_of_products(terms: Iterable[tuple[Iterable[tuple[_Key, int]], Fraction]], value: Callable[[_Key], Any]) -> mpf:
+    """Return the sum of coefficients times powers of values."""
     import mpmath
 
     total = mpmath.mpf(0)
-    for monomial, coefficient in element.terms.items():
+    for powers, coefficient in terms:
         product = mpmath.mpf(coefficient.numerator) / coefficient.denominator
-        for k, exponent in enumerate(monomial):
+        for key, exponent in powers:
             if exponent:
-                product *= sample.generators[k] ** exponent
+                product *= value(key) ** exponent
         total += product
     return total
 
 
 def _generators(arm: ExactArm, names: Mapping[str, Any]) -> list[Any]:
+    """Return the values of the ring's generators, given those of names."""
     import mpmath
+
+    def atom_value(atom: Atom) -> Any:
+        if atom.name == "pi":
+            return +mpmath.pi
+        if atom.is_symbol:
+            return names[atom.name]
+        arguments = [expression_value(argument) for argument in atom.arguments]
+        if atom.name == "group":
+            return arguments[0]
+        function: Callable[..., Any] = abs if atom.name == "abs" else getattr(mpmath, atom.name)
+        return function(*arguments)
+
+    def expression_value(expression: Expression) -> Any:
+        return _sum_of_products(expression.terms, atom_value)
 
     values: list[Any] = []
     for generator in arm.ring.generators:
         if generator.kind in ("sine", "cosine"):
             angle = sum(names[f"q{joint + 1}"] for joint in generator.joints)
             values.append(mpmath.sin(angle) if generator.kind == "sine" else mpmath.cos(angle))
-        elif generator.kind == "constant":
-            values.append(names[generator.text] if generator.meaning is None else _value(generator.meaning, names))
+        elif generator.kind == "constant" and generator.meaning is not None:
+            values.append(expression_value(generator.meaning))
         else:
             values.append(names[generator.text])
     return values
 
 
-def _value(expression: Expression, names: Mapping[str, Any]) -> Any:
-    import mpmath
-
-    total = mpmath.mpf(0)
-    for monomial, coefficient in expression.terms:
-        product = mpmath.mpf(coefficient.numerator) / coefficient.denominator
-        for atom, exponent in monomial:
-            product *= _atom(atom, names) ** exponent
-        total += product
-    return total
-
-
-def _atom(atom: Atom, names: Mapping[str, Any]) -> Any:
-    import mpmath
-
-    if atom.name == "pi":
-        return +mpmath.pi
-    if atom.is_symbol:
-        return names[atom.name]
-    arguments = [_value(argument, names) for argument in atom.arguments]
-    if atom.name == "group":
-        return arguments[0]
-    function: Callable[..., Any] = abs if atom.name == "abs" else getattr(mpmath, atom.name)
-    return function(*arguments)
-
-
-def differ(answer: Any, truth: Any) -> bool:
-    """Whether two numbers in many digits are not the same."""
-    size = max(abs(answer), abs(truth), LEAST)
+def differ(answer: mpf, truth: mpf) -> bool:
+    """Whether two numbers of mpmath differ by more than the tolerance."""
+    size = max(abs(answer), abs(truth), MIN_SIZE)
     return bool(abs(answer - truth) > TOLERANCE * size)
 
 
 def show_state(sample: Sample, names: set[str]) -> dict[str, float]:
-    """Return those of a sample's values that are named, as doubles."""
+    """Return those values of a sample that are named, as doubles; SI units and rad."""
     return {name: float(value) for name, value in sample.names.items() if name in names}

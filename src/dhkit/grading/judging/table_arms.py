@@ -1,10 +1,10 @@
-"""Tables in doubles: their links, frames and joint axes, for given values of parameters."""
+"""Denavit-Hartenberg tables in doubles: link transforms, frames and joint axes for given values of parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,18 +14,21 @@ from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, substitute
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.numeric import doubles
+from dhkit.symbolic.ring import Element
+
+_T = TypeVar("_T", Array, Element)
 
 ROUNDING = 1e-12
-"""Share of the largest entry: two A_i that differ by less in doubles may well be equal."""
-FAR = 1e6
-"""m or rad: no arm has such entries, and laying axes over one another would lose its digits."""
+"""Relative tolerance, to the largest entry, within which two A_i are taken for equal in doubles."""
+MAX_ENTRY = 1e6
+"""Largest entry of a table, m or rad: no arm has larger ones, and comparing axes would lose digits."""
 
 Row: TypeAlias = tuple[Expression, Expression, Expression, Expression]
-"""theta, d, a, alpha with the joint's variable in its place."""
+"""theta, d, a, alpha, with the joint variable in theta or d; rad and m."""
 
 
 def parameter_values(description: Description, factors: Array) -> dict[str, float]:
-    """Return values of parameters, those that are no others' times factors, and of units."""
+    """Return the values of parameters by name, SI units and rad, independent ones times factors of shape (k,)."""
     changed = {
         name: value if value.symbols else exact(float(value) * float(factor))
         for (name, value), factor in zip(description.parameters.items(), factors, strict=True)
@@ -35,45 +38,73 @@ def parameter_values(description: Description, factors: Array) -> dict[str, floa
 
 
 def row_numbers(row: Sequence[Tree], values: Mapping[str, float]) -> list[float]:
-    """Return a row's entries."""
+    """Return the entries of a row, rad and m."""
     return [float(doubles(tree, values)) for tree in row]
 
 
 def number_of(entry: Expression, values: Mapping[str, float]) -> float:
-    """Return an exact entry's number."""
+    """Return the value of an exact entry, rad or m."""
     return float(substitute(entry, {name: exact(values[name]) for name in entry.symbols}))
 
 
+def link_entries(
+    convention: Convention, theta: tuple[_T, _T], d: _T, a: _T, alpha: tuple[_T, _T], unit: tuple[_T, _T]
+) -> list[list[_T]]:
+    """Return the entries of A_i, four rows of four, in doubles, arrays of them or elements of a ring.
+
+    Parameters
+    ----------
+    convention
+        Convention of the table.
+    theta, alpha
+        Cosine and sine of each angle.
+    d, a
+        Lengths, m.
+    unit
+        0 and 1 in the same arithmetic.
+    """
+    (c, s), (ca, sa), (zero, one) = theta, alpha, unit
+    rows: list[list[_T]]
+    if convention is Convention.STANDARD:
+        rows = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [zero, sa, ca, d]]
+    else:
+        rows = [[c, -s, zero, a], [s * ca, c * ca, -sa, -sa * d], [s * sa, c * sa, ca, ca * d]]
+    rows.append([zero, zero, zero, one])
+    return rows
+
+
 def link_in_doubles(convention: Convention, theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike) -> Array:
-    """Return A_i in doubles, shape (..., 4, 4), of entries of shape (...)."""
-    along_z, along_x = np.zeros((2, *np.shape(theta), 4, 4))
-    along_z[..., 0, 0] = along_z[..., 1, 1] = np.cos(theta)
-    along_z[..., 1, 0] = np.sin(theta)
-    along_z[..., 0, 1] = -along_z[..., 1, 0]
-    along_z[..., 2, 2] = along_z[..., 3, 3] = along_x[..., 0, 0] = along_x[..., 3, 3] = 1
-    along_z[..., 2, 3] = d
-    along_x[..., 1, 1] = along_x[..., 2, 2] = np.cos(alpha)
-    along_x[..., 2, 1] = np.sin(alpha)
-    along_x[..., 1, 2] = -along_x[..., 2, 1]
-    along_x[..., 0, 3] = a
-    A: Array = along_z @ along_x if convention is Convention.STANDARD else along_x @ along_z
-    return A
+    """Return A_i in doubles, shape (..., 4, 4), of angles in rad and lengths in m of shape (...)."""
+    theta, d, a, alpha = np.broadcast_arrays(theta, d, a, alpha)
+    unit = np.zeros(theta.shape), np.ones(theta.shape)
+    angles = [(np.cos(angle), np.sin(angle)) for angle in (theta, alpha)]
+    return np.moveaxis(np.array(link_entries(convention, angles[0], d, a, angles[1], unit)), (0, 1), (-2, -1))
 
 
 @dataclass(frozen=True, eq=False)
 class TableArm:
-    """A table in doubles: entries at joint values 0, and the sense in which each variable counts."""
+    """A table in doubles.
+
+    Attributes
+    ----------
+    convention
+        Convention of the table.
+    kinds
+        A letter for each joint: R for a revolute one.
+    entries
+        theta, d, a, alpha at joint values 0, shape (n, 4), rad and m.
+    senses
+        +1 or -1 for each joint, shape (n,): the sign of its variable in theta or d.
+    """
 
     convention: Convention
     kinds: str
     entries: Array
-    """Shape (n, 4): theta, d, a, alpha."""
     senses: Array
-    """Shape (n,): +1 or -1."""
 
     @classmethod
     def of_rows(cls, rows: Sequence[Row], kinds: str, convention: Convention, values: Mapping[str, float]) -> TableArm:
-        """Return the arm of a table that is known."""
+        """Return the arm of exact rows, at given values of parameters."""
         at_zero = dict(values) | {f"q{i + 1}": 0.0 for i in range(len(kinds))}
         entries = np.array([[number_of(entry, at_zero) for entry in row] for row in rows])
         return cls(convention, kinds, entries, np.ones(len(kinds)))
@@ -82,7 +113,7 @@ class TableArm:
     def of_trees(
         cls, rows: Sequence[Sequence[Tree]], kinds: str, convention: Convention, values: Mapping[str, float]
     ) -> TableArm | None:
-        """Return an answer's arm; None where its rows are no joints: each its own variable in the right column."""
+        """Return the arm of an answer; None unless each row has its own variable, and no other, in the right column."""
         n = len(kinds)
         own = np.array([[kind == "R", kind != "R", False, False] for kind in kinds], dtype=float)
 
@@ -91,7 +122,7 @@ class TableArm:
             return np.array([row_numbers(row, named) for row in rows])
 
         entries, q = at(np.zeros(n)), np.linspace(0.3, 0.9, n)
-        if not np.all(np.abs(entries) < FAR):
+        if not np.all(np.abs(entries) < MAX_ENTRY):
             return None
         senses = np.sum((at(np.ones(n)) - entries) * own, axis=1)
         moved = entries + own * (senses * q)[:, None]
@@ -105,7 +136,7 @@ class TableArm:
         return len(self.kinds)
 
     def frames(self, q: Array) -> Array:
-        """Return frames 0 ... n in frame 0, shape (n + 1, 4, 4)."""
+        """Return frames 0 ... n in frame 0, shape (n + 1, 4, 4), m, at joint values of shape (n,), rad and m."""
         change, turning = self.senses * q, np.array([kind == "R" for kind in self.kinds])
         theta, d, a, alpha = self.entries.T
         links = link_in_doubles(self.convention, theta + change * turning, d + change * ~turning, a, alpha)
@@ -115,7 +146,7 @@ class TableArm:
         return np.array(frames)
 
     def screws(self, q: Array, scale: float) -> Array:
-        """Return the joints' axes as screws (direction; moment / scale), shape (n, 6)."""
+        """Return the joint axes as screws (direction; moment / scale), shape (n, 6), in frame 0."""
         frames = self.frames(q)
         moving = frames[:-1] if self.convention is Convention.STANDARD else frames[1:]
         z = moving[:, :3, 2] * self.senses[:, None]

@@ -1,4 +1,4 @@
-"""A table row by row: each A_i against the file's, in the exact ring and, outside it, in doubles."""
+"""Comparison of a table with the file's, row by row: each A_i in the exact ring or, outside it, in doubles."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.judging.numeric import doubles, names_of
+from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
 from dhkit.grading.judging.same_arm import STATES
 from dhkit.grading.judging.table_arms import (
     ROUNDING,
     Row,
+    link_entries,
     link_in_doubles,
     number_of,
     parameter_values,
@@ -31,8 +33,8 @@ from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring
 from dhkit.symbolic.textbook_kinematics import with_massless_links
 
-MOST = 8
-"""The largest multiple of a joint variable in an angle that is compared exactly."""
+MAX_MULTIPLE = 8
+"""Largest multiple of a joint variable in an angle that is compared exactly."""
 COLUMNS = ("theta", "d", "a", "alpha")
 
 
@@ -43,9 +45,9 @@ class Answer:
     Attributes
     ----------
     trees
-        A row a joint: theta, d, a, alpha.
+        Rows of theta, d, a, alpha, one for each joint; rad and m.
     entries
-        The same exactly; None where an entry is outside exact arithmetic.
+        The same as exact values; None for entries outside exact arithmetic.
     """
 
     trees: tuple[tuple[Tree, ...], ...]
@@ -75,7 +77,7 @@ class Answer:
 
 
 def _entry(tree: Tree, names: Sequence[str], where: str) -> Expression | None:
-    """Return an entry's exact value, None where it has none."""
+    """Return the exact value of an entry; None if it has none."""
     for name in sorted(names_of(tree) - {*names, *CONSTANTS}):
         raise AnswerError(f"{where}: unknown name {name!r}; expected {', '.join([*names, 'pi', 'deg'])}")
     try:
@@ -88,7 +90,7 @@ def _entry(tree: Tree, names: Sequence[str], where: str) -> Expression | None:
 
 @dataclass(frozen=True)
 class JudgedRow:
-    """What is found of a row, and the names that its numbers stand for."""
+    """Verdict on a row, its reason, and the parameters for which it has numbers."""
 
     verdict: Verdict
     statement: str
@@ -97,7 +99,7 @@ class JudgedRow:
 
 @dataclass(frozen=True, eq=False)
 class TableRows:
-    """The rows of an answer beside the file's.
+    """Rows of an answer, compared with the file's.
 
     Attributes
     ----------
@@ -106,9 +108,9 @@ class TableRows:
     answer
         The rows that were handed in.
     convention
-        What the answer says that its table is.
+        Convention of the answer, as it states.
     seed
-        Of the random states that entries outside the exact ring are tried at.
+        Seed of the random states at which entries outside the exact ring are tried.
     """
 
     description: Description
@@ -130,12 +132,12 @@ class TableRows:
         """Judge A_i, i from 0."""
         entries = self.answer.entries[i]
         if None not in entries:
-            if self.proved(i, numbers=False):
+            if self.is_proved(i, numbers=False):
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved")
-            if self.has_numbers(i) and self.proved(i, numbers=True):
+            if self.has_numbers(i) and self.is_proved(i, numbers=True):
                 used = frozenset().union(*(entry.symbols for entry in self.reference[i]))
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", used)
-        if self.agrees(i):
+        if self.agrees_in_doubles(i):
             statement = f"A{i + 1} agrees at {STATES} random states to {ROUNDING:g}, without a proof"
             return JudgedRow(Verdict.UNDECIDED, statement)
         return JudgedRow(Verdict.WRONG, f"A{i + 1} differs")
@@ -146,8 +148,8 @@ class TableRows:
         given = set().union(*(entry.symbols for entry in self.answer.entries[i] if entry is not None))
         return not given & parameters and any(entry.symbols & parameters for entry in self.reference[i])
 
-    def proved(self, i: int, numbers: bool) -> bool:
-        """Return whether A_i equals the file's in the exact ring."""
+    def is_proved(self, i: int, numbers: bool) -> bool:
+        """Whether A_i, i from 0, equals the file's in the ring of the file's parameters, or of its numbers."""
         reader = self.readers[numbers]
         try:
             A = reader.link(self.answer.entries[i], self.convention)
@@ -155,8 +157,8 @@ class TableRows:
         except (RingError, ExpressionError):
             return False
 
-    def agrees(self, i: int) -> bool:
-        """Return whether A_i agrees with the file's in doubles, for other values of the parameters as well."""
+    def agrees_in_doubles(self, i: int) -> bool:
+        """Whether A_i, i from 0, agrees with the file's in doubles, for other values of the parameters as well."""
         fixed = {name: self.states[0][name] for name in self.description.parameters} if self.has_numbers(i) else {}
         for state in self.states:
             values = state | fixed
@@ -176,13 +178,13 @@ class TableRows:
 
     @cached_property
     def readers(self) -> tuple[_Reader, _Reader]:
-        """Into the ring with the file's parameters, and into the one with its numbers."""
+        """Readers into the ring with the file's parameters, and into the one with its numbers."""
         whole = with_massless_links(self.description)
         return _Reader(exact_arm(whole, "file")), _Reader(exact_arm(whole, "none"))
 
     @cached_property
     def states(self) -> list[dict[str, float]]:
-        """Values of joint variables, parameters and units; the first with the file's parameters."""
+        """Values of joint variables and parameters by name, rad and SI units; the first with the file's parameters."""
         random = np.random.default_rng(self.seed)
         states = []
         for k in range(STATES):
@@ -194,7 +196,7 @@ class TableRows:
         return states
 
     def equal(self, i: int, column: int, truth: Expression) -> bool:
-        """Return whether an entry of row i is this, angles up to full turns, numbers in place of parameters allowed."""
+        """Whether an entry of row i has a value, angles up to full turns; numbers may stand for parameters."""
         given = self.answer.entries[i][column]
         if given is None:
             return False
@@ -207,12 +209,12 @@ class TableRows:
 
 
 def other_convention(convention: Convention) -> Convention:
-    """Return the convention that this one is not."""
+    """Return the other of the two conventions."""
     return Convention.MODIFIED if convention is Convention.STANDARD else Convention.STANDARD
 
 
 def _file_rows(description: Description, convention: Convention) -> tuple[Row, ...]:
-    """Return the file's table, a and alpha moved to the neighbouring row where the convention is the other."""
+    """Return the file's table in a convention: in the other one, a and alpha move to the neighbouring row."""
     joints = description.joints
     links = [(joint.a, exact_angle(joint.alpha)) for joint in joints]
     if convention is not description.convention:
@@ -225,7 +227,7 @@ def _file_rows(description: Description, convention: Convention) -> tuple[Row, .
 
 
 class _Reader:
-    """Reads rows into an arm's ring."""
+    """Reads exact rows into an arm's ring."""
 
     def __init__(self, arm: ExactArm) -> None:
         self.ring: Ring = arm.ring
@@ -238,19 +240,22 @@ class _Reader:
         Raises
         ------
         RingError
-            An entry that the ring has not.
+            An entry that the ring does not have.
         """
         theta, d, a, alpha = (ZERO if entry is None else self.naming.known(entry) for entry in row)
-        ring, (c, s), (ca, sa) = self.ring, self.angle(theta), self.angle(alpha)
-        a_, d_, o = self.length(a), self.length(d), self.ring.zero
-        if convention is Convention.STANDARD:
-            A = [[c, -s * ca, s * sa, a_ * c], [s, c * ca, -c * sa, a_ * s], [o, sa, ca, d_]]
-        else:
-            A = [[c, -s, o, a_], [s * ca, c * ca, -sa, -sa * d_], [s * sa, c * sa, ca, ca * d_]]
-        return np.array([*A, [o, o, o, ring.one]], dtype=object)
+        ring = self.ring
+        angles, lengths = (self.angle(theta), self.angle(alpha)), (self.length(d), self.length(a))
+        entries = link_entries(convention, angles[0], *lengths, angles[1], (ring.zero, ring.one))
+        return np.array(entries, dtype=object)
 
     def length(self, length: Expression) -> Element:
-        """Return a length, which may hold the variables of sliding joints."""
+        """Return a length, in which variables of sliding joints may occur.
+
+        Raises
+        ------
+        RingError
+            Another variable in the length, or a constant that the ring does not have.
+        """
         ring, total = self.ring, []
         for monomial, coefficient in length.terms:
             product = ring.number(coefficient)
@@ -266,20 +271,21 @@ class _Reader:
         return ring.sum(total)
 
     def angle(self, angle: Expression) -> Direction:
-        """Return cosine and sine of whole multiples of turning joints' variables and a constant."""
-        ring = self.ring
-        c, s = ring.one, ring.zero
-        constant = []
+        """Return cosine and sine of an angle: whole multiples of turning joints' variables, and a constant.
+
+        Raises
+        ------
+        RingError
+            Another angle.
+        """
+        ring, constant, parts = self.ring, [], []
         for monomial, coefficient in angle.terms:
-            joint = self.joints.get(monomial[0][0].text) if monomial and len(monomial) == 1 else None
+            joint = self.joints.get(monomial[0][0].text) if len(monomial) == 1 else None
             if joint is None:
                 constant.append(Expression(((monomial, coefficient),)))
                 continue
-            whole = coefficient.denominator == 1 and abs(coefficient) <= MOST
-            if ring.kinds[joint] != "R" or monomial[0][1] != 1 or not whole:
+            is_multiple = coefficient.denominator == 1 and abs(coefficient) <= MAX_MULTIPLE
+            if ring.kinds[joint] != "R" or monomial[0][1] != 1 or not is_multiple:
                 raise RingError(f"{monomial[0][0].text} in an angle")
-            x, y = ring.cosine(joint), ring.sine(joint) * (1 if coefficient > 0 else -1)
-            for _ in range(int(abs(coefficient))):
-                c, s = c * x - s * y, s * x + c * y
-        x, y = ring.direction(exact_angle(Expression.sum(constant)))
-        return c * x - s * y, s * x + c * y
+            parts.append(multiple_angle(ring, joint, int(coefficient)))
+        return sum_of_angles(ring, [*parts, ring.direction(exact_angle(Expression.sum(constant)))])

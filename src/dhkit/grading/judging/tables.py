@@ -1,69 +1,53 @@
-"""Judging a Denavit-Hartenberg table: the same arm in the same frames, in other frames, or another arm.
+"""Judging of Denavit-Hartenberg tables: the same arm in the same frames, the same arm in other frames, or another arm.
 
-Same frames is decided exactly: every A_i of the answer equals the file's in the ring. A table of the other convention
-is held against the file's table rewritten in it, which is exact too: Rz Tz and Tx Rx only change partners. Whether two
-tables are one arm in different frames is numerical, to 1e-9: their joint axes are laid over one another.
+Equality in the same frames is decided exactly: every A_i of the answer equals the file's in the ring. A table of the
+other convention is compared with the file's table rewritten in that convention, which is exact too: Rz Tz and Tx Rx
+only change partners. Whether two tables describe one arm in different frames is decided numerically, to 1e-9, by the
+positions of their joint axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from dhkit.description import Convention, Description
+from dhkit.expressions import PI, ZERO, Expression, substitute
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.answers.given import Given
-from dhkit.grading.answers.sheet import Task
+from dhkit.grading.answers.sheet import Requirements
 from dhkit.grading.judging.frame_changes import FrameChange
-from dhkit.grading.judging.kinematic_judgement import KinematicJudgement, unreadable_entries, with_texts
 from dhkit.grading.judging.same_arm import Overlay, overlaid
 from dhkit.grading.judging.table_arms import TableArm
-from dhkit.grading.judging.table_mistakes import RowMistake, row_mistakes
-from dhkit.grading.judging.table_rows import Answer, JudgedRow, TableRows, other_convention
+from dhkit.grading.judging.table_rows import COLUMNS, Answer, JudgedRow, TableRows, other_convention
 from dhkit.grading.mistakes.library import hint_of, sentence_of
-from dhkit.grading.report import Diagnosis, Entry, Note, NoteKind, Verdict
+from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
 
-ASKED = Task()
-"""A task that leaves frames and zero pose open."""
+OPEN_TASK = Requirements()
+"""Requirements that leaves frames and zero pose open."""
+UNEXPLAINED = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
+"""By column: the mistake that is named if no more specific one explains an entry."""
 
 
 @dataclass(frozen=True)
 class TableJudgement(KinematicJudgement):
-    """What is decided of a table, an entry a row.
+    """Judgement of a table, with one entry for each row.
 
     CORRECT is proved: A_i equals the file's. UNDECIDED: A_i agrees in doubles but is outside the exact ring, or the
-    whole table is the same arm in other frames, which is numerical.
+    whole table is the same arm in other frames, which is decided numerically.
 
     Attributes
     ----------
     other_frames
-        How frames and joint variables differ from the file's where the table is the same arm in other frames; empty
-        otherwise.
+        Changes of frames and joint variables from the file's, if the table is the same arm in other frames.
     moves_zero
-        Whether, in other frames, a joint variable counts from another zero or the other way round.
+        Whether, in other frames, a joint variable has another zero or the opposite sense.
     """
 
     other_frames: tuple[FrameChange, ...] = ()
     moves_zero: bool = False
-
-
-def table_entries(
-    description: Description, rows: Sequence[Sequence[Given]], convention: str, task: Task, seed: int = 0
-) -> KinematicJudgement:
-    """Judge the table of a sheet; see :func:`judge_table`.
-
-    Raises
-    ------
-    AnswerError
-        An entry with a name or a function that tables do not have.
-    """
-    if unreadable := unreadable_entries("dh", rows):
-        return KinematicJudgement(unreadable)
-    trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
-    judgement = judge_table(description, trees, convention, seed, task)
-    return replace(judgement, entries=with_texts(judgement.entries, rows))
 
 
 def judge_table(
@@ -71,7 +55,7 @@ def judge_table(
     rows: Sequence[Sequence[Tree]],
     convention: Convention | str,
     seed: int = 0,
-    task: Task = ASKED,
+    task: Requirements = OPEN_TASK,
 ) -> TableJudgement:
     """Judge a table against a robot's.
 
@@ -80,14 +64,14 @@ def judge_table(
     description
         The robot; links may lack bodies.
     rows
-        One a joint: theta, d, a, alpha (modified: theta_i, d_i, a_(i-1), alpha_(i-1)), in metres and radians, of the
+        One row for each joint: theta, d, a, alpha (modified: theta_i, d_i, a_(i-1), alpha_(i-1)), in m and rad, of the
         joint variables q1 ... qn, the robot's parameters, pi, deg, mm, cm and inch.
     convention
-        What the answer says that its table is.
+        Convention that the answer states.
     seed
-        Of the random states that entries outside the exact ring are tried at.
+        Seed of the random states at which entries outside the exact ring are tried.
     task
-        Whether frames or the zero pose are given: a table with others is then wrong.
+        Whether the task gives the frames or the zero pose: a table with others is then wrong.
 
     Raises
     ------
@@ -107,97 +91,198 @@ def judge_table(
     """
     table = TableRows(description, Answer.of(description, rows), Convention(convention), seed)
     with np.errstate(all="ignore"):
-        return _judged(table, task)
+        return _judge(table, task)
 
 
-def _judged(table: TableRows, task: Task) -> TableJudgement:
+def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     rows = [table.row(i) for i in range(table.n)]
     in_numbers = frozenset().union(*(row.numbers for row in rows))
-    at = {name: table.states[0][name] for name in table.description.parameters if name in in_numbers}
+    judged_at = {name: table.states[0][name] for name in table.description.parameters if name in in_numbers}
     notes: tuple[Note, ...] = ()
     if table.converted:
         conventions = (table.description.convention.value, table.convention.value)
         notes = (Note(NoteKind.OTHER_CONVENTION, "dh", conventions),)
     wrong = [i for i, row in enumerate(rows) if row.verdict is Verdict.WRONG]
+    entries = _entries(rows)
     if not wrong:
-        return TableJudgement(_entries(rows), notes=notes, judged_at=at)
+        return TableJudgement(entries, notes=notes, judged_at=judged_at)
     mistakes = row_mistakes(table, wrong)
     overlay = _overlay(table)
-    # Without changes all frames are the file's, within 1e-9: a number is off by less, which is another arm's.
+    # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
-        return _in_other_frames(rows, wrong, mistakes, overlay, task, notes, at)
-    entries = _entries(rows)
+        return _judge_in_other_frames(rows, wrong, mistakes, overlay, task, notes, judged_at)
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
         other, given = other_convention(table.convention).value, table.convention.value
         detail = f"it is the {other} one, and was handed in as {given}"
-        diagnosis = (_of_table("other_convention", entries, detail),)
-    return TableJudgement(entries, diagnosis, notes, at)
+        diagnosis = (_diagnosis_of_table("other_convention", entries, detail),)
+    return TableJudgement(entries, diagnosis, notes, judged_at)
 
 
-def _in_other_frames(
+def _judge_in_other_frames(
     rows: Sequence[JudgedRow],
     wrong: Sequence[int],
     mistakes: tuple[RowMistake, ...],
     overlay: Overlay,
-    task: Task,
+    task: Requirements,
     notes: tuple[Note, ...],
-    at: dict[str, float],
+    judged_at: Mapping[str, float],
 ) -> TableJudgement:
-    """Return the judgement of a table that is the same arm in other frames: a choice, unless it is rather a slip.
+    """Judge a table that is the same arm in other frames: a choice of frames, or a single slip.
 
-    One slip is more likely than a choice of frames that differs in one entry alone; several slips are a choice.
+    One slip is likelier than a choice of frames that differs in one entry alone; several slips are a choice.
     """
     slips = mistakes if len(mistakes) == 1 and mistakes[0].is_specific else ()
-    refused = _refused(overlay, task)
-    verdict, statement = Verdict.UNDECIDED, "the same arm in other frames, numerically"
-    moved = [replace(row, verdict=verdict, statement=statement) if i in wrong else row for i, row in enumerate(rows)]
-    if slips or refused:
-        moved = [replace(row, statement=row.statement + refused) if i in wrong else row for i, row in enumerate(rows)]
-    entries = _entries(moved)
-    diagnosis = tuple(slip.diagnosis() for slip in slips)
+    refusal = _refusal(overlay, task)
+    rows = list(rows)
+    for i in wrong:
+        rows[i] = (
+            replace(rows[i], statement=rows[i].statement + refusal)
+            if slips or refusal
+            else replace(rows[i], verdict=Verdict.UNDECIDED, statement="the same arm in other frames, numerically")
+        )
+    entries = _entries(rows)
     if slips:
+        diagnosis = tuple(slip.diagnosis() for slip in slips)
         notes = (*notes, Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"))
     else:
-        diagnosis = (_of_table("other_frames", entries, "; ".join(map(str, overlay.changes))),)
-    return TableJudgement(entries, diagnosis, notes, at, overlay.changes, overlay.moves_zero)
+        diagnosis = (_diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes))),)
+    return TableJudgement(entries, diagnosis, notes, judged_at, overlay.changes, overlay.moves_zero)
 
 
-def _refused(overlay: Overlay, task: Task) -> str:
-    """Return why a table in other frames is wrong for this task; empty where it is allowed."""
+def _refusal(overlay: Overlay, task: Requirements) -> str:
+    """Return why a table in other frames is wrong for a task; empty if it is allowed."""
     if task.frames_given:
         return ": the task gives the frames"
-    if overlay.moves_zero and task.zero_given:
-        return ": the task gives the zero pose"
-    return ""
+    return ": the task gives the zero pose" if overlay.moves_zero and task.zero_given else ""
 
 
 def _entries(rows: Sequence[JudgedRow]) -> tuple[Entry, ...]:
     return tuple(Entry("dh", (i,), row.verdict, statement=row.statement) for i, row in enumerate(rows))
 
 
-def _of_table(mistake: str, entries: Sequence[Entry], detail: str) -> Diagnosis:
-    """Return a diagnosis of the whole table: it concerns all rows that are not right."""
+def _diagnosis_of_table(mistake: str, entries: Sequence[Entry], detail: str) -> Diagnosis:
+    """Return a diagnosis of the whole table, which concerns all rows that are not right."""
     concerned = tuple(entry.name for entry in entries if entry.verdict is not Verdict.CORRECT)
     return Diagnosis(mistake, sentence_of(mistake, detail=detail), "dh", concerned, hint_of(mistake))
 
 
 def _overlay(table: TableRows) -> Overlay | None:
-    """Return how the frames lie on the file's where the table is the same arm; None where it is another arm."""
+    """Return how the answer's frames lie on the file's; None if the answer is another arm."""
     strict, kinds = not table.converted, table.description.kinds
-    found: Overlay | None = None
-    symbolic = table.description.parameters and not any(table.has_numbers(i) for i in range(table.n))
-    for values in table.states[: 2 if symbolic else 1]:
+    best: Overlay | None = None
+    is_symbolic = table.description.parameters and not any(table.has_numbers(i) for i in range(table.n))
+    for values in table.states[: 2 if is_symbolic else 1]:
         answer = TableArm.of_trees(table.answer.trees, kinds, table.convention, values)
         truth = TableArm.of_rows(table.reference, kinds, table.convention, values)
         overlay = None if answer is None else overlaid(answer, truth, strict)
         if overlay is None:
             return None
-        found = found if found is not None and found.changes else overlay
-    return found
+        best = best if best is not None and best.changes else overlay
+    return best
 
 
 def _is_of_other_convention(table: TableRows) -> bool:
-    """Return whether the rows, read in the other convention, are this arm."""
+    """Whether the rows, read in the other convention, are this arm."""
     other = replace(table, convention=other_convention(table.convention))
     return all(other.row(i).verdict is Verdict.CORRECT for i in range(table.n)) or _overlay(other) is not None
+
+
+# Mistakes in rows
+
+
+@dataclass(frozen=True)
+class RowMistake:
+    """Mistake in a row.
+
+    Attributes
+    ----------
+    mistake
+        Identity of a mistake of the library.
+    row
+        Number of the row, from 0.
+    where
+        Rows or entry that the mistake concerns, in words.
+    is_specific
+        Whether the mistake says what is wrong with an entry, and not only that it is wrong.
+    """
+
+    mistake: str
+    row: int
+    where: str
+    is_specific: bool = True
+
+    def diagnosis(self) -> Diagnosis:
+        """Return the diagnosis for a report."""
+        sentence = sentence_of(self.mistake, self.where)
+        names = (entry_name("dh", (self.row,)),)
+        return Diagnosis(self.mistake, sentence, f"dh, row {self.row + 1}", names, hint_of(self.mistake))
+
+
+def row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[RowMistake, ...]:
+    """Return the mistakes in wrong rows, from 0, in their order; rows outside exact arithmetic are left out."""
+    mistakes = []
+    left = list(wrong)
+    for i, j in combinations(wrong, 2):
+        if i in left and j in left and _matches(table, i, j) and _matches(table, j, i):
+            left = [k for k in left if k not in (i, j)]
+            mistakes += [RowMistake("rows_exchanged", k, f"rows {i + 1} and {j + 1}") for k in (i, j)]
+    for i in left:
+        if None not in table.answer.entries[i]:
+            mistakes += _explain_row(table, i)
+    return tuple(sorted(mistakes, key=lambda mistake: mistake.row))
+
+
+def _matches(table: TableRows, i: int, j: int) -> bool:
+    """Whether row i of the answer is row j of the file, with the variable of joint i or of joint j."""
+    own = {f"q{j + 1}": Expression.symbol(f"q{i + 1}")}
+    moved = tuple(substitute(entry, own) for entry in table.reference[j])
+    return any(all(table.equal(i, column, row[column]) for column in range(4)) for row in (moved, table.reference[j]))
+
+
+def _explain_row(table: TableRows, i: int) -> Iterator[RowMistake]:
+    """Yield the mistakes in row i: one of the whole row, or one for each wrong entry."""
+    theta, d, a, alpha = table.reference[i]
+    q = Expression.symbol(f"q{i + 1}")
+    turning = table.description.kinds[i] == "R"
+    exchanged = (theta, a, d, alpha) if turning else (theta, a + q, d - q, alpha)
+    column = (theta - q, d + q, a, alpha) if turning else (theta + q, d - q, a, alpha)
+    for name, row in (("a_d_exchanged", exchanged), ("variable_column", column)):
+        if all(table.equal(i, k, entry) for k, entry in enumerate(row)):
+            yield RowMistake(name, i, f"row {i + 1}")
+            return
+    for k, truth in enumerate(table.reference[i]):
+        if not table.equal(i, k, truth):
+            yield _explain_entry(table, i, k, truth)
+
+
+def _explain_entry(table: TableRows, i: int, k: int, truth: Expression) -> RowMistake:
+    where = f"row {i + 1}, {COLUMNS[k]} = {table.answer.entries[i][k]}"
+    for name, entry in _wrong_entries(table, i, k, truth):
+        if table.equal(i, k, entry):
+            return RowMistake(name, i, where)
+    return RowMistake(UNEXPLAINED[COLUMNS[k]], i, where, is_specific=False)
+
+
+def _wrong_entries(table: TableRows, i: int, k: int, truth: Expression) -> Iterator[tuple[str, Expression]]:
+    """Yield mistakes in an entry, each with the entry that it gives."""
+    own = COLUMNS[k] == ("theta" if table.description.kinds[i] == "R" else "d")
+    q = Expression.symbol(f"q{i + 1}") if own else ZERO
+    offset = truth - q
+    if own:
+        yield "variable_forgotten", offset
+        for j in range(table.n):
+            yield "variable_of_another_joint", offset + Expression.symbol(f"q{j + 1}")
+    if COLUMNS[k] in ("d", "a"):
+        yield "length_sign", q - offset
+        yield f"{COLUMNS[k]}_forgotten", q
+        yield "millimetres_for_metres", q + offset * 1000
+        return
+    yield "degrees_for_radians", q + offset * 180 / PI
+    if COLUMNS[k] == "alpha":
+        yield "alpha_sign", -truth
+        yield "alpha_forgotten", ZERO
+        return
+    yield "theta_offset_forgotten", q
+    yield "theta_offset_sign", q - offset
+    yield "theta_sign", -truth

@@ -1,8 +1,8 @@
-"""What is right: an arm's equations and transforms in the exact ring, in the student's coordinates."""
+"""Right answers: an arm's equations and transforms in the exact ring, in the student's coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -12,24 +12,25 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.description.parameters import resolved
 from dhkit.grading.judging.coordinates import Coordinates
+from dhkit.grading.judging.quotients import RingReader
 from dhkit.symbolic import ExactArm, Lagrangian, lagrangian
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
 
 DYNAMICS = ("M", "C", "h", "g", "tau", "K", "V", "L")
-"""Quantities of the equations of motion, in the order in which they are derived from one another."""
+"""Quantities of the equations of motion, each derived from those before it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The right answers for a robot.
+    """Right answers for a robot.
 
     Attributes
     ----------
     description
         The robot.
     coordinates
-        In which joint variables torques and mass matrices are asked for.
+        Joint variables in which torques and mass matrices are asked for.
     friction
         Whether tau includes viscous friction.
     """
@@ -37,7 +38,7 @@ class Truth:
     description: Description
     coordinates: Coordinates
     friction: bool = False
-    _made: dict[str, Elements] = field(default_factory=dict, repr=False)
+    _values: dict[str, Elements] = field(default_factory=dict, repr=False)
 
     @cached_property
     def kinematics(self) -> TextbookKinematics:
@@ -56,38 +57,41 @@ class Truth:
         return lagrangian(self.description)
 
     def arm(self, quantity: str) -> ExactArm:
-        """Return the arm in whose ring a quantity is."""
+        """Return the arm whose ring holds a quantity."""
         return self.lagrangian.arm if quantity in DYNAMICS else self.kinematics.arm
 
-    def others(self, quantity: str) -> dict[str, Fraction]:
-        """Return the numbers of the parameters that a quantity's ring does not have."""
-        known = set(self.arm(quantity).ring.constants)
-        names = (name for name in self.description.parameters if name not in known)
-        return {name: exact_number(self.description, name) for name in names}
+    def reader(self, quantity: str) -> RingReader:
+        """Return a reader into a quantity's ring, with numbers for the parameters that the ring does not have."""
+        ring = self.arm(quantity).ring
+        names = self.description.parameters.keys() - set(ring.constants)
+        return RingReader(ring, numbers={name: exact_number(self.description, name) for name in names})
 
     def of(self, quantity: str) -> Elements:
-        """Return a quantity's right value, an array of elements.
+        """Return the right value of a quantity, an array of elements in the quantity's shape.
 
         Raises
         ------
         DescriptionError
             A link has no body, and the quantity needs it.
         """
-        if quantity not in self._made:
-            self._made[quantity] = self.coordinates.in_y(quantity, self._robots(quantity))
-        return self._made[quantity]
+        if quantity not in self._values:
+            self._values[quantity] = self.coordinates.in_y(quantity, self._in_robot_variables(quantity))
+        return self._values[quantity]
 
-    def _robots(self, quantity: str) -> Elements:
+    def with_numbers(self, quantity: str, array: Elements, numbers: Collection[str]) -> Elements:
+        """Return elements of a quantity's ring with the file's numbers in place of some parameters."""
+        ring = self.arm(quantity).ring
+        return substituted(array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring)
+
+    def _in_robot_variables(self, quantity: str) -> Elements:
         if quantity not in DYNAMICS:
             return kinematic_quantity(self.kinematics, quantity)
-        lag = self.lagrangian
-        value = lag.K - lag.V if quantity == "L" else getattr(lag, quantity)
-        array = element_array(value)
+        array = right_value(self.lagrangian, quantity)
         return array + self.viscous if quantity == "tau" and self.friction else array
 
     @cached_property
     def viscous(self) -> Elements:
-        """Friction torques gear^2 B qd on the joints' side, shape (n,)."""
+        """Viscous friction torques gear^2 B qd on the joints' side, shape (n,), N m or N."""
         arm = self.lagrangian.arm
         pairs = zip(arm.gear, arm.viscous, strict=True)
         return element_array([gear * gear * B * arm.ring.rate(i) for i, (gear, B) in enumerate(pairs)])
@@ -95,29 +99,38 @@ class Truth:
 
 @lru_cache(maxsize=32)
 def truth_of(description: Description, absolute: bool = False, friction: bool = False) -> Truth:
-    """Return the right answers; the same object each time, so that nothing is derived twice."""
+    """Return the right answers for a robot; the same object each time, so that nothing is derived twice."""
     arm = derive_kinematics(description).arm
     coordinates = Coordinates.absolute(arm) if absolute else Coordinates.relative(description.n)
     return Truth(description, coordinates, friction)
 
 
+def right_value(lag: Lagrangian, quantity: str) -> Elements:
+    """Return M, C, h, g, tau, K, V or L in the robot's own joint variables, without friction."""
+    return element_array(lag.K - lag.V if quantity == "L" else getattr(lag, quantity))
+
+
 def kinematic_quantity(kinematics: TextbookKinematics, quantity: str) -> Elements:
-    """Return A1 ... An, T or J of a derivation."""
+    """Return A1 ... An (4, 4), T (4, 4) or J (6, n) of a derivation."""
     if quantity in ("T", "J"):
         return kinematics.T if quantity == "T" else kinematics.J
     return kinematics.A[int(quantity[1:]) - 1]
 
 
 def substituted(array: Elements, values: Mapping[str, Element], ring: Ring) -> Elements:
-    """Return elements with constants replaced, by their texts."""
-    places = {ring.place("constant", text): value for text, value in values.items()}
+    """Return elements with constants, given by their texts, replaced by elements of a ring."""
+    return translated_array(array, {ring.place("constant", text): value for text, value in values.items()}, ring)
+
+
+def translated_array(array: Elements, places: Mapping[int, Element], ring: Ring | None = None) -> Elements:
+    """Return elements with generators, given by their places, replaced; in their own ring unless another is given."""
     result = np.empty(array.shape, dtype=object)
-    for place, element in np.ndenumerate(array):
-        result[place] = translated(element, ring, places)
+    for index, element in np.ndenumerate(array):
+        result[index] = translated(element, element.ring if ring is None else ring, places)
     return result
 
 
 def exact_number(description: Description, name: str) -> Fraction:
-    """Return a parameter's number in the file."""
+    """Return the number of a parameter in the file, in SI units or rad."""
     value = resolved(description.parameters)[name]
     return value.value() if value.rational is None else value.rational

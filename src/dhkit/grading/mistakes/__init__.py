@@ -1,1 +1,1 @@
-"""Where students go wrong: a library of mistakes, what each changes on a robot, and which one gives an answer."""
+"""Mistakes of students: a library, the changes that each causes on a robot, and the search for those in an answer."""

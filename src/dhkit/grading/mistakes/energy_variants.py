@@ -1,20 +1,19 @@
-"""Mistakes that change the energies of a link, of one of its bodies, or of a rotor, and through them all equations."""
+"""Mistakes in the energies of a link, one of its bodies, or a rotor, which change all equations of motion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
 from itertools import combinations
 
 from dhkit.description import Convention, Description, Joint
 from dhkit.errors import DhkitError
 from dhkit.expressions import ZERO, Expression
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.mistakes.variants import Change, Variant
+from dhkit.grading.mistakes.variants import Change, Variant, make_lazily
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
-from dhkit.symbolic.ring import Element, Elements, element_array, translated
+from dhkit.symbolic.ring import Element, element_array, translated
 from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 
 HALF = Fraction(1, 2)
@@ -27,32 +26,32 @@ SHAPES = {
     "inertia_quarter_for_rod": (3,),
     "rod_with_half_length": (Fraction(1, 4),),
 }
-"""What m l^2/12 about the centre is multiplied by: m l^2/2, m l^2/3, m l^2 about the centre and about the end, ..."""
+"""By mistake: factors of a rod's m l^2/12 about its centre, such as 6 for m l^2/2."""
 OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_about_com_at_joint")) | frozenset(
     ("velocity_relative_angle", "height_relative_angle")
 )
-"""Mistakes with the angle of a link's joint, or with the inertia about its axis."""
+"""Mistakes with the angle of a revolute joint, or with the inertia about its axis."""
 RARER = frozenset(("inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
-"""Mistakes of the textbook that are made less often than those that give the same answers."""
+"""Mistakes of the textbook that are rarer than others which give the same answers."""
 INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
-"""Mistakes that are made at some links, where the first link only turns about its own axis."""
+"""Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
 MAX_LINKS_OF_SUBSETS = 4
-"""Links of arms at some of which a mistake may be made."""
+"""Largest number of links of which all subsets are tried."""
 EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A body of a link, and what mistakes at it are called.
+    """Body of a link, with its name in the places of mistakes.
 
     Attributes
     ----------
     link
-        From 1.
+        Number of the link, from 1.
     name
-        The body's; None where its link has no other body.
+        Name of the body; None if its link has no other body.
     motion
-        What the derivation finds of it.
+        The body's motion and energies by the derivation.
     """
 
     link: int
@@ -61,10 +60,10 @@ class _Part:
 
     @property
     def place(self) -> str:
-        """Where it is, in words."""
+        """Link and body in words."""
         return f"link {self.link}" if self.name is None else f"link {self.link}, {self.name}"
 
-    def made(self, identity: str) -> MadeAt:
+    def mistake(self, identity: str) -> MadeAt:
         """Return a mistake at this body alone."""
         return MadeAt(identity, self.link, self.name)
 
@@ -90,7 +89,7 @@ def energy_variants(truth: Truth) -> Iterator[Variant]:
 
 
 def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield the mistakes that the textbook's derivation knows, the more frequent first."""
+    """Yield the mistakes of the textbook's derivation, the more frequent first."""
     n = textbook.arm.n
     names = [name for name in MISTAKES if name in LINK_MISTAKES | ROTOR_MISTAKES]
     several = [part for part in _parts(textbook) if part.name is not None]
@@ -99,28 +98,30 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
         return int(name in RARER)
 
     for name in names:
-        yield Variant(MadeAt(name), _derived(textbook, MadeAt(name)), rarity=rarity(name))
+        yield Variant(MadeAt(name), make_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
         for i in range(1, n + 1):
             if n == 1 or not _is_possible(textbook, name, i):
                 continue
-            yield Variant(MadeAt(name, i), _derived(textbook, MadeAt(name, i)), f"link {i}", rarity(name))
+            made = MadeAt(name, i)
+            yield Variant(made, make_lazily(_derived, textbook, made), f"link {i}", rarity(name))
     for name in INERTIA_MISTAKES:
         for links in _subsets([i for i in range(1, n + 1) if _is_possible(textbook, name, i)]):
-            change = _derived(textbook, *(MadeAt(name, i) for i in links))
-            yield Variant(MadeAt(name), change, _listed(links), 1)
+            make = make_lazily(_derived, textbook, *(MadeAt(name, i) for i in links))
+            yield Variant(MadeAt(name), make, _listed(links), 1)
     for name in names:
         for part in several if name in LINK_MISTAKES else ():
             if _is_possible(textbook, name, part.link):
-                yield Variant(part.made(name), _derived(textbook, part.made(name)), part.place, 1 + rarity(name))
+                made = part.mistake(name)
+                yield Variant(made, make_lazily(_derived, textbook, made), part.place, 1 + rarity(name))
 
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
-    """Whether a mistake can be made at a link: what slides has no angle of its own, and no parallel axis."""
+    """Whether a mistake can be made at a link, from 1: a sliding joint has no angle and no parallel axis."""
     return name not in OF_TURNING or textbook.arm.ring.kinds[link - 1] == "R"
 
 
 def _subsets(links: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Yield several of some links, not all of them."""
+    """Yield the subsets of at least two links, without all of them; none of more than four links."""
     if len(links) <= MAX_LINKS_OF_SUBSETS:
         for count in range(2, len(links)):
             yield from combinations(links, count)
@@ -130,44 +131,30 @@ def _listed(links: Sequence[int]) -> str:
     return f"links {', '.join(map(str, links[:-1]))} and {links[-1]}"
 
 
-def _derived(textbook: TextbookDerivation, *made: MadeAt) -> Callable[[str], Elements]:
-    def change() -> Change:
-        wrong = derive(textbook.arm.description, made, textbook.arm.symbols)
-        return Change(wrong.K - textbook.K, wrong.V - textbook.V)
-
-    return _lazily(change)
-
-
-def _lazily(change: Callable[[], Change]) -> Callable[[str], Elements]:
-    """Return what a change adds to a quantity; the change is made once."""
-    made: list[Change] = []
-
-    def make(quantity: str) -> Elements:
-        if not made:
-            made.append(change())
-        return made[0].of(quantity)
-
-    return make
+def _derived(textbook: TextbookDerivation, *made: MadeAt) -> Change:
+    """Return the change of the energies if a derivation makes some mistakes."""
+    wrong = derive(textbook.arm.description, made, textbook.arm.symbols)
+    return Change(wrong.K - textbook.K, wrong.V - textbook.V)
 
 
 # Several bodies on a link
 
 
 def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield a link's second and further bodies left out, and placed where its first one is."""
+    """Yield mistakes with a link's further bodies: left out, or placed at the first body."""
     arm, ring = textbook.arm, textbook.arm.ring
     for part in _parts(textbook):
         if part.name is None or part.motion.body is arm.bodies[part.link - 1][0]:
             continue
         left_out = Change(-part.motion.K, -part.motion.V)
-        yield Variant(part.made("payload_forgotten"), left_out.of, part.place)
-        yield Variant(part.made("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
-        moved = partial(_of_description, textbook, _with_com_of_first(arm.description, part))
-        yield Variant(part.made("payload_at_com"), _lazily(moved), part.place)
+        yield Variant(part.mistake("payload_forgotten"), left_out.of, part.place)
+        yield Variant(part.mistake("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
+        make = make_lazily(_of_description, textbook, _with_com_of_first(arm.description, part))
+        yield Variant(part.mistake("payload_at_com"), make, part.place)
 
 
 def _with_com_of_first(description: Description, part: _Part) -> Description:
-    """Return an arm with a body where its link's first one is."""
+    """Return an arm with a body moved to the centre of mass of its link's first body."""
     joints = list(description.joints)
     own = joints[part.link - 1]
     bodies = (replace(body, com=own.bodies[0].com) if body.name == part.name else body for body in own.bodies)
@@ -179,7 +166,7 @@ def _with_com_of_first(description: Description, part: _Part) -> Description:
 
 
 def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield the inertia of another body, or of another point, at all bodies alike or at one."""
+    """Yield mistakes with the inertia: of another body, or about another point; at all bodies or at one."""
     parts = _parts(textbook)
     rods = [part for part in parts if _is_rod(part)]
     for identity, factors in SHAPES.items():
@@ -189,26 +176,26 @@ def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
     for part in parts:
         for a, b in EXCHANGED_AXES:
             place = f"{part.place}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
-            change = partial(_exchanged_moments, textbook, part, a, b)
-            yield Variant(part.made("inertia_moments_exchanged"), _lazily(change), place, 1)
+            make = make_lazily(_exchanged_moments, textbook, part, a, b)
+            yield Variant(part.mistake("inertia_moments_exchanged"), make, place, 1)
 
 
 def _scaled_inertia(
     textbook: TextbookDerivation, identity: str, factor: Fraction, parts: Sequence[_Part]
 ) -> Iterator[Variant]:
     if len(parts) > 1:
-        yield Variant(MadeAt(identity), _lazily(partial(_more_inertia, textbook, parts, factor - 1)), rarity=1)
+        yield Variant(MadeAt(identity), make_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1)
     by_link = {part.link: part for part in parts}
     for links in _subsets([*by_link]) if len(by_link) == len(parts) else ():
-        change = partial(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
-        yield Variant(MadeAt(identity), _lazily(change), _listed(links), 1)
+        make = make_lazily(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
+        yield Variant(MadeAt(identity), make, _listed(links), 1)
     for part in parts:
         place = part.place if textbook.arm.n > 1 or part.name is not None else ""
-        yield Variant(part.made(identity), _lazily(partial(_more_inertia, textbook, [part], factor - 1)), place, 1)
+        yield Variant(part.mistake(identity), make_lazily(_more_inertia, textbook, [part], factor - 1), place, 1)
 
 
 def _is_rod(part: _Part) -> bool:
-    """Whether an inertia is m l^2/12 of a rod whose centre of mass is half its length from the link's frame."""
+    """Whether an inertia is a rod's m l^2/12, with the centre of mass at half its length from the link's frame."""
     body = part.motion.body
     square = body.com @ body.com
     moment = body.mass * square * 4
@@ -239,13 +226,13 @@ def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
     for i, j in combinations(range(arm.n), 2):
         if arm.rotor[i] or arm.rotor[j]:
             place = f"joints {i + 1} and {j + 1}"
-            yield Variant(MadeAt("drives_exchanged"), _lazily(partial(_exchanged_drives, textbook, i, j)), place, 1)
+            yield Variant(MadeAt("drives_exchanged"), make_lazily(_exchanged_drives, textbook, i, j), place, 1)
     driven = [i for i in range(arm.n) if arm.rotor[i] and _inverse(arm.gear[i]) is not None]
     if driven:
-        yield Variant(MadeAt("gear_inverted"), _lazily(partial(_inverted_gears, textbook, driven)), rarity=1)
+        yield Variant(MadeAt("gear_inverted"), make_lazily(_inverted_gears, textbook, driven), rarity=1)
     for i in driven if arm.n > 1 else ():
         made = MadeAt("gear_inverted", i + 1)
-        yield Variant(made, _lazily(partial(_inverted_gears, textbook, [i])), f"joint {i + 1}", 1)
+        yield Variant(made, make_lazily(_inverted_gears, textbook, [i]), f"joint {i + 1}", 1)
 
 
 def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
@@ -266,7 +253,7 @@ def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Chan
 
 
 def _inverse(gear: Element) -> Element | None:
-    """Return one over a gear ratio that is a number."""
+    """Return the reciprocal of a gear ratio; None if the ratio is no number."""
     terms = gear.terms
     if len(terms) != 1 or any(any(monomial) for monomial in terms):
         return None
@@ -277,23 +264,23 @@ def _inverse(gear: Element) -> Element | None:
 
 
 def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield positions of links that lack the variable of one sliding joint."""
+    """Yield mistakes in positions of links: the variable of one sliding joint is missing."""
     ring = textbook.arm.ring
     for k in range(ring.n):
         if ring.kinds[k] == "R":
             continue
         for i in range(k, ring.n):
             place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
-            change = partial(_without_slide, textbook, textbook.links[i].bodies, k)
-            yield Variant(MadeAt("slide_forgotten", i + 1), _lazily(change), place, 2)
+            make = make_lazily(_without_slide, textbook, textbook.links[i].bodies, k)
+            yield Variant(MadeAt("slide_forgotten", i + 1), make, place, 2)
         for part in _parts(textbook):
             if part.name is not None and part.link > k:
-                change = partial(_without_slide, textbook, [part.motion], k)
-                yield Variant(part.made("slide_forgotten"), _lazily(change), f"{part.place}, q{k + 1}", 2)
+                make = make_lazily(_without_slide, textbook, [part.motion], k)
+                yield Variant(part.mistake("slide_forgotten"), make, f"{part.place}, q{k + 1}", 2)
 
 
 def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
-    """Take a slide for fixed at zero where centres of mass are placed; they may still turn with their joints."""
+    """Return the change if a sliding joint is fixed at zero in the positions of bodies, not in their orientations."""
     arm, ring = textbook.arm, textbook.arm.ring
     K, V = ring.zero, ring.zero
     for motion in motions:
@@ -312,34 +299,34 @@ def _tables(textbook: TextbookDerivation) -> Iterator[Variant]:
     description = textbook.arm.description
     standard = description.convention is Convention.STANDARD
     other = replace(description, convention=Convention.MODIFIED if standard else Convention.STANDARD)
-    yield Variant(MadeAt("convention_in_dynamics"), _lazily(partial(_of_description, textbook, other)), rarity=1)
+    yield Variant(MadeAt("convention_in_dynamics"), make_lazily(_of_description, textbook, other), rarity=1)
     turned = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
     for links in ([turned] if len(turned) > 1 else []) + [[i] for i in turned]:
         made = MadeAt("twist_sign_in_dynamics", links[0] + 1 if len(links) == 1 else None)
         place = f"row {links[0] + 1}" if len(links) == 1 else ""
         wrong = _with_twists_turned(description, links)
-        yield Variant(made, _lazily(partial(_of_description, textbook, wrong)), place, 1)
+        yield Variant(made, make_lazily(_of_description, textbook, wrong), place, 1)
 
     if any(not x.symbols and not x.is_zero for joint in description.joints for x in _lengths(joint)):
         wrong = replace(description, joints=tuple(map(_in_millimetres, description.joints)))
         made = MadeAt("millimetres_for_metres")
-        yield Variant(made, _lazily(partial(_of_description, textbook, wrong)), rarity=1)
+        yield Variant(made, make_lazily(_of_description, textbook, wrong), rarity=1)
     for i, joint in enumerate(description.joints):
         offset = "theta" if description.kinds[i] == "R" else "d"
         if not getattr(joint, offset).is_zero:
             without = replace(joint, theta=ZERO) if offset == "theta" else replace(joint, d=ZERO)
             joints = (*description.joints[:i], without, *description.joints[i + 1 :])
-            change = partial(_of_description, textbook, replace(description, joints=joints))
-            yield Variant(MadeAt("offset_in_dynamics", i + 1), _lazily(change), f"q{i + 1}", 1)
+            make = make_lazily(_of_description, textbook, replace(description, joints=joints))
+            yield Variant(MadeAt("offset_in_dynamics", i + 1), make, f"q{i + 1}", 1)
 
 
 def _lengths(joint: Joint) -> list[Expression]:
-    """Return a row's lengths, and those of its bodies' places."""
+    """Return the lengths of a row and of its bodies' centres of mass, m."""
     return [joint.a, joint.d, *(x for body in joint.bodies for x in body.com)]
 
 
 def _in_millimetres(joint: Joint) -> Joint:
-    """Return a row whose lengths are numbers a thousand times as large; inertias stay."""
+    """Return a row whose lengths are multiplied by a thousand; inertias stay."""
     bodies = tuple(
         replace(body, com=(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES))
         for body in joint.bodies
@@ -348,16 +335,15 @@ def _in_millimetres(joint: Joint) -> Joint:
     return replace(joint, a=joint.a * MILLIMETRES, d=joint.d * MILLIMETRES, bodies=bodies)
 
 
-def _with_twists_turned(description: Description, links: Iterable[int]) -> Description:
-    changed = set(links)
+def _with_twists_turned(description: Description, links: Collection[int]) -> Description:
     joints = tuple(
-        replace(joint, alpha=-joint.alpha) if i in changed else joint for i, joint in enumerate(description.joints)
+        replace(joint, alpha=-joint.alpha) if i in links else joint for i, joint in enumerate(description.joints)
     )
     return replace(description, joints=joints)
 
 
 def _of_description(textbook: TextbookDerivation, description: Description) -> Change:
-    """Return by how much the energies of another description differ; nothing where its ring has other constants."""
+    """Return the change of the energies to another description's; zero if its ring has other constants."""
     ring = textbook.arm.ring
     try:
         wrong = derive(description, symbols=textbook.arm.symbols)

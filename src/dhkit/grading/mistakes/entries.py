@@ -1,31 +1,35 @@
-"""What is wrong in one entry: its factor, its mirror image, a slip in one of its terms, or its terms in words."""
+"""Errors in one entry: a factor, a mirror image, a slip in a term; or a description of its terms."""
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from dhkit.errors import AnswerError
-from dhkit.grading.capitals import capitalised
 from dhkit.grading.judging.coordinates import ANGLE
 from dhkit.grading.judging.findings import readable
-from dhkit.grading.judging.quantities import JudgedQuantity
-from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
+from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
+from dhkit.grading.judging.quotients import OutsideTheRingError
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.mistakes.diagnosis import Index, place_of, varying
-from dhkit.grading.mistakes.library import FACTORS, hint_of
+from dhkit.grading.mistakes.diagnosis import varying
+from dhkit.grading.mistakes.library import FACTORS, capitalize, hint_of
 from dhkit.grading.mistakes.slips import Slip, slip_in
-from dhkit.grading.mistakes.terms import describe
-from dhkit.grading.mistakes.wording import diagnosis_of_identity, entry_names, wrong_entries
+from dhkit.grading.mistakes.wording import diagnosis_of_identity, entry_names
 from dhkit.grading.report import Diagnosis
+from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
+from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element
 
 MAX_TERMS = 150
-"""Terms in which an entry may differ for a slip in one of them to be looked for."""
-MAX_DESCRIBED = 600
-"""Terms of an entry that is described term by term."""
+"""Largest number of differing terms of an entry in which a slip is looked for."""
+MAX_DESCRIBED_TERMS = 600
+"""Largest number of terms of an entry that is described term by term."""
+MAX_NAMED_TERMS = 3
+"""Largest number of terms of each kind that a description names."""
 
 
 def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
-    """Return the one slip in a term of a wrong entry; None where there is none, or more."""
+    """Return the slip in a term of a wrong entry; None if there is none, or more than one."""
     difference, right = quantity.findings[index].difference, quantity.right(index)
     if difference is None or difference.is_zero or len(difference) > MAX_TERMS:
         return None
@@ -34,34 +38,33 @@ def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None
         difference, right = varying(difference), varying(right)
     if quantity.name == "g" and not right and _is_weight(truth, difference):
         return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
-    return slip_shown(truth, quantity.name, right + difference, right)
+    return slip_between(truth, quantity.name, right + difference, right)
 
 
-def slip_shown(truth: Truth, name: str, answer: Element, right: Element) -> Slip | None:
-    """Return the slip that makes an answer of the truth, in the student's own rates and angles."""
+def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Slip | None:
+    """Return the slip that turns the truth into an answer, in the student's own rates and angles."""
     own = truth.coordinates.in_own_rates
     slip = slip_in(truth.arm(name), own(answer), own(right))
     return None if slip is None else Slip(slip.identity, in_own_angles(truth, slip.detail))
 
 
 def in_own_angles(truth: Truth, text: str) -> str:
-    """Return a formula's text in the student's own angles."""
+    """Return a printed formula in the student's own angles."""
     if any(ANGLE.fullmatch(name) for name in truth.description.parameters):
         return text
     return truth.coordinates.in_own_angles(text)
 
 
 def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
-    """Return the slip in the one entry of a row of C that is not the Christoffel factorization's."""
-    arm = truth.arm("C")
-    reading = Reading(arm.ring, others=truth.others("C"))
+    """Return the slip in the only entry of a row of C that differs from the Christoffel factorization; else None."""
+    reader = truth.reader("C")
     right = truth.coordinates.in_y("C", truth.lagrangian.C)
     differing: list[tuple[Element, Element]] = []
     for given in quantity.given:
         if given.index[0] != index[0] or given.tree is None:
             continue
         try:
-            answer = reading.read(given.tree).element()
+            answer = reader.read(given.tree).element()
         except (OutsideTheRingError, AnswerError):
             return None
         if answer is None:
@@ -73,19 +76,19 @@ def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | No
     answer, entry = differing[0]
     names = (identity for identity, factor in FACTORS.items() if answer == entry * factor)
     identity = next(names, None)
-    return slip_shown(truth, "C", answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
+    return slip_between(truth, "C", answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
 
 
 def _is_weight(truth: Truth, difference: Element) -> bool:
-    """Whether a torque holds the parameter that gravity is given by, or there is none."""
+    """Whether a torque contains the parameter of the gravitational acceleration, if that is a parameter."""
     names = {name for x in truth.description.gravity for name in x.symbols}
     places = [k for k, g in enumerate(difference.ring.generators) if g.text in names]
     return not places or all(any(monomial[k] for k in places) for monomial in difference.terms)
 
 
 def distinct(quantity: JudgedQuantity) -> list[Index]:
-    """Return wrong entries, of C one a row."""
-    wrong = wrong_entries(quantity)
+    """Return the indices of wrong entries; of C those of one entry in each wrong row."""
+    wrong = quantity.wrong_indices
     if quantity.name != "C":
         return wrong
     rows = {place_of("C", index): index for index in reversed(wrong)}
@@ -93,7 +96,7 @@ def distinct(quantity: JudgedQuantity) -> list[Index]:
 
 
 def mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
-    """Return what is said of an entry of M whose mirror image is right; None of any other."""
+    """Return the diagnosis of an entry of M whose mirror image is right; None for other entries."""
     if quantity.name != "M" or index[0] == index[1] or not quantity.findings[index[::-1]].verdict.passes:
         return None
     (entry,) = entry_names(quantity, [index])
@@ -101,7 +104,7 @@ def mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 
 
 def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
-    """Return what is said of an entry that is the right one times -1, 1/2, 2 or 0; None of any other."""
+    """Return the diagnosis of an entry that is the right one times -1, 1/2, 2 or 0; None for other entries."""
     difference, right = quantity.findings[index].difference, quantity.right(index)
     if difference is None or not right:
         return None
@@ -113,15 +116,48 @@ def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 
 
 def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
-    """Return what the terms of a wrong entry show where no mistake is known."""
+    """Return a diagnosis without a mistake, which compares the terms of a wrong entry with the right ones."""
     finding, right = quantity.findings[index], quantity.right(index)
     (entry,) = entry_names(quantity, [index])
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
-        words = finding.statement
-    elif len(element) > MAX_DESCRIBED:
-        words = f"{len(element)} terms, where {len(right)} are right"
+        text = finding.statement
+    elif len(element) > MAX_DESCRIBED_TERMS:
+        text = f"{len(element)} terms, where {len(right)} are right"
     else:
         own = truth.coordinates.in_own_rates
-        words = in_own_angles(truth, describe(truth.arm(quantity.name), own(element), own(right)))
-    return Diagnosis(None, capitalised(f"{words}."), entry, (entry,), hint_of(None))
+        text = in_own_angles(truth, compare_terms(truth.arm(quantity.name), own(element), own(right)))
+    return Diagnosis(None, capitalize(f"{text}."), entry, (entry,), hint_of(None))
+
+
+def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> str:
+    """Return in words how the terms of an answer differ from those of the truth.
+
+    Parameters
+    ----------
+    arm
+        Arm to whose ring the elements belong.
+    answer, truth
+        Elements of the ring.
+    """
+    # All three in the angles in which they differ least: c12 is one term, c1*c2 - s1*s2 are two.
+    truth, answer, _ = shortened_alike(arm, [truth, answer, answer - truth])
+    ours, theirs, ring = truth.terms, answer.terms, truth.ring
+
+    def text(terms: dict[tuple[int, ...], Fraction]) -> str:
+        return plain_text(ring.from_terms(terms))
+
+    differences = {
+        "missing": [text({m: c}) for m, c in ours.items() if m not in theirs],
+        "too much": [text({m: c}) for m, c in theirs.items() if m not in ours],
+        "another factor": [
+            f"{text({m: theirs[m]})} in place of {text({m: c})}"
+            for m, c in ours.items()
+            if m in theirs and theirs[m] != c
+        ],
+    }
+    parts = []
+    for kind, terms in differences.items():
+        more = f" and {len(terms) - MAX_NAMED_TERMS} more" if len(terms) > MAX_NAMED_TERMS else ""
+        parts += [f"{kind}: {', '.join(terms[:MAX_NAMED_TERMS])}{more}"] if terms else []
+    return "; ".join(parts) or "the terms are the same"

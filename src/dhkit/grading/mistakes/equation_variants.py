@@ -1,8 +1,8 @@
-"""Mistakes in Euler and Lagrange's equation, in what is done with right energies, and in coordinates."""
+"""Mistakes in Euler and Lagrange's equation with right energies, and in the choice of coordinates."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
 from itertools import combinations
@@ -10,9 +10,10 @@ from itertools import combinations
 import numpy as np
 
 from dhkit.grading.judging.coordinates import Coordinates
-from dhkit.grading.judging.truth import DYNAMICS, Truth
+from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
+from dhkit.grading.judging.truth import DYNAMICS, Truth, right_value, translated_array
 from dhkit.grading.mistakes.sums_of_angles import sums_of_angles
-from dhkit.grading.mistakes.variants import Make, Variant, changed_only, nothing, right, translated_array
+from dhkit.grading.mistakes.variants import Make, Variant, changed_only, nothing
 from dhkit.symbolic import Lagrangian
 from dhkit.symbolic.mistakes import MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
@@ -26,14 +27,14 @@ def equation_variants(truth: Truth) -> Iterator[Variant]:
     yield from _gravity_torques(truth)
     yield from _heights(truth)
     yield from _matrices(truth)
-    yield from sums_of_angles(truth.lagrangian.arm, partial(right, truth.lagrangian))
+    yield from sums_of_angles(truth.lagrangian.arm, partial(right_value, truth.lagrangian))
     yield from _other_coordinates(truth)
     yield from _zero_poses(truth)
     yield from _friction(truth) if truth.friction else ()
 
 
 def lagrangian_sum(truth: Truth) -> Variant:
-    """Return the Lagrangian as the sum of energies, and torques from it: likelier than a sign of gravity."""
+    """Return the mistake L = K + V with the torques from it, which is likelier than a sign of gravity."""
     lag = truth.lagrangian
 
     def make(quantity: str) -> Elements:
@@ -45,20 +46,17 @@ def lagrangian_sum(truth: Truth) -> Variant:
 
 
 def _signs(truth: Truth) -> Iterator[Variant]:
-    """Yield what is wrong with whole parts of the equation: their sign, or that they are missing."""
+    """Yield mistakes with whole parts of the equation: a wrong sign, or a missing part."""
     lag = truth.lagrangian
     yield Variant(MadeAt("velocity_torques_sign"), changed_only(lag, "h", lambda: -2 * lag.h))
     yield Variant(MadeAt("velocity_torques_missing"), changed_only(lag, "h", lambda: -lag.h))
-    yield Variant(MadeAt("gravity_torques_missing"), _of_one(lag, "tau", lambda: -lag.g))
-    yield Variant(MadeAt("gravity_torque_sign"), _of_one(lag, "tau", lambda: -2 * lag.g))
-    yield Variant(MadeAt("inertial_torques_missing"), _of_one(lag, "tau", lambda: lag.h + lag.g - lag.tau), rarity=1)
+    yield Variant(MadeAt("gravity_torques_missing"), changed_only(lag, "tau", lambda: -lag.g))
+    yield Variant(MadeAt("gravity_torque_sign"), changed_only(lag, "tau", lambda: -2 * lag.g))
+    yield Variant(
+        MadeAt("inertial_torques_missing"), changed_only(lag, "tau", lambda: lag.h + lag.g - lag.tau), rarity=1
+    )
     if not truth.coordinates.is_relative:
         yield Variant(MadeAt("motor_torques"), _motor_torques(truth))
-
-
-def _of_one(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Make:
-    """Return what adds to one quantity alone."""
-    return lambda quantity: change() if quantity == changed else nothing(lag, quantity)
 
 
 # Steps of Euler and Lagrange's equation
@@ -83,7 +81,7 @@ def _mass_rate(lag: Lagrangian, momenta: Elements) -> Elements:
 
 
 def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
-    """Return what changes where d/dt of cos(q) is taken for -sin(q), without q's rate."""
+    """Return the change of h if d/dt of cos(q) is taken for -sin(q), without the rate of q."""
     ring = lag.arm.ring
     bare = element_array([ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta])
     return bare - _mass_rate(lag, momenta)
@@ -98,7 +96,7 @@ def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
 
 
 def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
-    """Return what changes, in the robot's torques, where products of the student's own rates have another factor."""
+    """Return the change of the robot's h if products of the student's own rates have another factor."""
     ring, coordinates, n = truth.lagrangian.arm.ring, truth.coordinates, truth.description.n
     rates = element_array([ring.rate(i) for i in range(n)])
     in_y = {ring.place("rate", i): rate for i, rate in enumerate(coordinates.B @ rates)}
@@ -109,7 +107,7 @@ def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
 
 
 def _gravity_torques(truth: Truth) -> Iterator[Variant]:
-    """Yield gravity torques whose heights are right, and whose angles are then the joints' own."""
+    """Yield gravity torques from right heights, but with the joints' own angles."""
     textbook = derive(truth.description)
     for i in range(1, truth.description.n):
         if truth.description.kinds[i] == "R":
@@ -119,7 +117,7 @@ def _gravity_torques(truth: Truth) -> Iterator[Variant]:
 
 
 def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
-    """Return what changes where the torques of link i, from its joint on, do not see the joints before it turn."""
+    """Return the change of g if the weight of link i, from 0, is computed without the angles of preceding joints."""
     arm, link = textbook.arm, textbook.links[i]
     ring = arm.ring
     joint = textbook.links[i - 1].origin if arm.is_standard else link.origin
@@ -133,7 +131,7 @@ def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
 
 
 def _heights(truth: Truth) -> Iterator[Variant]:
-    """Yield heights whose sines and cosines are exchanged, those of a joint's angle and of the sums that it is in."""
+    """Yield heights with sine and cosine exchanged, of a joint's angle and of the sums that contain it."""
     lag = truth.lagrangian
     for i in lag.arm.ring.angles:
         for sign in (-1, 1):
@@ -149,7 +147,7 @@ def _heights(truth: Truth) -> Iterator[Variant]:
             yield Variant(MadeAt("height_sin_cos", i + 1), make, f"q{i + 1}")
 
 
-# What is done with matrices that are right
+# Mistakes with right matrices
 
 
 def _matrices(truth: Truth) -> Iterator[Variant]:
@@ -164,11 +162,11 @@ def _matrices(truth: Truth) -> Iterator[Variant]:
 
 
 def _motor_torques(truth: Truth) -> Make:
-    """Return what changes where torques stay the motors' though the angles are absolute."""
+    """Return the change if torques are the motors' although the angles are absolute."""
     lag = truth.lagrangian
 
     def make(quantity: str) -> Elements:
-        value = right(lag, quantity)
+        value = right_value(lag, quantity)
         return truth.coordinates.S.T @ value - value if value.ndim == 1 else value * 0
 
     return make
@@ -176,7 +174,7 @@ def _motor_torques(truth: Truth) -> Make:
 
 def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
     def make(quantity: str) -> Elements:
-        value = right(lag, quantity)
+        value = right_value(lag, quantity)
         if not value.ndim:
             return nothing(lag, quantity)
         order = list(range(lag.n))
@@ -187,11 +185,11 @@ def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
 
 
 def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
-    """Exchange the squares of two rates in h."""
+    """Return the change if the squares of two rates are exchanged in h."""
     ring = lag.arm.ring
     a, b = ring.place("rate", i), ring.place("rate", j)
 
-    def exchanged(torque: Element) -> Element:
+    def exchange(torque: Element) -> Element:
         terms: dict[tuple[int, ...], Fraction] = {}
         for monomial, coefficient in torque.terms.items():
             powers = list(monomial)
@@ -200,7 +198,7 @@ def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
             terms[tuple(powers)] = terms.get(tuple(powers), Fraction(0)) + coefficient
         return ring.from_terms(terms)
 
-    return changed_only(lag, "h", lambda: element_array([exchanged(x) for x in lag.h]) - lag.h)
+    return changed_only(lag, "h", lambda: element_array([exchange(x) for x in lag.h]) - lag.h)
 
 
 # Coordinates
@@ -220,31 +218,28 @@ def _other_coordinates(truth: Truth) -> Iterator[Variant]:
 
 
 def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str) -> Elements:
-    """Return what changes where an answer in other coordinates is read in the declared ones.
+    """Return the change if an answer in other coordinates is read in the declared ones.
 
-    The answer is right in ``meant``; its variables are read as ``matrix`` times the robot's.
+    The answer is right in the coordinates ``meant``; its variables are read as ``matrix`` times the robot's.
     """
     lag = truth.lagrangian
     ring, n = lag.arm.ring, lag.n
-    answer = element_array(meant.in_y(quantity, right(lag, quantity)))
+    answer = element_array(meant.in_y(quantity, right_value(lag, quantity)))
     places: dict[int, Element] = {}
     for i in range(n):
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
             places[ring.place(kind, i)] = ring.sum(generator(j) * int(matrix[i, j]) for j in range(n) if matrix[i, j])
         if i in ring.angles:
-            c, s = ring.one, ring.zero
-            for j in range(n):
-                for _ in range(abs(int(matrix[i, j]))):
-                    x, y = ring.cosine(j), ring.sine(j) * (1 if matrix[i, j] > 0 else -1)
-                    c, s = c * x - s * y, s * x + c * y
+            multiples = [multiple_angle(ring, j, int(matrix[i, j])) for j in range(n) if matrix[i, j]]
+            c, s = sum_of_angles(ring, multiples)
             places |= {ring.place("cosine", i): c, ring.place("sine", i): s}
     wrong = translated_array(answer, places)
-    change = element_array(wrong - element_array(truth.coordinates.in_y(quantity, right(lag, quantity))))
-    return _in_robots(truth.coordinates, quantity, change)
+    change = element_array(wrong - element_array(truth.coordinates.in_y(quantity, right_value(lag, quantity))))
+    return _in_robot_variables(truth.coordinates, quantity, change)
 
 
-def _in_robots(coordinates: Coordinates, quantity: str, change: Elements) -> Elements:
-    """Return what a change in the declared coordinates is in the robot's own."""
+def _in_robot_variables(coordinates: Coordinates, quantity: str, change: Elements) -> Elements:
+    """Return a change in the declared coordinates in the robot's own."""
     if coordinates.is_relative or quantity not in DYNAMICS:
         return change
     if quantity in ("M", "C"):
@@ -253,7 +248,7 @@ def _in_robots(coordinates: Coordinates, quantity: str, change: Elements) -> Ele
 
 
 def _zero_poses(truth: Truth) -> Iterator[Variant]:
-    """Yield zero poses that are a quarter turn off, and sines and cosines exchanged."""
+    """Yield zero poses that are a quarter turn off."""
     lag = truth.lagrangian
     for i in lag.arm.ring.angles:
         for identity, sign in (("zero_shifted", 1), ("zero_shifted_back", -1)):
@@ -263,7 +258,7 @@ def _zero_poses(truth: Truth) -> Iterator[Variant]:
 def _shifted(lag: Lagrangian, i: int, sign: int) -> Make:
     ring = lag.arm.ring
     turned = {ring.place("cosine", i): ring.sine(i) * -sign, ring.place("sine", i): ring.cosine(i) * sign}
-    return lambda quantity: translated_array(right(lag, quantity), turned) - right(lag, quantity)
+    return lambda quantity: translated_array(right_value(lag, quantity), turned) - right_value(lag, quantity)
 
 
 # Friction

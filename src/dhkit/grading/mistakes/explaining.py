@@ -1,8 +1,9 @@
-"""From wrong answers to sentences: which mistakes give them, or what their terms show.
+"""Explanation of wrong answers: the mistakes that give them, or a description of their terms.
 
-First what an answer shows by itself (``plain_causes.py``). Then mistakes that leave the sheet's right answers right,
-those first that explain most quantities and that are made more often: mistakes of a derivation, slips in single terms,
-changed parameters, pairs of mistakes. What nothing explains is described by its terms.
+Mistakes that an answer shows by itself (``plain_causes.py``) come first. Then come mistakes that leave the sheet's
+right answers right, in the order of how many quantities they explain and how frequent they are: mistakes of a
+derivation, slips in single terms, changed parameters, pairs of mistakes. Entries that nothing explains are described by
+their terms.
 """
 
 from __future__ import annotations
@@ -13,44 +14,18 @@ from typing import Any
 
 from dhkit.grading.judging.findings import Comparison, equal, readable
 from dhkit.grading.judging.numeric import doubles, general_state
-from dhkit.grading.judging.quantities import JudgedQuantity
-from dhkit.grading.judging.quotients import Reading
+from dhkit.grading.judging.quantities import Index, JudgedQuantity
 from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
-from dhkit.grading.mistakes.diagnosis import Differences, Index
-from dhkit.grading.mistakes.entries import (
-    described,
-    distinct,
-    in_own_angles,
-    mirrored,
-    slip_of,
-    slip_of_C,
-    slip_shown,
-    whole_factor,
-)
+from dhkit.grading.mistakes import entries, plain_causes
+from dhkit.grading.mistakes.diagnosis import Differences
 from dhkit.grading.mistakes.library import hint_of
-from dhkit.grading.mistakes.parts import split_in_parts
-from dhkit.grading.mistakes.plain_causes import (
-    equivalent,
-    in_degrees,
-    in_other_units,
-    one_entry_of_C,
-    tables_of,
-    too_few_digits,
-    weights_on_vertical_axes,
-    with_inverted_gears,
-    zeros,
-)
+from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
-from dhkit.grading.mistakes.wording import (
-    diagnosis_of,
-    diagnosis_of_slip,
-    entry_names,
-    merged,
-    wrong_entries,
-)
+from dhkit.grading.mistakes.wording import diagnosis_of, diagnosis_of_slip, entry_names, merge
 from dhkit.grading.report import Diagnosis
 from dhkit.symbolic.equations import plain_text
+from dhkit.symbolic.ring import Element
 
 PARTS = {
     "M": "in the terms with accelerations",
@@ -59,13 +34,13 @@ PARTS = {
     "K": "in the kinetic energy",
     "V": "in the potential energy",
 }
-FEW_ENTRIES = 2
-"""Entries that a sentence says a mistake is made in alone."""
-LIKELY = 1
-"""The largest rarity of a mistake that is named before slips in single terms are looked for."""
-LEAST_TERMS_OF_A_PAIR, MOST_TERMS_OF_A_PAIR = 3, 600
-"""Terms in which an answer differs: of fewer a slip is likelier than two mistakes at once, of more it is not worth the
-search."""
+MAX_ENTRIES_ALONE = 2
+"""Largest number of entries of which a sentence says that the mistake was made in them alone."""
+MAX_LIKELY_RARITY = 1
+"""Largest rarity of mistakes that are tried before slips in single terms."""
+MIN_PAIR_TERMS, MAX_PAIR_TERMS = 3, 600
+"""Range of differing terms for which pairs of mistakes are tried: with fewer terms a slip is likelier, with more the
+search takes too long."""
 
 
 def explain(
@@ -74,7 +49,7 @@ def explain(
     digits: int = 4,
     follows: Mapping[str, Mapping[Index, str]] | None = None,
 ) -> list[Diagnosis]:
-    """Return what went wrong in quantities, those that one mistake explains together.
+    """Return the diagnoses of wrong quantities; quantities that one mistake explains share a diagnosis.
 
     Parameters
     ----------
@@ -85,42 +60,42 @@ def explain(
     digits
         Significant digits from which a decimal may have been rounded.
     follows
-        Of each quantity the wrong entries that follow from other answers of the sheet: nothing else is wrong in them.
+        By quantity: wrong entries that follow from other wrong answers of the sheet, and are right in themselves.
     """
     left = {name: quantity for name, quantity in judged.items() if quantity.wrong}
-    found: list[Diagnosis] = []
+    diagnoses: list[Diagnosis] = []
     following = {
-        name for name in left if all(index in (follows or {}).get(name, {}) for index in wrong_entries(left[name]))
+        name for name in left if all(index in (follows or {}).get(name, {}) for index in left[name].wrong_indices)
     }
-    _take(left, found, in_degrees(truth, left))
-    _take(left, found, with_inverted_gears(truth, left))
-    found += weights_on_vertical_axes(truth, left, following)
-    found += one_entry_of_C(truth, left, following)
-    _take(left, found, zeros(truth, left, following))
-    _take(left, found, in_other_units(truth, left))
-    # What only explains answers that follow from other wrong ones is not where the sheet went wrong.
-    for allowed in (lambda names, rarity: rarity <= LIKELY, lambda names, rarity: len(names) > 1):
+    _move(left, diagnoses, plain_causes.in_degrees(truth, left))
+    _move(left, diagnoses, plain_causes.with_inverted_gears(truth, left))
+    diagnoses += plain_causes.weights_on_vertical_axes(truth, left, following)
+    diagnoses += plain_causes.one_entry_of_C(truth, left, following)
+    _move(left, diagnoses, plain_causes.zeros(truth, left, following))
+    _move(left, diagnoses, plain_causes.in_other_units(truth, left))
+    # A mistake that explains only answers which follow from wrong ones is not the sheet's first error.
+    for allowed in (lambda names, rarity: rarity <= MAX_LIKELY_RARITY, lambda names, rarity: len(names) > 1):
         single = _single(truth, judged, left, allowed)
-        _take(left, found, {names: one for names, one in single.items() if not following.issuperset(names)})
-    _take(left, found, _nearly(truth, left, digits))
+        _move(left, diagnoses, {names: one for names, one in single.items() if not following.issuperset(names)})
+    _move(left, diagnoses, _nearly(truth, left, digits))
     for name in following & left.keys():
         del left[name]
-    for explained in (too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
+    for explained in (plain_causes.too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
         for name, quantity in list(left.items()):
-            diagnoses = explained(truth, judged, quantity)
-            if diagnoses:
-                found += diagnoses
+            own = explained(truth, judged, quantity)
+            if own:
+                diagnoses += own
                 del left[name]
     for quantity in left.values():
-        found += _entries(truth, quantity)
-    return merged(found)
+        diagnoses += _entries(truth, quantity)
+    return merge(diagnoses)
 
 
-def _take(
-    left: dict[str, JudgedQuantity], found: list[Diagnosis], explained: Mapping[tuple[str, ...], Diagnosis]
+def _move(
+    left: dict[str, JudgedQuantity], diagnoses: list[Diagnosis], explained: Mapping[tuple[str, ...], Diagnosis]
 ) -> None:
     for names, diagnosis in explained.items():
-        found.append(diagnosis)
+        diagnoses.append(diagnosis)
         for name in names:
             left.pop(name, None)
 
@@ -134,14 +109,14 @@ def _single(
     wrong: Mapping[str, JudgedQuantity],
     allowed: Callable[[tuple[str, ...], int], bool],
 ) -> dict[tuple[str, ...], Diagnosis]:
-    """Find mistakes that explain quantities entirely, each as many of them as it can, and that no right one denies."""
+    """Find mistakes that explain whole quantities, as many as possible each, and that no right answer contradicts."""
     candidates: dict[str, list[Variant]] = {}
     for name, quantity in wrong.items():
         differences = quantity.differences
         if differences:
             whole = tables_of(truth, quantity).whole(name, differences)
             candidates[name] = [variant for variant in whole if not _contradicted(truth, judged, variant)]
-    ranked = _greedily(candidates)
+    ranked = _fewest(candidates)
     return {
         names: diagnosis_of(variants, [wrong[name] for name in names])
         for names, variants in ranked.items()
@@ -150,7 +125,7 @@ def _single(
 
 
 def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> bool:
-    """Whether a quantity is right on the sheet that a mistake would have changed."""
+    """Whether the sheet has a right answer that a mistake would have changed."""
     for name, quantity in judged.items():
         right = [index for index, finding in quantity.findings.items() if finding.verdict.passes]
         if quantity.wrong or not right or (name in DYNAMICS) == variant.is_kinematic:
@@ -160,9 +135,12 @@ def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: V
     return False
 
 
-def _greedily(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], list[Variant]]:
-    """Return the fewest mistakes that explain all that can be, each with what it explains and what is equivalent."""
-    left, found = dict(candidates), dict[tuple[Any, ...], list[Variant]]()
+def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], list[Variant]]:
+    """Return a small set of mistakes that explains as much as possible, chosen greedily.
+
+    By the names that it explains, each mistake comes first in the list of those that explain the same.
+    """
+    left, chosen = dict(candidates), dict[tuple[Any, ...], list[Variant]]()
     while any(left.values()):
         explains: dict[tuple[str, str], list[Any]] = {}
         listed: dict[tuple[str, str], Variant] = {}
@@ -170,41 +148,41 @@ def _greedily(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], 
             for variant in variants:
                 key = (variant.identity, variant.place)
                 explained = explains.setdefault(key, [])
-                if name not in explained:  # one mistake may be made in several ways
+                if name not in explained:  # a mistake may be made in several ways
                     explained.append(name)
                 listed.setdefault(key, variant)
         ranked = sorted(listed, key=lambda key: (-len(explains[key]), listed[key].rarity))
         names = explains[ranked[0]]
-        found[tuple(names)] = [listed[key] for key in ranked if explains[key] == names]
+        chosen[tuple(names)] = [listed[key] for key in ranked if explains[key] == names]
         left = {name: variants for name, variants in left.items() if name not in names}
-    return found
+    return chosen
 
 
 def _nearly(truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int) -> dict[tuple[str, ...], Diagnosis]:
-    """Find mistakes that explain quotients, and answers whose decimals were rounded besides."""
-    found: dict[tuple[str, ...], Diagnosis] = {}
+    """Find mistakes that explain quotients, and answers that have rounded decimals too."""
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
         there = [entry for entry in quantity.given if entry.tree is not None]
         in_ring = all(quantity.findings[entry.index].answer is not None for entry in there)
         rounded = any(entry.tree is not None and has_decimals(entry.tree, digits) for entry in there)
         if name in ("C", "V", "L") or not in_ring or not (rounded or quantity.differences is None):
             continue
-        by = Comparison(truth.arm(name), Reading(truth.arm(name).ring, others=truth.others(name)), digits)
+        by = Comparison(truth.arm(name), truth.reader(name), digits)
         likely = tables_of(truth, quantity).near(name, quantity.truth, _numbers(truth, quantity))
-        variants = [variant for variant in likely if _gives(truth, variant, quantity, by)]
+        variants = [variant for variant in likely if _explains_answer(truth, variant, quantity, by)]
         if variants:
-            found[(name,)] = diagnosis_of(variants, [quantity])
-    return found
+            diagnoses[(name,)] = diagnosis_of(variants, [quantity])
+    return diagnoses
 
 
 def _numbers(truth: Truth, quantity: JudgedQuantity) -> Mapping[Index, float]:
-    """Return an answer's values at the state that :meth:`Variants.near` looks at."""
+    """Return an answer's values at the state that :meth:`Variants.near` uses, SI units."""
     arm = truth.arm(quantity.name)
     values = {**arm.description.numbers.values, **general_state(arm.n)}
     return {entry.index: float(doubles(entry.tree, values)) for entry in quantity.given if entry.tree is not None}
 
 
-def _gives(truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Comparison) -> bool:
+def _explains_answer(truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Comparison) -> bool:
     """Whether a mistake gives an answer exactly, or within the rounding of its decimals."""
     change = tables_of(truth, quantity).change(variant, quantity.name)
     return all(
@@ -218,45 +196,51 @@ def _gives(truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Compari
 
 
 def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find the one slip in a term of each wrong entry; nothing where an entry has none."""
-    found: list[Diagnosis] = []
-    for index in distinct(quantity):
-        slip = slip_of_C(truth, quantity, index) if quantity.name == "C" else slip_of(truth, quantity, index)
-        if slip is None or mirrored(quantity, index) or whole_factor(quantity, index):
+    """Find one slip in a term of each wrong entry; nothing if an entry has none."""
+    diagnoses: list[Diagnosis] = []
+    for index in entries.distinct(quantity):
+        slip = (
+            entries.slip_of_C(truth, quantity, index)
+            if quantity.name == "C"
+            else entries.slip_of(truth, quantity, index)
+        )
+        if slip is None or entries.mirrored(quantity, index) or entries.whole_factor(quantity, index):
             return []
-        found.append(diagnosis_of_slip(quantity, index, slip))
-    if len({one.sentence for one in found}) > 1 and (rare := _rare(truth, judged, quantity)):
+        diagnoses.append(diagnosis_of_slip(quantity, index, slip))
+    if len({one.sentence for one in diagnoses}) > 1 and (rare := _rare(truth, judged, quantity)):
         return rare
-    return [replace(one, equivalent=equivalent(truth, quantity)) for one in found]
+    return [replace(one, equivalent=plain_causes.equivalent(truth, quantity)) for one in diagnoses]
 
 
 # Rarer mistakes
 
 
 def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find the single mistakes that are possible, and seldom made."""
-    return list(_single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > LIKELY).values())
+    """Find single mistakes that are possible, but rare."""
+    return list(
+        _single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > MAX_LIKELY_RARITY).values()
+    )
 
 
 def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Find a factor that all entries, all of them wrong, share."""
-    wrong = distinct(quantity)
-    if any(mirrored(quantity, index) for index in wrong):
+    wrong = entries.distinct(quantity)
+    if any(entries.mirrored(quantity, index) for index in wrong):
         return []
-    found = [whole_factor(quantity, index) for index in wrong]
-    names = {one.mistake for one in found if one is not None}
-    if None in found or len(names) != 1:
+    factors = [entries.whole_factor(quantity, index) for index in wrong]
+    names = {one.mistake for one in factors if one is not None}
+    if None in factors or len(names) != 1:
         return []
-    return [one for one in found if one is not None]
+    return [one for one in factors if one is not None]
 
 
 def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Explain torques, and the Lagrangian, part by part: those of accelerations, of rates, and of neither."""
+    """Explain torques and the Lagrangian by parts: terms with accelerations, with products of rates, with neither."""
     differences = quantity.differences
     if quantity.name not in ("tau", "L") or not differences:
         return []
     tables = tables_of(truth, quantity)
-    split = split_in_parts(truth, quantity.name, differences)
+    split = _split_in_parts(truth, quantity.name, differences)
     parts = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
     right = {part: whole for part, whole in split.items() if part not in parts}
 
@@ -267,40 +251,40 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         part: [variant for variant in tables.whole(part, whole) if not leaves_the_rest(variant)]
         for part, whole in parts.items()
     }
-    explained = _greedily(candidates)
-    found = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
+    explained = _fewest(candidates)
+    diagnoses = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
     left = [part for part in parts if not any(part in names for names in explained)]
-    if not found and len(parts) == len(split):
+    if not diagnoses and len(parts) == len(split):
         return []
     for part in left:
-        found += _part_entries(truth, quantity, part, parts[part])
-    return found
+        diagnoses += _part_entries(truth, quantity, part, parts[part])
+    return diagnoses
 
 
 def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Differences) -> list[Diagnosis]:
-    """Explain a part's entries one by one."""
-    found = []
+    """Explain the entries of a part one by one."""
+    diagnoses = []
     for index, difference in whole.items():
         if difference.is_zero:
             continue
         place = index[: len(quantity.truth.shape)]
         (entry,) = entry_names(quantity, [place])
         right = truth.of(part)[index]
-        slip = slip_shown(truth, part, right + difference, right)
+        slip = entries.slip_between(truth, part, right + difference, right)
         if slip is not None:
-            found.append(diagnosis_of_slip(quantity, place, slip))
+            diagnoses.append(diagnosis_of_slip(quantity, place, slip))
             continue
         difference = truth.coordinates.in_own_rates(difference)
-        excess = in_own_angles(truth, plain_text(readable(truth.arm(quantity.name), difference)))
-        found.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
-    return found
+        excess = entries.in_own_angles(truth, plain_text(readable(truth.arm(quantity.name), difference)))
+        diagnoses.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
+    return diagnoses
 
 
 def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find two of a derivation's mistakes that together explain what no single one does."""
+    """Find two mistakes of a derivation that together explain a quantity."""
     differences = quantity.differences
     terms = sum(map(len, differences.values())) if differences else 0
-    if not differences or not LEAST_TERMS_OF_A_PAIR <= terms <= MOST_TERMS_OF_A_PAIR:
+    if not differences or not MIN_PAIR_TERMS <= terms <= MAX_PAIR_TERMS:
         return []
     pair = tables_of(truth, quantity).pair(quantity.name, differences)
     if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):
@@ -308,33 +292,62 @@ def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQu
     return [diagnosis_of([variant], [quantity]) for variant in pair]
 
 
+def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mapping[str, Differences]:
+    """Split the differences of tau or L by the factors of their terms: accelerations, products of rates, or neither.
+
+    Parts of tau are M, whose entries are the coefficients of accelerations, h and g; parts of L are K and V.
+    """
+    ring = next(iter(differences.values())).ring
+    n = ring.n
+    accelerations = [ring.place("acceleration", i) for i in range(n)]
+    rates = [ring.place("rate", i) for i in range(n)]
+    parts: dict[str, dict[Index, Element]] = {"M": {}, "h": {}, "g": {}} if name == "tau" else {"K": {}, "V": {}}
+    for index, element in differences.items():
+        moving = {m: c for m, c in element.terms.items() if any(m[k] for k in rates)}
+        resting = {m: c for m, c in element.terms.items() if not any(m[k] for k in (*rates, *accelerations))}
+        if name == "L":
+            parts["K"][index], parts["V"][index] = ring.from_terms(moving), -ring.from_terms(resting)
+            continue
+        parts["h"][index], parts["g"][index] = ring.from_terms(moving), ring.from_terms(resting)
+        by_joint = [_coefficient(element, k) for k in accelerations]
+        for j in range(n):
+            parts["M"][*index, j] = ring.sum(by_joint[k] * int(truth.coordinates.B[k, j]) for k in range(n))
+    return parts
+
+
+def _coefficient(element: Element, place: int) -> Element:
+    """Return the coefficient of an acceleration."""
+    terms = {(*m[:place], 0, *m[place + 1 :]): c for m, c in element.terms.items() if m[place] == 1}
+    return element.ring.from_terms(terms)
+
+
 # Entry by entry
 
 
 def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Explain wrong entries one by one; those that one mistake explains go together."""
-    found: list[Diagnosis] = []
+    """Explain wrong entries one by one; entries that one mistake explains share a diagnosis."""
+    diagnoses: list[Diagnosis] = []
     candidates: dict[Index, list[Variant]] = {}
-    for index in distinct(quantity):
-        plain = mirrored(quantity, index) or whole_factor(quantity, index)
-        slip = None if plain else slip_of(truth, quantity, index)
+    for index in entries.distinct(quantity):
+        plain = entries.mirrored(quantity, index) or entries.whole_factor(quantity, index)
+        slip = None if plain else entries.slip_of(truth, quantity, index)
         difference = quantity.findings[index].difference
         if plain is not None:
-            found.append(plain)
+            diagnoses.append(plain)
         elif slip is not None:
-            found.append(diagnosis_of_slip(quantity, index, slip))
+            diagnoses.append(diagnosis_of_slip(quantity, index, slip))
         elif difference is not None:
             candidates[index] = tables_of(truth, quantity).entry(quantity.name, index, difference)
         else:
             candidates[index] = []
-    # One entry alone proves little: of transforms' entries many look alike, and so do those of a muddle.
+    # A single entry proves little: many entries of transforms look alike, and so do those of a confused answer.
     certain = quantity.name in DYNAMICS and all(candidates.values())
-    for indices, variants in _greedily(candidates).items():
+    for indices, variants in _fewest(candidates).items():
         if len(indices) == 1 and not certain:
             continue
         diagnosis = diagnosis_of(variants, [quantity], indices)
-        few = len(diagnosis.entries) <= FEW_ENTRIES
+        few = len(diagnosis.entries) <= MAX_ENTRIES_ALONE
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
-        found.append(replace(diagnosis, sentence=alone) if few else diagnosis)
+        diagnoses.append(replace(diagnosis, sentence=alone) if few else diagnosis)
         candidates = {index: v for index, v in candidates.items() if index not in indices}
-    return found + [described(truth, quantity, index) for index in candidates]
+    return diagnoses + [entries.described(truth, quantity, index) for index in candidates]

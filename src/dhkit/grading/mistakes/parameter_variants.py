@@ -1,4 +1,4 @@
-"""Parameters that are forgotten, doubled, halved, taken for another, exchanged, or in other units."""
+"""Mistakes with parameters: forgotten, doubled, halved, taken for another, exchanged, or in other units."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from itertools import combinations, permutations
 
 from dhkit.description import INERTIA_PLACES, Description
 from dhkit.expressions import Expression
-from dhkit.grading.judging.truth import Truth
+from dhkit.grading.judging.truth import Truth, right_value, translated_array
 from dhkit.grading.mistakes.library import PARAMETER_FACTORS, UNITS
-from dhkit.grading.mistakes.variants import Make, Variant, right, translated_array
+from dhkit.grading.mistakes.variants import Make, Variant
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements
 
 MAX_JOINTS = 3
-"""Joints of arms of which half of one length may stand for another: of larger ones there are too many pairs."""
+"""Largest arm for which half of a length may stand for another length; larger ones have too many pairs."""
 
 
 def parameter_variants(truth: Truth) -> Iterator[Variant]:
-    """Yield what goes wrong with the file's parameters."""
+    """Yield mistakes with the file's parameters."""
     lag = truth.lagrangian
     ring = lag.arm.ring
     symbols = [name for name in lag.arm.parameters if name in ring.constants]
@@ -65,7 +65,7 @@ def _units(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
 
 
 def _tilts(truth: Truth) -> Iterator[Variant]:
-    """Yield constant angles that are forgotten, or whose sine and cosine are exchanged or have another sign."""
+    """Yield mistakes with constant angles: forgotten, wrong sign, sine and cosine exchanged."""
     ring = truth.lagrangian.arm.ring
     for cosine in ring.constants:
         if not cosine.startswith("cos(") or (sine := f"sin{cosine[3:]}") not in ring.constants:
@@ -85,13 +85,13 @@ def lengths_of(description: Description) -> list[str]:
 
 
 def _kinds(description: Description) -> dict[str, str]:
-    """Return which parameters are lengths, masses, inertias or gears, by where the file uses them first."""
-    found: dict[str, str] = {}
+    """Return the kind of each parameter (length, mass, inertia, gear ...), by its first use in the file."""
+    kinds: dict[str, str] = {}
 
     def note(kind: str, *expressions: Expression) -> None:
         for expression in expressions:
             for name in expression.symbols:
-                found.setdefault(name, kind)
+                kinds.setdefault(name, kind)
 
     for joint in description.joints:
         note("mass", *(body.mass for body in joint.bodies))
@@ -106,11 +106,11 @@ def _kinds(description: Description) -> dict[str, str]:
         note("length", *body.com)
     for body in bodies:
         note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
-    return found
+    return kinds
 
 
 def _are_alike(first: str, second: str, kinds: Mapping[str, str]) -> bool:
-    """Whether one parameter may stand in another's place by a slip: of the same kind, or of the same letters."""
+    """Whether two parameters may be confused: they are of the same kind, or have the same letters."""
     return kinds.get(first, first) == kinds.get(second, second) or _letters(first) == _letters(second)
 
 
@@ -124,20 +124,20 @@ def _letters(name: str) -> str:
 
 
 def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
-    """Return what changes where parameters are replaced, in quantities without constants that are made of them."""
+    """Return the change if parameters are replaced; zero for quantities with constants that are made of them."""
     ring = truth.lagrangian.arm.ring
     places = {ring.place("constant", name): value for name, value in values.items()}
-    made_of = [
+    dependent = [
         ring.place("constant", constant.text)
         for constant in ring.given
         if constant.text not in values and not constant.symbols.isdisjoint(values)
     ]
 
     def make(quantity: str) -> Elements:
-        whole = right(truth.lagrangian, quantity)
+        whole = right_value(truth.lagrangian, quantity)
         if quantity == "tau" and truth.friction:
             whole = whole + truth.viscous
-        if made_of and any(term[k] for element in whole.flat for term in element.terms for k in made_of):
+        if any(term[k] for k in dependent for element in whole.flat for term in element.terms):
             return whole * 0
         return translated_array(whole, places) - whole
 

@@ -1,4 +1,4 @@
-"""Causes that an answer shows by itself: degrees, other units, inverted gears, zeros, too few digits."""
+"""Mistakes that an answer shows by itself: degrees, other units, inverted gears, zeros, too few digits."""
 
 from __future__ import annotations
 
@@ -13,45 +13,44 @@ from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.findings import Comparison, equal
 from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity
-from dhkit.grading.judging.quotients import OutsideTheRingError, Reading
+from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth, exact_number, substituted
 from dhkit.grading.mistakes.diagnosis import Variants, variants_of
 from dhkit.grading.mistakes.entries import mirrored, slip_of, slip_of_C
 from dhkit.grading.mistakes.library import UNITS
 from dhkit.grading.mistakes.parameter_variants import lengths_of
-from dhkit.grading.mistakes.wording import diagnosis_of_identity, diagnosis_of_slip, wrong_entries
+from dhkit.grading.mistakes.wording import diagnosis_of_identity, diagnosis_of_slip
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
-IN_DEGREES = (Fraction(1, 180), Fraction(180))
+DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
+"""Factors, besides pi and 1/pi, of angles that are confused with degrees."""
 ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
-"""What is missing where all of a quantity is zero."""
-LEAST_DIGITS = 2
-"""Significant digits of decimals that are told to be too few rather than wrong."""
+"""By quantity: the mistake if all its entries are zero."""
+MIN_DIGITS = 2
+"""Smallest number of significant digits of decimals that count as too short rather than wrong."""
 
 
 def in_degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find answers that are right once their angles are no longer multiplied by pi/180 or 180/pi."""
-    found: dict[tuple[str, ...], Diagnosis] = {}
+    """Find quantities that are right if factors pi/180 or 180/pi are taken off their angles."""
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        if name != "C" and any(_is_right_in(truth, quantity, factor) for factor in IN_DEGREES):
-            found[(name,)] = diagnosis_of_identity("degrees_for_radians", quantity, wrong_entries(quantity), name)
-    return found
+        if name != "C" and any(
+            _is_right(quantity, RingReader(truth.arm(name).ring, angle_factor=factor)) for factor in DEGREE_FACTORS
+        ):
+            diagnoses[(name,)] = diagnosis_of_identity("degrees_for_radians", quantity, quantity.wrong_indices, name)
+    return diagnoses
 
 
-def _is_right_in(truth: Truth, quantity: JudgedQuantity, degrees: Fraction) -> bool:
-    return _is_right(quantity, Reading(truth.arm(quantity.name).ring, degrees=degrees))
-
-
-def _is_right(quantity: JudgedQuantity, reading: Reading, change: Callable[[Tree], Tree] = lambda tree: tree) -> bool:
-    """Whether the wrong entries are right once they are changed, or read in another way."""
+def _is_right(quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tree], Tree] = lambda tree: tree) -> bool:
+    """Whether all wrong entries are right after a change, or with another reader."""
     for entry in quantity.given:
         if quantity.findings[entry.index].verdict is not Verdict.WRONG:
             continue
         try:
             right = quantity.right(entry.index)
-            if entry.tree is None or not reading.read(change(entry.tree)).numerator_of_difference(right).is_zero:
+            if entry.tree is None or not reader.read(change(entry.tree)).numerator_of_difference(right).is_zero:
                 return False
         except (OutsideTheRingError, AnswerError):
             return False
@@ -59,25 +58,25 @@ def _is_right(quantity: JudgedQuantity, reading: Reading, change: Callable[[Tree
 
 
 def with_inverted_gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find answers that are right once gear ratios are inverted in them; numbers are inverted by the variants."""
+    """Find quantities that are right if gear ratios are inverted in them; for ratios in numbers there are variants."""
     gears = {name for joint in truth.description.joints if joint.drive for name in joint.drive.gear.symbols}
     one = Number(Fraction(1), "1", 0)
     inverse: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
     return {
-        (name,): diagnosis_of_identity("gear_inverted", quantity, wrong_entries(quantity), name)
+        (name,): diagnosis_of_identity("gear_inverted", quantity, quantity.wrong_indices, name)
         for name, quantity in wrong.items()
         if gears
         and name in ("M", "K", "tau")
-        and _is_right(quantity, Reading(truth.arm(name).ring), partial(renamed, change=inverse))
+        and _is_right(quantity, RingReader(truth.arm(name).ring), partial(renamed, change=inverse))
     }
 
 
 def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
-    """Take gravity torques out that stand where there are none, if no other one is wrong."""
+    """Remove g from ``left`` if its only errors are torques at joints that have none; return their diagnoses."""
     g = left.get("g")
-    if g is None or "g" in following or any(g.right(index) for index in wrong_entries(g)):
+    if g is None or "g" in following or any(g.right(index) for index in g.wrong_indices):
         return []
-    slips = {index: slip_of(truth, g, index) for index in wrong_entries(g)}
+    slips = {index: slip_of(truth, g, index) for index in g.wrong_indices}
     if any(slip is None or slip.identity != "weight_on_vertical_axis" for slip in slips.values()):
         return []
     del left["g"]
@@ -86,9 +85,9 @@ def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], foll
 
 
 def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
-    """Take C out if one entry of it is not the Christoffel factorization's, and say what is wrong in that."""
+    """Remove C from ``left`` if a single entry is not the Christoffel factorization's; return its diagnosis."""
     C = left.get("C")
-    wrong = wrong_entries(C) if C is not None else []
+    wrong = C.wrong_indices if C is not None else []
     if C is None or "C" in following or len(wrong) != 1 or len(C.given) < C.truth.size**2:
         return []
     slip = slip_of_C(truth, C, wrong[0])
@@ -99,21 +98,21 @@ def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set
 
 
 def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities that are handed in as zero."""
-    found: dict[tuple[str, ...], Diagnosis] = {}
+    """Find quantities that were handed in as zero."""
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in left.items():
-        wrong = wrong_entries(quantity)
+        wrong = quantity.wrong_indices
         if name in following or not quantity.is_zero or any(mirrored(quantity, index) for index in wrong):
             continue
         identity = ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
         one = diagnosis_of_identity(identity, quantity, wrong, name)
-        found[(name,)] = replace(one, equivalent=equivalent(truth, quantity))
-    return found
+        diagnoses[(name,)] = replace(one, equivalent=equivalent(truth, quantity))
+    return diagnoses
 
 
 def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities with lengths as numbers in another unit, where other parameters stand as symbols."""
-    found: dict[tuple[str, ...], Diagnosis] = {}
+    """Find quantities with lengths as numbers in another unit; other parameters may be symbols."""
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     lengths = lengths_of(truth.description)
     for name, quantity in left.items():
         there = [entry.tree for entry in quantity.given if entry.tree is not None]
@@ -124,28 +123,28 @@ def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tup
         for identity, factor in UNITS.items():
             values = {p: ring.number(exact_number(truth.description, p) * factor) for p in absent}
             if _has_answers(quantity, substituted(truth.of(name), values, ring)):
-                found[(name,)] = diagnosis_of_identity(identity, quantity, wrong_entries(quantity), name)
-    return found
+                diagnoses[(name,)] = diagnosis_of_identity(identity, quantity, quantity.wrong_indices, name)
+    return diagnoses
 
 
 def _has_answers(quantity: JudgedQuantity, expected: Elements) -> bool:
-    """Whether all wrong entries are what is expected."""
-    answers = [(index, quantity.findings[index].answer) for index in wrong_entries(quantity)]
+    """Whether all wrong entries equal the expected ones."""
+    answers = [(index, quantity.findings[index].answer) for index in quantity.wrong_indices]
     return all(
         answer is not None and answer.numerator_of_difference(expected[index]).is_zero for index, answer in answers
     )
 
 
 def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find decimals that would be right within rounding if fewer digits were allowed."""
+    """Find decimals that would be right within rounding if fewer digits were enough."""
     name = quantity.name
     if name in ("C", "V", "L"):
         return []
-    by = Comparison(truth.arm(name), Reading(truth.arm(name).ring, others=truth.others(name)), LEAST_DIGITS)
-    wrong = set(wrong_entries(quantity))
+    by = Comparison(truth.arm(name), truth.reader(name), MIN_DIGITS)
+    wrong = set(quantity.wrong_indices)
     for entry in quantity.given:
         if entry.index in wrong:
-            if entry.tree is None or not has_decimals(entry.tree, LEAST_DIGITS):
+            if entry.tree is None or not has_decimals(entry.tree, MIN_DIGITS):
                 return []
             if not equal(entry.tree, quantity.truth[entry.index], by):
                 return []
@@ -153,12 +152,12 @@ def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity:
 
 
 def equivalent(truth: Truth, quantity: JudgedQuantity) -> tuple[str, ...]:
-    """Return what the mistakes are called that give a whole quantity."""
+    """Return the names of the mistakes that give a whole quantity."""
     differences = quantity.differences
     variants = tables_of(truth, quantity).whole(quantity.name, differences) if differences else []
-    return tuple(dict.fromkeys(variant.called for variant in variants))
+    return tuple(dict.fromkeys(variant.name for variant in variants))
 
 
 def tables_of(truth: Truth, quantity: JudgedQuantity) -> Variants:
-    """Return the robot's mistakes, with the numbers that an answer has for parameters."""
+    """Return the mistakes on the robot, with the numbers that an answer has for parameters."""
     return variants_of(truth, quantity.numbers)

@@ -1,4 +1,4 @@
-"""Slips in single terms of an entry: missing, doubled, with another sign, factor, exponent, index or function."""
+"""Slips in a term of an entry: a missing term, or another sign, factor, exponent, index or function."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from fractions import Fraction
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
-from dhkit.symbolic.ring import Element, Generator, Ring
+from dhkit.symbolic.ring import Element, Generator
+from dhkit.symbolic.ring.elements import PolynomialRing
 
 Terms = Mapping[tuple[int, ...], Fraction]
 UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
-"""Factors of a term in millimetres."""
+"""Factors of terms with lengths in mm in place of m, or the reverse."""
 MAX_CHANGED = 16
-"""Terms in which an answer and the truth may differ for a slip to be looked for."""
+"""Largest number of terms by which an answer and the truth differ in which a slip is looked for."""
 MAX_TERMS = 4
-"""Terms that one slip changes alike: m2*(l1^2 + l2^2) may stand multiplied out."""
+"""Largest number of terms that one slip changes: m2*(l1^2 + l2^2) may be multiplied out."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,9 @@ class Slip:
     Attributes
     ----------
     identity
-        Of the mistake.
+        Identity of the mistake.
     detail
-        Which term, and what stands in its place.
+        The term, and the term in its place.
     """
 
     identity: str
@@ -37,14 +38,14 @@ class Slip:
 
 
 def slip_in(arm: ExactArm, answer: Element, truth: Element) -> Slip | None:
-    """Return the one slip in a term that makes an answer of the truth; None where there is none, or more.
+    """Return the slip in a term that turns the truth into an answer; None if there is none, or more than one.
 
     Parameters
     ----------
     arm
-        Whose ring they are of.
+        Arm to whose ring the elements belong.
     answer, truth
-        Elements of it, which differ.
+        Different elements of the ring.
     """
     short_truth, short_answer, _ = shortened_alike(arm, [truth, answer, answer - truth])
     return _slip(short_answer, short_truth) or _slip(answer, truth)
@@ -56,9 +57,9 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     changed = {m: c for m, c in changed.items() if c}
     if not changed or len(changed) > MAX_CHANGED:
         return None
-    gone = {m: right[m] for m, c in changed.items() if m not in wrong}
-    come = {m: c for m, c in changed.items() if m not in gone}
-    if gone and len(gone) == len(come) and (slip := _replaced(ring, gone, come)):
+    missing = {m: right[m] for m, c in changed.items() if m not in wrong}
+    new = {m: c for m, c in changed.items() if m not in missing}
+    if missing and len(missing) == len(new) and (slip := _replaced(ring, missing, new)):
         return slip
     shared = {m: c for m, c in changed.items() if m in right}
     extra = {m: c for m, c in changed.items() if m not in right}
@@ -72,10 +73,10 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     return None
 
 
-def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
-    """Return a slip by which terms have another factor, all the same one."""
+def _rescaled(ring: PolynomialRing, shared: Terms, right: Terms) -> Slip | None:
+    """Return the slip if terms have another factor, the same for all of them."""
     factors = {(right[m] + c) / right[m] for m, c in shared.items()}
-    # What stands beside one and the same sine is one term of a person's, however many parameters multiply it.
+    # Terms with the same sines, cosines and rates are one term for a person, however many parameters multiply it.
     is_one = len(shared) <= MAX_TERMS or len({_state_part(ring, m) for m in shared}) == 1
     if len(factors) != 1 or not is_one or (len(shared) > 1 and len(shared) == len(right)):
         return None
@@ -92,13 +93,13 @@ def _rescaled(ring: Ring, shared: Terms, right: Terms) -> Slip | None:
     return Slip("term_factor", f"{wrong} in place of {terms}")
 
 
-def _state_part(ring: Ring, term: tuple[int, ...]) -> tuple[int, ...]:
+def _state_part(ring: PolynomialRing, term: tuple[int, ...]) -> tuple[int, ...]:
     """Return a term without its parameters."""
     return tuple(0 if g.kind == "constant" else e for g, e in zip(ring.generators, term, strict=True))
 
 
 def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
-    """Whether a term is the 2ab of a square of which a^2 and b^2 are there."""
+    """Whether a term is the 2ab of a square whose a^2 and b^2 occur."""
     for a in right:
         if a == term or right[a] <= 0:
             continue
@@ -108,23 +109,23 @@ def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
     return False
 
 
-def _replaced(ring: Ring, gone: Terms, come: Terms) -> Slip | None:
-    """Return a slip by which terms stand in others' places: all of them with the same exchange of generators."""
-    pairs = _paired(gone, come)
+def _replaced(ring: PolynomialRing, missing: Terms, new: Terms) -> Slip | None:
+    """Return the slip if terms replace others, all of them by the same exchange of generators."""
+    pairs = _paired(missing, new)
     if pairs is None:
         return None
     exchanges = {tuple(b - a for a, b in zip(old, new, strict=True)) for old, new in pairs.items()}
     if len(exchanges) != 1:
         return None
     (exchange,) = exchanges
-    less = [(ring.generators[k], -e) for k, e in enumerate(exchange) if e < 0]
-    more = [(ring.generators[k], e) for k, e in enumerate(exchange) if e > 0]
-    new, old = plain_text(ring.from_terms(dict(come))), plain_text(ring.from_terms(dict(gone)))
-    return Slip(_kind(ring, less, more, next(iter(pairs))), f"{new} in place of {old}")
+    removed = [(ring.generators[k], -e) for k, e in enumerate(exchange) if e < 0]
+    added = [(ring.generators[k], e) for k, e in enumerate(exchange) if e > 0]
+    texts = [plain_text(ring.from_terms(dict(terms))) for terms in (new, missing)]
+    return Slip(_identity(ring, removed, added, next(iter(pairs))), " in place of ".join(texts))
 
 
 def _paired(old: Terms, new: Terms) -> dict[tuple[int, ...], tuple[int, ...]] | None:
-    """Return which new term stands for which old one, by their coefficients and what they have in common."""
+    """Return the new term for each old one, matched by coefficients and common factors; None without a match."""
     pairs: dict[tuple[int, ...], tuple[int, ...]] = {}
     left = dict(new)
     for m, c in old.items():
@@ -138,17 +139,17 @@ def _paired(old: Terms, new: Terms) -> dict[tuple[int, ...], tuple[int, ...]] | 
     return pairs
 
 
-def _kind(
-    ring: Ring, gone: list[tuple[Generator, int]], come: list[tuple[Generator, int]], old: tuple[int, ...]
+def _identity(
+    ring: PolynomialRing, removed: list[tuple[Generator, int]], added: list[tuple[Generator, int]], old: tuple[int, ...]
 ) -> str:
-    """Return what an exchange of generators in a term is called."""
-    if not come:
-        left = [old[ring.generators.index(generator)] - exponent for generator, exponent in gone]
+    """Return the identity of an exchange of generators in a term."""
+    if not added:
+        left = [old[ring.generators.index(generator)] - exponent for generator, exponent in removed]
         return "exponent_dropped" if all(left) else "factor_missing"
-    if not gone:
+    if not removed:
         return "factor_extra"
-    kinds = {generator.kind for generator, _ in (*gone, *come)}
-    if kinds == {"sine", "cosine"} and len(gone) == len(come) == 1 and gone[0][0].joints == come[0][0].joints:
+    kinds = {generator.kind for generator, _ in (*removed, *added)}
+    if kinds == {"sine", "cosine"} and len(removed) == len(added) == 1 and removed[0][0].joints == added[0][0].joints:
         return "term_function"
     if kinds <= {"sine", "cosine"}:
         return "term_angle"

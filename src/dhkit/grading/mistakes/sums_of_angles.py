@@ -1,4 +1,4 @@
-"""Mistakes with the sines and cosines of sums of angles: wrong formulas for them, and wrong derivatives."""
+"""Mistakes with sines and cosines of sums of angles: wrong sum formulas, and wrong derivatives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dhkit.grading.judging.truth import Truth, kinematic_quantity
+from dhkit.grading.judging.truth import Truth, kinematic_quantity, translated_array
 from dhkit.grading.mistakes.variants import Make, Variant
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.exact.compact import parallel_runs, shortened
@@ -17,7 +17,7 @@ from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
 Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]]
-"""Gives cosine and sine of a + b from cosine and sine of a, and of b."""
+"""Returns cosine and sine of a + b from cosine and sine of a, and of b."""
 
 FORMULAS: tuple[tuple[str, Formula], ...] = (
     ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
@@ -36,12 +36,12 @@ def _right(c: Element, s: Element, x: Element, y: Element) -> tuple[Element, Ele
 
 
 def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> Iterator[Variant]:
-    """Yield wrong formulas for the sines and cosines of sums, wherever such a sum stands.
+    """Yield mistakes by wrong formulas for sines and cosines of sums, wherever such a sum occurs.
 
     Parameters
     ----------
     arm
-        Whose angles they are.
+        Arm whose angles are meant.
     right
         Returns a quantity's right value in the robot's own joint variables.
     is_kinematic
@@ -55,7 +55,7 @@ def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> It
 
 
 def derivatives_of_cosines(truth: Truth) -> Variant:
-    """Return the Jacobian whose linear half is differentiated with d/dq cos(q) = sin(q)."""
+    """Return the mistake d/dq cos(q) = sin(q) in the linear half of the Jacobian."""
     arm, kinematics = truth.kinematics.arm, truth.kinematics
 
     def change(quantity: str) -> Elements:
@@ -72,7 +72,7 @@ def derivatives_of_cosines(truth: Truth) -> Variant:
 
 
 def _without_minus(element: Element, joint: int) -> Element:
-    """Return a derivative by a joint's variable in which that of a cosine is the sine."""
+    """Return a derivative by a joint's variable in which the derivative of a cosine is the sine."""
     ring = element.ring
     if ring.kinds[joint] != "R":
         return element.by_position(joint)
@@ -96,7 +96,7 @@ def _with_formula(
     written: Callable[[ExactArm, Elements], Elements],
     quantity: str,
 ) -> Elements:
-    """Return what changes where sines and cosines of sums, as they are written, are worked out by another formula."""
+    """Return the change if sines and cosines of sums, as they are written, are computed by another formula."""
     value = right(quantity)
     changed = np.empty(value.shape, dtype=object)
     for place, element in np.ndenumerate(written(arm, value)):
@@ -105,7 +105,7 @@ def _with_formula(
 
 
 def _in_angles(arm: ExactArm, element: Element, formula: Formula) -> Element:
-    """Return an element of sums of angles in the single angles, by a formula for the sums."""
+    """Return an element written in sums of angles in single angles, by a formula for the sums."""
     ring = arm.ring
     single: dict[int, Element] = {}
     for sine, cosine, joints in element.ring.turning:
@@ -117,17 +117,14 @@ def _in_angles(arm: ExactArm, element: Element, formula: Formula) -> Element:
 
 
 def _in_sums(arm: ExactArm, array: Elements) -> Elements:
-    """Return elements with a sine and a cosine of their own for the angles of parallel axes, counted from the first."""
+    """Return elements written in sums of the angles of parallel axes, each with a sine and cosine of its own."""
     angles = {joint: run[: k + 1] for run in parallel_runs(arm) for k, joint in enumerate(run)}
     ring = Ring(arm.ring.kinds, arm.ring.given, angles)
     turned: dict[int, Element] = {}
     for run in parallel_runs(arm):
-        for before, joint in pairwise(run):
+        for previous, joint in pairwise(run):
             c, s = ring.cosine(joint), ring.sine(joint)
-            x, y = ring.cosine(before), ring.sine(before)
+            x, y = ring.cosine(previous), ring.sine(previous)
             turned[arm.ring.place("cosine", joint)] = c * x + s * y
             turned[arm.ring.place("sine", joint)] = s * x - c * y
-    written = np.empty(array.shape, dtype=object)
-    for place, element in np.ndenumerate(array):
-        written[place] = translated(element, ring, turned)
-    return written
+    return translated_array(array, turned, ring)

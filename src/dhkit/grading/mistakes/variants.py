@@ -1,31 +1,33 @@
-"""What each mistake changes on one robot: differences from the truth, made when asked for."""
+"""Mistakes on one robot, each with what it adds to every quantity; computed when asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
 from dhkit.grading.judging.coordinates import Coordinates
+from dhkit.grading.judging.truth import right_value
 from dhkit.symbolic import Lagrangian
 from dhkit.symbolic.mistakes import MadeAt
-from dhkit.symbolic.ring import Element, Elements, Ring, element_array, translated
+from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import velocity_torques
 
 Make = Callable[[str], Elements]
-"""Returns what a mistake adds to a quantity in the robot's own joint variables."""
+"""Returns what a mistake adds to a quantity, in the robot's own joint variables and in the quantity's shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """What a mistake adds to energies, from which what it adds to all else follows: equations are linear in them."""
+    """Change of the energies by a mistake; the changes of all equations follow, which are linear in the energies."""
 
     K: Element
     V: Element
 
     def of(self, quantity: str) -> Elements:
-        """Return what it adds to M, h, g, tau, K, V or L."""
+        """Return the change of M, h, g, tau, K, V or L."""
         ring = self.K.ring
         n = ring.n
         momenta = element_array([self.K.by_rate(i) for i in range(n)])
@@ -37,27 +39,34 @@ class Change:
             case "g":
                 return element_array([self.V.by_position(i) for i in range(n)])
             case "tau":
-                return _torques(ring, self.of("M"), self.of("h"), self.of("g"))
+                accelerations = element_array([ring.acceleration(i) for i in range(n)])
+                return self.of("M") @ accelerations + self.of("h") + self.of("g")
         return element_array({"K": self.K, "V": self.V}.get(quantity, self.K - self.V))
+
+
+def make_lazily(change: Callable[..., Change], *arguments: object) -> Make:
+    """Return what a change of the energies adds to a quantity; the change is computed once, when first asked for."""
+    cached = cache(lambda: change(*arguments))
+    return lambda quantity: cached().of(quantity)
 
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """A mistake on a robot.
+    """Mistake on a robot.
 
     Attributes
     ----------
     made
-        Which mistake, and at which link.
+        Identity of the mistake, and the link where it is made.
     make
-        Returns what it adds to a quantity in the robot's own joint variables.
+        Returns what the mistake adds to a quantity, in the robot's own joint variables.
     place
-        Which link, joint or parameters, in words; empty where it is made throughout.
+        Link, joint or parameters in words; empty if the mistake is made throughout.
     rarity
-        How seldom such mistakes are made: 0 where a textbook's derivation goes wrong, 1 for what goes wrong in
-        formulas, 2 for what is possible. Of several that explain an answer the least rare is named.
+        How rare such mistakes are: 0 in a textbook's derivation, 1 in formulas, 2 for those that are merely possible.
+        Of several mistakes that explain an answer the least rare is named.
     is_kinematic
-        Whether it is made in transforms and the Jacobian, not in the dynamics.
+        Whether the mistake is made in transforms and the Jacobian, not in the dynamics.
     """
 
     made: MadeAt
@@ -65,55 +74,38 @@ class Variant:
     place: str = ""
     rarity: int = 0
     is_kinematic: bool = False
-    _made: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)
+    _changes: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)
 
     @property
     def identity(self) -> str:
-        """The mistake's identity."""
+        """Identity of the mistake."""
         return self.made.identity
 
     @property
-    def called(self) -> str:
-        """The identity, with the place."""
+    def name(self) -> str:
+        """Identity of the mistake, with the place."""
         return f"{self.identity} ({self.place})" if self.place else self.identity
 
     def adds_to(self, quantity: str, coordinates: Coordinates) -> Elements:
-        """Return what the mistake adds to a quantity in the student's coordinates; C counts by C qd."""
+        """Return what the mistake adds to a quantity in the student's coordinates; C is represented by C qd."""
         key = (quantity, coordinates)
-        if key not in self._made:
-            self._made[key] = element_array(coordinates.in_y(quantity, self.make(quantity)))
-        return self._made[key]
+        if key not in self._changes:
+            self._changes[key] = element_array(coordinates.in_y(quantity, self.make(quantity)))
+        return self._changes[key]
 
 
 # Arrays of elements
 
 
-def right(lag: Lagrangian, quantity: str) -> Elements:
-    """Return a quantity's right value in the robot's own joint variables."""
-    return element_array(lag.K - lag.V) if quantity == "L" else element_array(getattr(lag, quantity))
-
-
 def nothing(lag: Lagrangian, quantity: str) -> Elements:
-    """Return zeros of a quantity's shape."""
-    return right(lag, quantity) * 0
+    """Return zeros in the shape of a quantity."""
+    return right_value(lag, quantity) * 0
 
 
 def changed_only(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Make:
-    """Return what adds to one vector of torques, and to their sum."""
+    """Return a change of one vector of torques, and of tau, their sum."""
 
     def make(quantity: str) -> Elements:
         return change() if quantity in (changed, "tau") else nothing(lag, quantity)
 
     return make
-
-
-def translated_array(array: Elements, places: Mapping[int, Element]) -> Elements:
-    """Return elements with generators replaced, by their places."""
-    result = np.empty(array.shape, dtype=object)
-    for place, element in np.ndenumerate(array):
-        result[place] = translated(element, element.ring, places)
-    return result
-
-
-def _torques(ring: Ring, M: Elements, h: Elements, g: Elements) -> Elements:
-    return M @ element_array([ring.acceleration(i) for i in range(ring.n)]) + h + g

@@ -1,12 +1,11 @@
-"""A judgement written down: for the terminal, as JSON, HTML, JUnit's XML, Gradescope's results and CSV."""
+"""Reports of judged sheets in all forms: terminal, JSON, HTML, JUnit XML, Gradescope's results and CSV."""
 
-from dhkit.grading.reports.class_page import html_class
-from dhkit.grading.reports.feedback import with_feedback
 from dhkit.grading.reports.gradescope import gradescope
-from dhkit.grading.reports.html import html_report
+from dhkit.grading.reports.html import html_class, html_report
 from dhkit.grading.reports.json import json_report, read_reports, report_of
 from dhkit.grading.reports.junit import junit
 from dhkit.grading.reports.marks_csv import marks_csv
+from dhkit.grading.reports.sentences import with_feedback
 from dhkit.grading.reports.terminal import terminal_class, terminal_report
 
 __all__ = [

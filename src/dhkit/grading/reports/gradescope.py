@@ -1,58 +1,54 @@
-"""A judgement as the ``results.json`` that a Gradescope autograder leaves behind."""
+"""Reports as the ``results.json`` of a Gradescope autograder."""
 
 from __future__ import annotations
 
-from typing import Any
-
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport
-from dhkit.grading.reports.plain import plain
-from dhkit.grading.reports.sentences import found, provenance, remarks, summary, told
+from dhkit.grading.report import GradeReport
+from dhkit.grading.reports.sentences import (
+    diagnosis_lines,
+    entry_lines,
+    plain,
+    provenance,
+    remark_lines,
+    summary,
+)
 
 
-def gradescope(report: GradeReport, marks: Marks) -> dict[str, Any]:
-    """Return what Gradescope shows a student: a test for each entry, and one for each quantity that is missing.
+def gradescope(report: GradeReport, marks: Marks) -> dict[str, object]:
+    """Return the object of ``results.json``: a test for each entry, and one for each missing quantity.
 
     Source: Gradescope, Autograder Specifications, "Output Format".
     """
-    tests = [_test(report, entry, mark) for entry, mark in zip(report.entries, marks.entries, strict=False)]
-    tests += [_missing(mark) for mark in marks.quantities if mark.rule]
+    tests = [
+        _test(
+            mark,
+            entry.verdict.passes,
+            [entry.verdict.value, *entry_lines(entry, mark), *diagnosis_lines(report, entry)],
+        )
+        for entry, mark in zip(report.entries, marks.entries, strict=False)
+    ]
+    tests += [_test(mark, False, [mark.rule]) for mark in marks.quantities if mark.rule]
+    lines = [summary(report, marks), *diagnosis_lines(report), *remark_lines(report), provenance(report)]
+    facts = {"version": report.version, "robot": report.robot, "digest": report.digest}
     return {
         "score": marks.points,
         "execution_time": round(report.seconds, 3),
-        "output": "\n".join([summary(report, marks), *found(report), *remarks(report), provenance(report)]),
+        "output": "\n".join(lines),
         "output_format": "text",
         "test_output_format": "text",
         "visibility": "visible",
         "tests": tests,
-        "extra_data": {
-            "max_score": marks.most,
-            "version": report.version,
-            "robot": report.robot,
-            "digest": report.digest,
-        },
+        "extra_data": {"max_score": marks.most, **facts},
     }
 
 
-def _test(report: GradeReport, entry: Entry, mark: Mark) -> dict[str, Any]:
-    return {
-        "name": plain(entry.name),
-        "score": mark.points,
-        "max_score": mark.most,
-        "status": "passed" if entry.verdict.passes else "failed",
-        "output": "\n".join([entry.verdict.value, *told(entry, mark), *found(report, entry)]),
-        "output_format": "text",
-        "visibility": "visible",
-    }
-
-
-def _missing(mark: Mark) -> dict[str, Any]:
+def _test(mark: Mark, passed: bool, lines: list[str]) -> dict[str, object]:
     return {
         "name": plain(mark.name),
         "score": mark.points,
         "max_score": mark.most,
-        "status": "failed",
-        "output": mark.rule,
+        "status": "passed" if passed else "failed",
+        "output": "\n".join(lines),
         "output_format": "text",
         "visibility": "visible",
     }

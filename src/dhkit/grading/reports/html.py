@@ -1,18 +1,17 @@
-"""A judgement as one page of HTML: no script, nothing from the network, to be read on a phone and on paper."""
+"""Reports as HTML pages without scripts or network access: one sheet, or a class with its marks and mistakes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape
 
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Verdict
+from dhkit.grading.report import Entry, GradeReport, Verdict, worst_verdict
+from dhkit.grading.reports import sentences
 from dhkit.grading.reports.mathml import mathml
-from dhkit.grading.reports.plain import plain, points
-from dhkit.grading.reports.sentences import found, provenance, remarks, witness_sentence
-from dhkit.grading.reports.style import STYLE
+from dhkit.grading.reports.sentences import plain, points, points_of
 
-SIGNS = {
+BADGES = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
     Verdict.UNDECIDED: ("open", "?"),
@@ -20,91 +19,167 @@ SIGNS = {
     Verdict.WRONG: ("wrong", "✗"),
     Verdict.UNREADABLE: ("unread", "!"),
 }
-"""Class of a verdict's badge, and a sign for those who do not tell its colours."""
+"""CSS class of a verdict's badge, and a sign for readers who cannot tell its colours apart."""
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+"""Content security policy of the pages."""
+STYLE = """
+:root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --faint: #57606a; --line: #d8dee4;
+        --right: #116329; --wrong: #b3261e; --open: #7a5200; --unread: #6e40a9; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e6e9ed; --paper: #14171a; --faint: #9aa4af; --line: #3a4149;
+          --right: #6cc47e; --wrong: #ff8f86; --open: #e0b050; --unread: #c4a2f5; } }
+* { box-sizing: border-box; }
+body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: var(--ink);
+       background: var(--paper); max-width: 60rem; margin: 2rem auto; padding: 0 1rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.6rem; line-height: 1.2; } h2 { font-size: 1.25rem; margin-top: 2.5rem; }
+h3 { font-size: 1.05rem; margin: 0 0 .3rem; } h3 .note { font-weight: normal; }
+a { color: inherit; } p { margin: .35rem 0; } .note, th { color: var(--faint); } .sum { font-size: 1.1rem; }
+.error, .found { border-left: 3px solid var(--wrong); padding-left: .7rem; }
+.badge { white-space: nowrap; font-weight: 600; }
+.right { color: var(--right); } .wrong { color: var(--wrong); } .open { color: var(--open); }
+.unread { color: var(--unread); }
+.wide { overflow: auto hidden; padding: .2rem 0; } math { font-size: 1.08rem; }
+math[display="block"] { width: fit-content; margin: 0 0 0 1rem; }
+code { font: .92em/1.4 "Source Code Pro", "DejaVu Sans Mono", monospace; }
+article { border-top: 1px solid var(--line); padding: .7rem 0; break-inside: avoid; }
+details { margin-top: 1rem; } summary { cursor: pointer; }
+table { border-collapse: collapse; margin: .6rem 0; }
+th, td { text-align: left; padding: .25rem 1rem .25rem 0; border-bottom: 1px solid var(--line); }
+td:first-child { white-space: nowrap; }
+th { font-weight: normal; } td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.bar { width: 50%; min-width: 8rem; } td.bar i { display: block; height: .8rem; background: var(--wrong); }
+@media print { body { max-width: none; margin: 0; font-size: 11pt; } section { break-before: page; }
+  td.bar i { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
+"""
+"""Style sheet of the pages: light and dark, wide and narrow, screen and paper."""
 
 
 def html_report(report: GradeReport, marks: Marks) -> str:
-    """Return a sheet's page."""
+    """Return the page of one sheet."""
     title = f"{report.student or report.sheet or 'Answers'}: {report.robot or 'not judged'}"
-    return page(title, "\n".join(sections(report, marks)))
+    return _page(title, "\n".join(_sections(report, marks)))
 
 
-def page(title: str, body: str) -> str:
-    """Return a page around what is already HTML."""
+def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: str = "Class") -> str:
+    """Return the page of a class: mistakes with their frequency, a table of marks, then the sheets in order."""
+    parts = [f'<p class="error">{_text(line)}</p>' for line in sentences.own_robot_warnings(reports)]
+    parts += [*_mistake_bars(reports), "<h2>Marks</h2>", _marks_table(reports, marks)]
+    for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
+        parts.append(f'<section id="sheet-{number}">\n<h2>{_sheet_name(report, number)}</h2>')
+        parts += [*_sections(report, sheet), "</section>"]
+    return _page(title, "\n".join(parts))
+
+
+def _page(title: str, body: str) -> str:
+    """Return a page around a body that is HTML already."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{text(title, 200)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{text(title, 200)}</h1>\n"
+        f"<title>{_text(title, 200)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{_text(title, 200)}</h1>\n"
         f"{body}\n</body>\n</html>\n"
     )
 
 
-def sections(report: GradeReport, marks: Marks) -> Iterator[str]:
-    """Yield what a page shows of a sheet, below its heading."""
-    rest = report.conclusion.removeprefix(report.verdict.value).removeprefix(", ")
-    said = f" {text(rest)};" if rest and not report.error else ""
-    yield f'<p class="sum">{badge(report.verdict)}{said} {points(marks.points)} of {points(marks.most)} points</p>'
+def _sections(report: GradeReport, marks: Marks) -> Iterator[str]:
+    """Yield the parts of a sheet's page below its heading; correct entries come last and folded."""
+    conditions = "" if report.error else _conditions(report)
+    remark = f" {conditions};" if conditions else ""
+    yield f'<p class="sum">{_badge(report.verdict)}{remark} {points_of(marks)} points</p>'
     if report.error:
-        yield f'<p class="error">{text(report.error)}</p>'
+        yield f'<p class="error">{_text(report.error)}</p>'
     if marks.quantities:
-        yield _quantities(report, marks)
-    yield from (f'<p class="found">{text(line)}</p>' for line in found(report))
-    pairs = list(zip(report.entries, marks.entries, strict=False))
-    settled = (Verdict.CORRECT, Verdict.ROUNDED)
-    yield from (_entry(entry, mark) for entry, mark in pairs if entry.verdict not in settled)
-    right = [_entry(entry, mark) for entry, mark in pairs if entry.verdict in settled]
-    if right:
-        yield f"<details><summary>{len(right)} correct</summary>\n" + "\n".join(right) + "\n</details>"
-    yield from (f'<p class="note">{text(line)}</p>' for line in remarks(report))
-    yield f'<p class="note">{text(provenance(report))}</p>'
+        yield _quantities_table(report, marks)
+    yield from (f'<p class="found">{_text(line)}</p>' for line in sentences.diagnosis_lines(report))
+    correct = []
+    for entry, mark in zip(report.entries, marks.entries, strict=False):
+        if entry.verdict in (Verdict.CORRECT, Verdict.ROUNDED):
+            correct.append(_entry(entry, mark))
+        else:
+            yield _entry(entry, mark)
+    if correct:
+        yield f"<details><summary>{len(correct)} correct</summary>\n" + "\n".join(correct) + "\n</details>"
+    yield from (f'<p class="note">{_text(line)}</p>' for line in sentences.remark_lines(report))
+    yield f'<p class="note">{_text(sentences.provenance(report))}</p>'
 
 
-def _quantities(report: GradeReport, marks: Marks) -> str:
-    rows = []
+def _conditions(report: GradeReport) -> str:
+    """Return the conclusion without its verdict: at which parameter values it holds, what it lacks to pass."""
+    return _text(report.conclusion.removeprefix(report.verdict.value).removeprefix(", "))
+
+
+def _quantities_table(report: GradeReport, marks: Marks) -> str:
+    rows = ["<tr><th>quantity</th><th>verdict</th><th>entries</th><th>points</th></tr>"]
     for mark in marks.quantities:
-        entries = report.of(mark.name)
-        worst = max((entry.verdict for entry in entries), key=lambda verdict: verdict.severity, default=None)
-        verdict = badge(worst) if worst else text(mark.rule)
+        worst = worst_verdict(entries := report.of(mark.name))
+        verdict = _badge(worst) if worst else _text(mark.rule)
         rows.append(
-            f'<tr><td>{text(mark.name)}</td><td>{verdict}</td><td class="number">{len(entries)}</td>'
-            f'<td class="number">{points(mark.points)} of {points(mark.most)}</td></tr>'
+            f'<tr><td>{_text(mark.name)}</td><td>{verdict}</td><td class="number">{len(entries)}</td>'
+            f'<td class="number">{points_of(mark)}</td></tr>'
         )
-    head = "<tr><th>quantity</th><th>verdict</th><th>entries</th><th>points</th></tr>"
-    return f'<div class="wide"><table>{head}\n' + "\n".join(rows) + "\n</table></div>"
+    return '<div class="wide"><table>' + "\n".join(rows) + "\n</table></div>"
 
 
 def _entry(entry: Entry, mark: Mark) -> str:
-    worth = f"{points(mark.points)} of {points(mark.most)} points"
-    rule = f": {text(mark.rule)}" if mark.rule and mark.rule != entry.verdict.value else ""
-    lines = [f'<h3>{text(entry.name)} {badge(entry.verdict)} <span class="note">{worth}{rule}</span></h3>']
+    rule = f": {_text(mark.rule)}" if mark.rule and mark.rule != entry.verdict.value else ""
+    worth = f'<span class="note">{points_of(mark)} points{rule}</span>'
+    lines = [f"<h3>{_text(entry.name)} {_badge(entry.verdict)} {worth}</h3>"]
     if entry.answer:
-        lines.append(f'<p>answer</p><div class="wide"><code>{text(entry.answer)}</code></div>')
+        lines.append(f'<p>answer</p><div class="wide"><code>{_text(entry.answer)}</code></div>')
     if entry.latex:
         lines.append(f"<p>read as</p>{_equation(entry.latex, entry.read)}")
     if entry.difference is not None:
         lines.append(f"<p>answer less the truth</p>{_equation(entry.difference_latex, entry.difference)}")
     if entry.witness is not None:
-        lines.append(f"<p>{text(witness_sentence(entry.witness))}</p>")
+        lines.append(f"<p>{_text(sentences.witness_sentence(entry.witness))}</p>")
     if entry.statement:
-        lines.append(f'<p class="note">{text(entry.statement)}</p>')
+        lines.append(f'<p class="note">{_text(entry.statement)}</p>')
     if entry.follows:
-        lines.append(f"<p>right in itself; follows from {text(entry.follows)}</p>")
+        lines.append(f"<p>right in itself; follows from {_text(entry.follows)}</p>")
     return "<article>" + "\n".join(lines) + "</article>"
 
 
-def _equation(latex: str, otherwise: str) -> str:
-    """Return an equation, and as text where it cannot be set."""
-    return f'<div class="wide">{mathml(latex) or f"<code>{text(otherwise or latex)}</code>"}</div>'
+def _equation(latex: str, text: str) -> str:
+    """Return an equation as MathML, or as text if the LaTeX cannot be converted."""
+    return f'<div class="wide">{mathml(latex) or f"<code>{_text(text or latex)}</code>"}</div>'
 
 
-def badge(verdict: Verdict) -> str:
-    """Return a verdict in its colour."""
-    kind, sign = SIGNS[verdict]
+def _marks_table(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
+    """Return the table of a class's marks: a row for each sheet, a column for each quantity."""
+    quantities = list(dict.fromkeys(mark.name for sheet in marks for mark in sheet.quantities))
+    heads = "".join(f"<th>{_text(head, 40)}</th>" for head in ("student", "verdict", "points", *quantities))
+    rows = [f"<tr>{heads}</tr>"]
+    for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
+        by_quantity = {mark.name: points(mark.points) for mark in sheet.quantities}
+        numbers = [points_of(sheet), *(by_quantity.get(name, "") for name in quantities)]
+        cells = "".join(f'<td class="number">{cell}</td>' for cell in numbers)
+        link = f'<a href="#sheet-{number}">{_sheet_name(report, number)}</a>'
+        conditions = "" if report.error else _conditions(report)
+        rows.append(f"<tr><td>{link}</td><td>{_badge(report.verdict)} {conditions}</td>{cells}</tr>")
+    return '<div class="wide"><table>' + "\n".join(rows) + "</table></div>"
+
+
+def _mistake_bars(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield a bar for each mistake, as long as the share of the sheets that have it."""
+    counts = sentences.mistake_counts(reports)
+    if not counts:
+        return
+    yield f"<h2>Mistakes, and on how many of {len(reports)} sheets</h2>\n<table>"
+    for name, count in counts:
+        bar = f'<td class="bar"><i style="width:{100 * count / len(reports):.1f}%"></i></td>'
+        yield f'<tr><td>{_text(name, 80)}</td><td class="number">{count}</td>{bar}</tr>'
+    yield "</table>"
+
+
+def _sheet_name(report: GradeReport, number: int) -> str:
+    return _text(report.student or report.sheet or f"sheet {number}", 120)
+
+
+def _badge(verdict: Verdict) -> str:
+    kind, sign = BADGES[verdict]
     return f'<span class="badge {kind}">{sign} {escape(verdict.value)}</span>'
 
 
-def text(line: str, most: int = 4000) -> str:
-    """Return text as HTML: printable, and nothing in it is a tag."""
+def _text(line: str, most: int = sentences.MAX_CHARACTERS) -> str:
+    """Return text as HTML: one printable line, in which no character begins a tag or an entity."""
     return escape(plain(line, most))

@@ -1,13 +1,12 @@
-"""A judgement as JSON: what programs read, and what can be marked again."""
+"""Reports as JSON, which programs read and which can be marked again."""
 
 from __future__ import annotations
 
 import json as jsons
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from dhkit.description.files import read_bounded
 from dhkit.errors import AnswerError, DescriptionError
@@ -16,27 +15,25 @@ from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Feedback
 
 MAX_BYTES = 500_000_000
-"""Of a file of reports, one a line: a class of a thousand with long answers."""
-
-FORM = TypeAdapter(GradeReport)
+"""Largest file of reports, one a line: enough for a thousand students with long answers."""
 
 
-def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") -> dict[str, Any]:
+def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") -> dict[str, object]:
     """Return a report with its marks as plain data.
 
     Parameters
     ----------
     report, marks
-        As far as they are to be told.
+        What is to be shown, reduced already if ``feedback`` is not ``"full"``.
     feedback
-        How far that is: only ``"full"`` reports can be marked again.
+        How much of the report is shown; only ``"full"`` reports can be marked again.
     """
-    told = {"verdict": report.verdict.value, "points": marks.points, "most": marks.most}
-    return told | report.data() | {"marks": marks.data(), "feedback": feedback}
+    verdict = {"verdict": report.verdict.value, "points": marks.points, "most": marks.most}
+    return verdict | report.data() | {"marks": marks.data(), "feedback": feedback}
 
 
 def report_of(text: str | bytes) -> GradeReport:
-    """Return the report in a JSON text, every field checked: its writer need not be trusted.
+    """Return the report in a JSON text; every field is checked, so that its writer need not be trusted.
 
     Raises
     ------
@@ -44,20 +41,20 @@ def report_of(text: str | bytes) -> GradeReport:
         No JSON, or no report: a field is missing, of another type, or not finite.
     """
     try:
-        report = FORM.validate_python(jsons.loads(text))
-        report.to_json().encode()  # refuses what is not finite, and halves of characters
+        report = GradeReport.from_data(jsons.loads(text))
+        report.to_json().encode()  # refuses NaN, infinity and lone surrogates
     except RecursionError:
         raise ValueError("nested too deep") from None
     return report
 
 
 def read_reports(path: Path) -> Iterator[GradeReport]:
-    """Yield the reports of a file of JSON: one a line, or one alone.
+    """Yield the reports of a file of JSON: one on each line, or a single one.
 
     Raises
     ------
     AnswerError
-        No such file, no reports, or reports of which something was left out for the students.
+        No such file, no reports, or reports that were reduced for students.
     """
     try:
         text = read_bounded(path, MAX_BYTES).decode().strip()
@@ -68,10 +65,10 @@ def read_reports(path: Path) -> Iterator[GradeReport]:
     lines = [text] if _is_json(text) else text.splitlines()
     for number, line in enumerate(lines, start=1):
         if line.strip():
-            yield _read(line, f"{path}: line {number}" if len(lines) > 1 else str(path))
+            yield _read_report(line, f"{path}: line {number}" if len(lines) > 1 else str(path))
 
 
-def _read(text: str, place: str) -> GradeReport:
+def _read_report(text: str, place: str) -> GradeReport:
     try:
         feedback = jsons.loads(text).get("feedback", "full")
         report = report_of(text)
@@ -85,7 +82,7 @@ def _read(text: str, place: str) -> GradeReport:
 
 
 def _fault(error: Exception) -> str:
-    """Say in a line what is wrong with a report."""
+    """Return in one line what is wrong with a report."""
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         place = ".".join(str(part)[:80] for part in first["loc"])

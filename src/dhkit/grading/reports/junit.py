@@ -1,4 +1,4 @@
-"""Judgements as JUnit's XML, which continuous integration shows: a suite a sheet, a case an entry."""
+"""Reports as JUnit XML, which continuous integration shows: a suite for each sheet, a case for each entry."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict
-from dhkit.grading.reports.plain import plain, points
-from dhkit.grading.reports.sentences import found, summary, told
+from dhkit.grading.reports.sentences import diagnosis_lines, entry_lines, plain, points, summary
 
 OUTCOMES = {
     Verdict.WRONG: "failure",
@@ -16,19 +15,19 @@ OUTCOMES = {
     Verdict.UNREADABLE: "error",
     Verdict.UNDECIDED: "skipped",
 }
-"""What a case holds that did not simply pass."""
+"""Element inside the case of an entry that does not simply pass."""
 
 
 def junit(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
-    """Return XML: what is wrong is a failure, what cannot be read an error, what is undecided skipped."""
+    """Return XML in which wrong entries are failures, unreadable ones errors, undecided ones skipped."""
     root = Element("testsuites", name="dhkit grade")
     for report, mark in zip(reports, marks, strict=True):
-        _suite(root, report, mark)
+        _add_suite(root, report, mark)
     indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
 
 
-def _suite(root: Element, report: GradeReport, marks: Marks) -> None:
+def _add_suite(root: Element, report: GradeReport, marks: Marks) -> None:
     name = plain(report.student or report.sheet or report.robot or "answers", 200)
     suite = SubElement(root, "testsuite", name=name, time=f"{report.seconds:.3f}")
     properties = SubElement(suite, "properties")
@@ -49,27 +48,27 @@ def _suite(root: Element, report: GradeReport, marks: Marks) -> None:
         case = SubElement(suite, "testcase", classname=name, name="sheet", time="0")
         SubElement(case, "error", message=summary(report, marks), type="unreadable")
     for entry, mark in zip(report.entries, marks.entries, strict=False):
-        _case(suite, report, entry, mark)
+        _add_case(suite, report, entry, mark)
     for mark in marks.quantities:
         if mark.rule:
             case = SubElement(suite, "testcase", classname=plain(mark.name), name=plain(mark.name), time="0")
             SubElement(case, "failure", message=mark.rule, type="missing")
-    counts = {"failures": "failure", "errors": "error", "skipped": "skipped"}
     suite.set("tests", str(len(suite.findall("testcase"))))
-    for attribute, outcome in counts.items():
+    for attribute, outcome in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(attribute, str(len(suite.findall(f"testcase/{outcome}"))))
 
 
-def _case(suite: Element, report: GradeReport, entry: Entry, mark: Mark) -> None:
+def _add_case(suite: Element, report: GradeReport, entry: Entry, mark: Mark) -> None:
     case = SubElement(suite, "testcase", classname=plain(entry.quantity), name=plain(entry.name), time="0")
     outcome = OUTCOMES.get(entry.verdict)
     if entry.verdict is Verdict.UNDECIDED and report.proof_required:
         outcome = "failure"
     if outcome is None:
         return
-    lines = [*told(entry, mark), *found(report, entry)]
-    message = next(found(report, entry), lines[-1] if lines else entry.verdict.value)
-    told_here = SubElement(case, outcome, message=message)
+    diagnosis = list(diagnosis_lines(report, entry))
+    lines = [*entry_lines(entry, mark), *diagnosis]
+    message = [*diagnosis[:1], *lines[-1:], entry.verdict.value][0]
+    element = SubElement(case, outcome, message=message)
     if outcome != "skipped":
-        told_here.set("type", entry.verdict.value)
-    told_here.text = "\n".join(lines)
+        element.set("type", entry.verdict.value)
+    element.text = "\n".join(lines)

@@ -1,4 +1,4 @@
-"""The marks of a class as CSV: a row a sheet, a column a quantity."""
+"""Marks of a class as CSV: a row for each sheet, a column for each quantity."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from collections.abc import Sequence
 
 from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
-from dhkit.grading.reports.plain import plain, points
+from dhkit.grading.reports.sentences import plain, points
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
-"""How a text begins that a spreadsheet would compute."""
+"""First characters of a text that a spreadsheet would compute."""
 NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
+"""Columns behind the points of the quantities."""
+ORIGIN = ("sheet", "robot", "digest", "version")
+"""Last columns: fields of a report that say what was judged, and by what."""
 
 
 def cell(text: str) -> str:
-    """Return text that a spreadsheet takes for text: with a leading apostrophe where it might compute it.
+    """Return text that a spreadsheet does not compute: with a leading apostrophe if it might be a formula.
 
     Examples
     --------
@@ -28,45 +32,25 @@ def cell(text: str) -> str:
 
 
 def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
-    """Return the marks, the students in the order given."""
+    """Return the marks of sheets as CSV text, in the order given."""
     quantities = list(dict.fromkeys(mark.name for sheet in marks for mark in sheet.quantities))
-    names = [cell(plain(quantity)) for quantity in quantities]
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(
-        [
-            "student",
-            "points",
-            "most",
-            *names,
-            "verdict",
-            "judged at",
-            "missing",
-            "left out",
-            "mistakes",
-            "error",
-            *ORIGIN,
-        ]
-    )
+    writer.writerow(["student", "points", "most", *(cell(plain(name)) for name in quantities), *AFTER_POINTS, *ORIGIN])
     for report, sheet in zip(reports, marks, strict=True):
-        reached = {mark.name: points(mark.points) for mark in sheet.quantities}
-        mistakes = dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)
+        by_quantity = {mark.name: points(mark.points) for mark in sheet.quantities}
         row = [
             report.student,
             points(sheet.points),
             points(sheet.most),
-            *(reached.get(quantity, "") for quantity in quantities),
+            *(by_quantity.get(quantity, "") for quantity in quantities),
             report.verdict.value,
             ", ".join(f"{name} = {value:g}" for name, value in report.judged_at.items()),
             " ".join(report.missing),
             "; ".join(report.left_out),
-            " ".join(mistakes),
+            " ".join(dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)),
             report.fault,
             *(getattr(report, name) or "" for name in ORIGIN),
         ]
         writer.writerow([cell(plain(text)) for text in row])
     return file.getvalue()
-
-
-ORIGIN = ("sheet", "robot", "digest", "version")
-"""Fields of a report that say what was judged by what."""

@@ -1,4 +1,4 @@
-"""LaTeX of an answer as MathML of which nothing is left but mathematics."""
+"""LaTeX as MathML: of our own equations, and of students' answers, in which nothing but mathematics is kept."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import html
 import re
 from xml.etree.ElementTree import Element, ParseError, SubElement, fromstring, tostring
 
-MOST = 4000
-"""Characters of LaTeX that are set: a longer equation nobody reads, and converting it takes seconds."""
+MAX_CHARACTERS = 4000
+"""Longest LaTeX of an answer that is converted: nobody reads a longer equation, and converting it takes seconds."""
+EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
+MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
 NAMESPACE = re.compile(r"\{.*?\}")
 ELEMENTS = re.compile(
     "math|mrow|mi|mn|mo|mtext|mspace|mfrac|msqrt|mroot|msub|msup|msubsup|munder|mover|munderover|mtable|mtr|mtd|"
@@ -20,11 +22,25 @@ ATTRIBUTES = re.compile(
 VALUE = re.compile(r"[A-Za-z0-9.%+ -]{0,60}")
 
 
-def mathml(latex: str) -> str | None:
-    r"""Return displayed LaTeX as MathML; None where it cannot be converted.
+def equation_mathml(latex: str) -> str:
+    """Return a displayed equation that dhkit printed as MathML, brackets of matrices marked for a style sheet.
 
-    latex2mathml puts text into its result unescaped, and lets ``\href``, ``\class`` and ``\style`` through; so its
-    result is parsed, and only known elements with harmless attributes are written anew.
+    Not for LaTeX of strangers: latex2mathml passes on text and links as they are; see :func:`mathml`.
+    """
+    from latex2mathml.converter import convert
+
+    display = EQUATION.fullmatch(latex)
+    converted: str = convert(display[1] if display else latex, display="block")
+    return MATRIX.sub(
+        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>', converted
+    )
+
+
+def mathml(latex: str) -> str | None:
+    r"""Return the LaTeX of an answer as displayed MathML; None if it cannot be converted.
+
+    latex2mathml puts text into its result unescaped, and lets ``\href``, ``\class`` and ``\style`` through. Its result
+    is therefore parsed, and only known elements with harmless attributes are written again.
 
     Examples
     --------
@@ -33,26 +49,26 @@ def mathml(latex: str) -> str | None:
     """
     from latex2mathml.converter import convert
 
-    if not latex.strip() or len(latex) > MOST or "<" in latex or "&lt" in latex:
+    if not latex.strip() or len(latex) > MAX_CHARACTERS or "<" in latex or "&lt" in latex:
         return None
     try:
-        found = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
-        return tostring(_harmless(found, None), encoding="unicode", short_empty_elements=False)
+        root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
+        return tostring(_copy_harmless(root, None), encoding="unicode", short_empty_elements=False)
     except (ParseError, RecursionError):
         return None
-    except Exception:  # latex2mathml raises IndexError and others of text that is no LaTeX
+    except Exception:  # latex2mathml raises IndexError and others for text that is no LaTeX
         return None
 
 
-def _harmless(found: Element, parent: Element | None) -> Element:
+def _copy_harmless(element: Element, parent: Element | None) -> Element:
     """Return a copy with known elements and attributes alone; an unknown element becomes a row."""
-    tag = NAMESPACE.sub("", str(found.tag))
+    tag = NAMESPACE.sub("", str(element.tag))
     tag = tag if ELEMENTS.fullmatch(tag) else "mrow"
     allowed = {
-        key: value for key, value in found.attrib.items() if ATTRIBUTES.fullmatch(key) and VALUE.fullmatch(value)
+        key: value for key, value in element.attrib.items() if ATTRIBUTES.fullmatch(key) and VALUE.fullmatch(value)
     }
-    made = Element(tag, allowed) if parent is None else SubElement(parent, tag, allowed)
-    made.text = html.unescape(found.text or "")
-    for child in found:
-        _harmless(child, made)
-    return made
+    copy = Element(tag, allowed) if parent is None else SubElement(parent, tag, allowed)
+    copy.text = html.unescape(element.text or "")
+    for child in element:
+        _copy_harmless(child, copy)
+    return copy

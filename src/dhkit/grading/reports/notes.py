@@ -1,4 +1,4 @@
-"""The notes of a report in words: one sentence for each kind."""
+"""Notes of a report as sentences, one for each kind of note."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ AGREEMENT = {
     "T": "the product of the transforms, with the sheet's own {}",
     "J": "the Jacobian of the sheet's own {}",
 }
-"""By quantity how it follows from the quantities before it; ``{}`` stands for their names."""
+"""By quantity: how it follows from other quantities of the sheet, whose names replace ``{}``."""
 
 SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.AGREES: "{quantity} is {agreement}",
@@ -47,7 +47,7 @@ SENTENCES: Mapping[NoteKind, str] = {
 
 
 def note_text(note: Note) -> str:
-    """Return a note in a sentence, whatever names and texts it holds.
+    """Return the sentence of a note, whatever names and texts it contains.
 
     Examples
     --------

@@ -1,30 +1,79 @@
-"""The sentences of a report that every form of it shares, as plain lines that are safe to print."""
+"""Lines of plain text that all forms of a report share, and how much of a report a student is shown.
+
+Answers and file names come from students. Every line returned here passes through :func:`plain`, which makes it one
+line of printable characters.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
+from dhkit import display
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Verdict, Witness
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.reports.notes import note_text
-from dhkit.grading.reports.plain import plain, points
+from dhkit.grading.rubric import Feedback
+
+MAX_CHARACTERS = 4000
+"""Longest text shown of one answer or message, in characters: an answer may be a megabyte."""
+
+
+def plain(text: str, most: int = MAX_CHARACTERS) -> str:
+    """Return text as one line of at most ``most`` printable characters; see :func:`dhkit.display.plain`."""
+    return display.plain(text, most)
+
+
+def points(number: float) -> str:
+    """Return a number of points with two decimals at most, without trailing zeros."""
+    return f"{number:.2f}".rstrip("0").rstrip(".")
+
+
+def points_of(mark: Mark | Marks) -> str:
+    """Return the points given and the points possible, such as ``2.5 of 10``."""
+    return f"{points(mark.points)} of {points(mark.most)}"
+
+
+def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
+    """Return a report with only what a level of feedback shows.
+
+    ``"full"`` shows everything; ``"hint"`` shows verdicts and where to look, without differences, witnesses and names
+    of mistakes; ``"verdict"`` shows verdicts alone. A reduced report cannot be marked again: marks come from full
+    reports.
+    """
+    if level == "full":
+        return report
+    hints = level == "hint"
+    diagnosis = (Diagnosis(None, one.hint, one.where, one.entries, one.hint) for one in report.diagnosis if one.hint)
+    entries = []
+    for entry in report.entries:
+        shown = replace(entry, difference=None, difference_latex="", witness=None)
+        if not (hints and entry.verdict.passes):  # the statement on a wrong entry may say by how much it is wrong
+            shown = replace(shown, statement="")
+        entries.append(shown if hints else replace(shown, latex="", follows=""))
+    return replace(
+        report,
+        entries=tuple(entries),
+        diagnosis=tuple(dict.fromkeys(diagnosis)) if hints else (),
+        notes=report.notes if hints else (),  # notes say which quantities agree with each other
+    )
 
 
 def summary(report: GradeReport, marks: Marks) -> str:
-    """Return a sheet's verdict and points in a line, or why it could not be judged."""
+    """Return a sheet's verdict and points in one line, or why the sheet could not be judged."""
     verdict = f"unreadable: {plain(report.error)}" if report.error else plain(report.conclusion)
-    return f"{verdict} ({points(marks.points)} of {points(marks.most)} points)"
+    return f"{verdict} ({points_of(marks)} points)"
 
 
 def fault_of(report: GradeReport) -> str:
-    """Return which sheet could not be judged, and why; an error may name the sheet itself."""
+    """Return which sheet could not be judged, and why; the sheet is named once, though the error may name it too."""
     error, sheet = plain(report.error, 1000), plain(report.sheet or "")
     return error if not sheet or error.startswith(sheet) else f"{sheet}: {error}"
 
 
-def told(entry: Entry, mark: Mark) -> Iterator[str]:
-    """Yield what is said of an entry: the answer, why the verdict holds, the difference, a state that shows it."""
+def entry_lines(entry: Entry, mark: Mark) -> Iterator[str]:
+    """Yield the lines on one entry: answer, reason of the verdict, difference, witness, origin of the error, points."""
     if entry.answer:
         yield f"answer: {plain(entry.answer)}"
     if entry.statement:
@@ -39,16 +88,16 @@ def told(entry: Entry, mark: Mark) -> Iterator[str]:
         yield f"points: {plain(mark.rule)}"
 
 
-def reading(report: GradeReport) -> Iterator[str]:
-    """Yield how each entry was read, in the robot's own names, and what was not read."""
+def reading_lines(report: GradeReport) -> Iterator[str]:
+    """Yield how each entry was read, in the robot's own names, or why it was not read."""
     for entry in report.entries:
         if entry.answer and (entry.read or entry.verdict is Verdict.UNREADABLE):
-            was = plain(entry.read) if entry.read else f"not read: {plain(entry.statement)}"
-            yield f"{plain(entry.name)}: {plain(entry.answer)} was read as {was}"
+            meaning = plain(entry.read) if entry.read else f"not read: {plain(entry.statement)}"
+            yield f"{plain(entry.name)}: {plain(entry.answer)} was read as {meaning}"
 
 
-def remarks(report: GradeReport) -> Iterator[str]:
-    """Yield what a reader should know beside verdicts: what is missing, what was left out, notes."""
+def remark_lines(report: GradeReport) -> Iterator[str]:
+    """Yield what a reader needs besides verdicts: missing entries, statements left out, notes."""
     if report.missing:
         yield f"missing: {', '.join(map(plain, report.missing))}"
     yield from (f"left out: {plain(line)}" for line in report.left_out)
@@ -56,38 +105,33 @@ def remarks(report: GradeReport) -> Iterator[str]:
 
 
 def witness_sentence(witness: Witness) -> str:
-    """Return in words where an answer and the truth differ."""
+    """Return the state at which an answer and the truth differ, and both values there."""
     state = ", ".join(f"{plain(name, 40)} = {value:.6g}" for name, value in witness.state.items())
-    return f"{f'at {state}' if state else 'everywhere'}: answer {_value(witness.answer)}, truth {_value(witness.truth)}"
+    answer, truth = ("has no value" if x is None else f"{x:.6g}" for x in (witness.answer, witness.truth))
+    return f"{f'at {state}' if state else 'everywhere'}: answer {answer}, truth {truth}"
 
 
-def _value(value: float | None) -> str:
-    return "has no value" if value is None else f"{value:.6g}"
-
-
-def found(report: GradeReport, entry: Entry | None = None) -> Iterator[str]:
-    """Yield what went wrong, of the sheet or of an entry."""
+def diagnosis_lines(report: GradeReport, entry: Entry | None = None) -> Iterator[str]:
+    """Yield the diagnoses of a sheet, or those that concern one entry."""
     for one in report.diagnosis:
         if entry is None or entry.name in one.entries:
             yield f"{plain(one.place)}: {plain(one.sentence)}" if one.place else plain(one.sentence)
 
 
 def provenance(report: GradeReport) -> str:
-    """Return which dhkit judged by which robot, and the seed of its random states."""
+    """Return the version of dhkit, the robot with its digest, and the seed of the random states."""
     seed = "" if report.seed is None else f", seed {report.seed}"
     return f"dhkit {plain(report.version, 40)}, {plain(report.robot, 80)}, digest {plain(report.digest, 80)}{seed}"
 
 
-def own_robots(reports: Sequence[GradeReport]) -> Iterator[str]:
-    """Yield a warning where sheets named the robots that they were judged by: a student may choose an easier one."""
+def own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield a warning if sheets named the robots they were judged by: a student may choose an easier robot."""
     own = sorted({plain(report.robot, 40) for report in reports if report.own_robot and report.robot})
     if own:
         yield f"each sheet named its own robot ({', '.join(own)}): give the task's by --robot or --task"
 
 
-def mistakes_of(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:
-    """Return which mistakes were made, and on how many sheets; the most frequent first."""
-    count = Counter(
-        mistake for report in reports for mistake in {one.mistake for one in report.diagnosis if one.mistake}
-    )
+def mistake_counts(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:
+    """Return every mistake with the number of sheets that have it, the most frequent first."""
+    count = Counter(name for report in reports for name in {one.mistake for one in report.diagnosis if one.mistake})
     return sorted(count.items(), key=lambda item: (-item[1], item[0]))

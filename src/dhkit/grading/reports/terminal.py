@@ -1,4 +1,4 @@
-"""A judgement for the terminal: a table of quantities, then what is wrong, entry by entry."""
+"""Reports for the terminal: a table of quantities, then the entries that are not correct, one by one."""
 
 from __future__ import annotations
 
@@ -9,20 +9,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Verdict
-from dhkit.grading.reports.plain import plain, points
-from dhkit.grading.reports.sentences import (
-    fault_of,
-    found,
-    mistakes_of,
-    own_robots,
-    provenance,
-    reading,
-    remarks,
-    summary,
-    told,
-)
+from dhkit.grading.marks import Marks
+from dhkit.grading.report import GradeReport, Verdict, worst_verdict
+from dhkit.grading.reports import sentences
+from dhkit.grading.reports.sentences import plain, points_of
 
 STYLES = {
     Verdict.CORRECT: "green",
@@ -32,80 +22,74 @@ STYLES = {
     Verdict.WRONG: "red",
     Verdict.UNREADABLE: "magenta",
 }
-BAR = 40
-"""Columns of a bar for all sheets."""
+BAR_COLUMNS = 40
+"""Width of a mistake's bar if all sheets have the mistake, in columns of the terminal."""
 
 
 def terminal_report(report: GradeReport, marks: Marks, read: bool = False) -> RenderableType:
-    """Return a sheet's report: nothing in it is read as markup, or commands the terminal.
+    """Return the report of one sheet; no text in it is taken for markup or for a command to the terminal.
 
     Parameters
     ----------
     report, marks
-        Of the sheet.
+        Report and marks of the sheet.
     read
         Whether to show, before the verdicts, how each entry was read.
     """
     title = ", ".join(plain(part) for part in (report.student, report.sheet or "", report.robot) if part)
-    parts: list[RenderableType] = [
-        Text.assemble((title or "answers", "bold"), ": ", (summary(report, marks), STYLES[report.verdict]))
-    ]
+    verdict = (sentences.summary(report, marks), STYLES[report.verdict])
+    parts: list[RenderableType] = [Text.assemble((title or "answers", "bold"), ": ", verdict)]
     if read:
-        parts += [Text(line, style="blue") for line in reading(report)]
+        parts += [Text(line, style="blue") for line in sentences.reading_lines(report)]
     if report.entries:
-        parts.append(_quantities(report, marks))
+        parts.append(_quantities_table(report, marks))
     for entry, mark in zip(report.entries, marks.entries, strict=False):
         if entry.verdict not in (Verdict.CORRECT, Verdict.ROUNDED, Verdict.INCOMPLETE):
-            parts += _entry(entry, mark)
-    parts += [Text(line, style="cyan") for line in found(report)]
-    parts += [Text(line) for line in remarks(report)]
-    return Group(*parts, Text(provenance(report), style="dim"))
+            worth = f" ({points_of(mark)} points)"
+            verdict = (entry.verdict.value, STYLES[entry.verdict])
+            parts.append(Text.assemble((plain(entry.name), "bold"), ": ", verdict, worth))
+            parts += [Text(f"  {line}") for line in sentences.entry_lines(entry, mark)]
+    parts += [Text(line, style="cyan") for line in sentences.diagnosis_lines(report)]
+    parts += [Text(line) for line in sentences.remark_lines(report)]
+    return Group(*parts, Text(sentences.provenance(report), style="dim"))
 
 
-def _quantities(report: GradeReport, marks: Marks) -> Table:
+def _quantities_table(report: GradeReport, marks: Marks) -> Table:
     table = _table("quantity", "verdict", "entries", "points")
     for mark in marks.quantities:
         entries = report.of(mark.name)
-        right = sum(entry.verdict.passes for entry in entries)
-        worst = max((entry.verdict for entry in entries), key=lambda verdict: verdict.severity, default=None)
+        passed = sum(entry.verdict.passes for entry in entries)
+        worst = worst_verdict(entries)
         table.add_row(
             Text(plain(mark.name)),
             Text(worst.value, STYLES[worst]) if worst else Text(mark.rule, "red"),
-            Text(f"{right} of {len(entries)} pass" if entries else ""),
-            Text(f"{points(mark.points)} of {points(mark.most)}"),
+            Text(f"{passed} of {len(entries)} pass" if entries else ""),
+            Text(points_of(mark)),
         )
     return table
 
 
-def _entry(entry: Entry, mark: Mark) -> Iterator[RenderableType]:
-    """Yield an entry's heading, and below it what is said of it."""
-    worth = f" ({points(mark.points)} of {points(mark.most)} points)"
-    yield Text.assemble((plain(entry.name), "bold"), ": ", (entry.verdict.value, STYLES[entry.verdict]), worth)
-    for line in told(entry, mark):
-        yield Text(f"  {line}")
-
-
 def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> RenderableType:
-    """Return a class: its sheets with their points, and which mistakes were made how often."""
+    """Return the report of a class: its sheets with their points, and how often each mistake was made."""
     table = _table("student", "verdict", "points", "sheet")
     for report, mark in zip(reports, marks, strict=True):
         table.add_row(
             Text(plain(report.student, 60)),
             Text(plain(report.conclusion), STYLES[report.verdict]),
-            Text(f"{points(mark.points)} of {points(mark.most)}"),
-            Text(fault_of(report) if report.error else plain(report.sheet or "", 120)),
+            Text(points_of(mark)),
+            Text(sentences.fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
-    lines = [Text(line, style="yellow") for line in own_robots(reports)]
-    return Group(*lines, table, *_bars(mistakes_of(reports), len(reports)))
+    lines = [Text(line, style="yellow") for line in sentences.own_robot_warnings(reports)]
+    return Group(*lines, table, *_mistake_bars(sentences.mistake_counts(reports), len(reports)))
 
 
-def _bars(mistakes: Sequence[tuple[str, int]], sheets: int) -> Iterator[RenderableType]:
-    if not mistakes:
+def _mistake_bars(counts: Sequence[tuple[str, int]], sheets: int) -> Iterator[RenderableType]:
+    if not counts:
         return
     yield Text(f"\nmistakes, and on how many of {sheets} sheets", style="bold")
     table = Table.grid(padding=(0, 2, 0, 0))
-    for name, count in mistakes:
-        bar = ProgressBar(total=sheets, completed=count, width=BAR, complete_style="red", finished_style="red")
+    for name, count in counts:
+        bar = ProgressBar(total=sheets, completed=count, width=BAR_COLUMNS, complete_style="red", finished_style="red")
         table.add_row(Text(plain(name, 60)), Text(str(count)), bar)
     yield table
 

@@ -1,4 +1,7 @@
-r"""Rows of displayed equations: align, split, aligned, gather, cases and the like, taken apart at \\ and at columns."""
+r"""Rows of displays and of matrices in LaTeX, taken apart at \\ and at columns.
+
+Displays are align, split, aligned, gather, cases and the like.
+"""
 
 from __future__ import annotations
 
@@ -6,33 +9,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-ROWS = frozenset(
-    (
-        "align",
-        "aligned",
-        "alignat",
-        "alignedat",
-        "flalign",
-        "split",
-        "multline",
-        "multlined",
-        "gather",
-        "gathered",
-        "eqnarray",
-        "IEEEeqnarray",
-        "equation",
-        "dmath",
-        "dgroup",
-        "displaymath",
-        "math",
-        "cases",
-        "dcases",
-        "rcases",
-        "subequations",
-        "empheq",
-        "dseries",
-        "xalignat",
-    )
+from dhkit.grading.answers.tokens import word_set
+
+ROWS = word_set(
+    """
+    align aligned alignat alignedat flalign split multline multlined gather gathered eqnarray IEEEeqnarray
+    equation dmath dgroup displaymath math cases dcases rcases subequations empheq dseries xalignat
+    """
 )
 """Environments whose rows are equations, or parts of them."""
 JOINED = frozenset(("eqnarray", "IEEEeqnarray"))
@@ -47,9 +30,15 @@ MARK = re.compile(
     re.DOTALL,
 )
 
+MAX_BLANK_PIECES = 8
+"""Largest number of pieces in front of a row that may all be blank: labels and line breaks."""
 
-FEW = 8
-"""Pieces in front of a row that may all be blank: labels and line breaks."""
+SYSTEM = re.compile(
+    r"\\left\s*\\\{\s*\\begin\s*\{(array|aligned|matrix)\}(?:\s*\{[clr@{}|]*\})?((?:(?!\\begin|\\end).)*)"
+    r"\\end\s*\{\1\}\s*\\right\s*\.",
+    re.DOTALL,
+)
+r"""A system of equations: \left\{ \begin{array} ... \end{array} \right."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +48,15 @@ class Row:
     Attributes
     ----------
     line
-        From 1, where it begins.
+        Line in which it begins, from 1.
     text
         Without marks of columns.
     before
         What stands in front of its first &; empty where that is nothing.
-    after_mark
+    is_after_mark
         Whether it begins behind an &.
     column
-        Which pair of columns it begins in, from 0.
+        The pair of columns in which it begins, from 0.
     is_first
         Whether it is the first equation of a row.
     """
@@ -75,7 +64,7 @@ class Row:
     line: int
     text: str
     before: str = ""
-    after_mark: bool = False
+    is_after_mark: bool = False
     column: int = 0
     is_first: bool = True
 
@@ -84,80 +73,128 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     r"""Yield the rows of a display; what stands in matrices and in braces stays together.
 
     ``\left\{ \begin{array}{l} a = b \\ c = d \end{array} \right.`` is a system of equations, as ``cases`` is.
-    """
-    text = _systems(text)
-    kept: list[str] = []  # environments that are no rows: matrices
-    braces = 0
-    piece: list[str] = []
-    start, kinds = line, [""]
-    columns: list[str] = []
-    at = 0
 
-    def finished() -> Iterator[Row]:
-        columns.append("".join(piece))
-        piece.clear()
-        yield from _of_columns(list(columns), start, kinds[-1] in JOINED)
+    Parameters
+    ----------
+    text
+        The inside of the display.
+    line
+        Its first line, from 1.
+    """
+    text = SYSTEM.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
+    matrices: list[str] = []  # open environments whose rows are no equations
+    environments = [""]  # open environments of rows
+    braces = 0
+    columns: list[str] = []
+    pieces: list[str] = []  # of the last column
+    start, at = line, 0
+
+    def end_row() -> Iterator[Row]:
+        yield from _equations([*columns, "".join(pieces)], start, environments[-1] in JOINED)
         columns.clear()
+        pieces.clear()
 
     for mark in MARK.finditer(text):
-        piece.append(text[at : mark.start()])
+        pieces.append(text[at : mark.start()])
         line += text.count("\n", at, mark.start())
-        if len(piece) <= FEW and not columns and not "".join(piece).strip():
+        if len(pieces) <= MAX_BLANK_PIECES and not columns and not "".join(pieces).strip():
             start = line
         at = mark.end()
-        word = mark[0]
-        begins, ends = mark["begin"], mark["end"]
-        if begins and (begins not in ROWS or kept):
-            kept.append(begins)
-            piece.append(word)
-        elif ends and kept:
-            kept.pop()
-            piece.append(word)
+        word, begins, ends = mark[0], mark["begin"], mark["end"]
+        if begins and (begins not in ROWS or matrices):
+            matrices.append(begins)
+            pieces.append(word)
+        elif ends and matrices:
+            matrices.pop()
+            pieces.append(word)
         elif begins or ends:
-            yield from finished()
+            yield from end_row()
             if begins:
-                kinds.append(begins)
-                piece.append("" if begins in OPTIONED else mark["options"] or "")
-            elif len(kinds) > 1:
-                kinds.pop()
+                environments.append(begins)
+                pieces.append("" if begins in OPTIONED else mark["options"] or "")
+            elif len(environments) > 1:
+                environments.pop()
             start = line
-        elif kept or braces:
-            piece.append(word)
+        elif matrices or braces:
+            pieces.append(word)
         elif word == "&":
-            columns.append("".join(piece))
-            piece.clear()
-        elif re.match(r"\\(?:\\|cr|newline)", word) and not word.startswith("\\left"):
-            yield from finished()
+            columns.append("".join(pieces))
+            pieces.clear()
+        elif re.match(r"\\(?:\\|cr|newline)", word):
+            yield from end_row()
             start = line
         else:
-            piece.append(" " if word.isspace() else word)
+            pieces.append(" " if word.isspace() else word)
         if not begins and not ends:
             braces += (word == "{") - (word == "}" and braces > 0)
         line += word.count("\n")
-    piece.append(text[at:])
-    yield from finished()
+    pieces.append(text[at:])
+    yield from end_row()
 
 
-def _of_columns(columns: list[str], line: int, is_joined: bool) -> Iterator[Row]:
+def _equations(columns: list[str], line: int, is_joined: bool) -> Iterator[Row]:
     """Yield the equations of a row: in pairs of columns, of which an empty one has none."""
     before = columns[0].strip() if len(columns) > 1 else ""
     if len(columns) <= 2 or is_joined:
         yield Row(line, " ".join(columns), before, len(columns) > 1 and not before)
         return
     pairs = [columns[k : k + 2] for k in range(0, len(columns), 2)]
-    filled = [(k, pair) for k, pair in enumerate(pairs) if "".join(pair).strip()]
-    column, pair = filled[0] if filled else (0, [""])
-    first = Row(line, " ".join(pair), before, not before, column)
-    yield first
-    for column, pair in filled[1:]:
-        yield replace(first, text=" ".join(pair), before=pair[0].strip() or " ", column=column, is_first=False)
+    filled = [(k, pair) for k, pair in enumerate(pairs) if "".join(pair).strip()] or [(0, [""])]
+    for column, pair in filled:
+        row = Row(line, " ".join(pair), before, not before, column)
+        is_first = column == filled[0][0]
+        yield row if is_first else replace(row, before=pair[0].strip() or " ", is_first=False)
 
 
-def _systems(text: str) -> str:
-    r"""Return a text in which \left\{ \begin{array} ... \end{array} \right. are systems of equations, as cases are."""
-    pattern = re.compile(
-        r"\\left\s*\\\{\s*\\begin\s*\{(array|aligned|matrix)\}(?:\s*\{[clr@{}|]*\})?((?:(?!\\begin|\\end).)*)"
-        r"\\end\s*\{\1\}\s*\\right\s*\.",
-        re.DOTALL,
-    )
-    return pattern.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
+# Matrices
+
+MATRIX_BEGINNING = re.compile(r"\\begin\s*\{(?:[bpvBV]?|small)?(?:matrix|array)\*?\}")
+
+WHOLE_MATRIX = re.compile(
+    r"\s*(?:\\left\s*[\[(]\s*)?\\begin\s*\{(\w+\*?)\}(?:\{[clr|]*\})?(.*)\\end\s*\{\1\}\s*(?:\\right\s*[\])])?\s*",
+    re.DOTALL,
+)
+
+SYMMETRY_MARK = re.compile(
+    r"(?:\*|\\(?:ast|star|cdot|bullet)(?![A-Za-z])"
+    r"|\\(?:text|textrm|mbox|mathrm|textit|rm)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}|[Ss]ymm?\.?)"
+)
+"""What stands for an entry of a symmetric matrix that is equal to that of the other half."""
+
+
+def matrix_rows(formula: str) -> list[list[str]] | None:
+    r"""Return the rows of a matrix that is all of a formula, entries as typed; None of another formula."""
+    match = WHOLE_MATRIX.fullmatch(formula)
+    if match is None or "\\begin" in match[2]:
+        return None
+    rows: list[list[str]] = [[""]]
+    depth = 0
+    for piece in re.split(r"(\\\\(?:\s*\[[^\]]*\])?|(?<!\\)&|[{}])", match[2]):
+        depth += (piece == "{") - (piece == "}")
+        if depth == 0 and piece.startswith("\\\\"):
+            rows.append([""])
+        elif depth == 0 and piece == "&":
+            rows[-1].append("")
+        else:
+            rows[-1][-1] += piece
+    if not "".join(rows[-1]).strip():
+        rows.pop()
+    return [[entry.strip() for entry in row] for row in rows]
+
+
+def has_symmetry_marks(formula: str) -> bool:
+    """Whether a formula is a matrix in which signs stand for entries."""
+    return any(_is_mark(entry) for row in matrix_rows(formula) or () for entry in row)
+
+
+def marked_places(rows: list[list[str]]) -> set[tuple[int, int]]:
+    """Return the places, from 0, where a sign or nothing refers to the other half; none where both halves have one."""
+    places = {(i, j) for i, row in enumerate(rows) for j, entry in enumerate(row) if not entry or _is_mark(entry)}
+    is_one_half = len({i > j for i, j in places}) == 1
+    return places if is_one_half and all(i != j for i, j in places) else set()
+
+
+def _is_mark(entry: str) -> bool:
+    while entry.startswith("{") and entry.endswith("}"):
+        entry = entry[1:-1].strip()
+    return SYMMETRY_MARK.fullmatch(entry) is not None

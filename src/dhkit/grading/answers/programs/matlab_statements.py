@@ -1,12 +1,14 @@
-"""MATLAB and Octave as statements: without comments, joined where they go on, told apart outside brackets."""
+"""MATLAB and Octave as statements: tokens without comments, joined where lines go on, split outside brackets."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.tokens import word_set
 
 TOKEN = re.compile(
     r"(?P<number>0[xXbB][0-9A-Fa-f]+\w*|(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?[ij]?(?![\w]))"
@@ -15,9 +17,24 @@ TOKEN = re.compile(
     r"|[-+*/\\^()\[\]{},;:=<>&|~!@.'?])",
     re.ASCII,
 )
+STRING = re.compile(r"""(?P<string>'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*")""")
 SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
+
 MAX_TOKENS = 200_000
+"""Largest number of tokens of one statement."""
+
 OPENING, CLOSING = "([{", ")]}"
+CHANGING = ("+=", "-=", "*=", "/=", "^=", "|=", "&=")
+STEPPING = ("++", "--")
+ASSIGNING = ("=", *CHANGING, *STEPPING)
+
+COMMANDS = word_set(
+    """
+    syms clear clearvars close clc format hold warning more pkg global persistent load save figure grid axis
+    diary echo disp help doc graphics_toolkit addpath run source digits reset tic toc import
+    """
+)
+"""Commands that take the rest of their line as words: ``syms q1 q2 real``."""
 
 
 @dataclass(frozen=True)
@@ -29,198 +46,269 @@ class MatlabToken:
     kind
         number, name, sign, string or row.
     text
-        As typed; ``;`` of a row.
+        As typed; the end of a line for a row.
     line
-        From 1.
-    spaced
+        Line, from 1.
+    is_spaced
         Whether a space stands before it.
+    words
+        Rest of the line, of a command at the beginning of a statement.
     """
 
     kind: str
     text: str
     line: int
-    spaced: bool
+    is_spaced: bool
+    words: str = ""
 
     @property
     def nesting(self) -> int:
-        """By how much it changes the depth of brackets: 1, -1 or 0."""
+        """Change of the depth of brackets: 1, -1 or 0."""
         return (self.text in OPENING) - (self.text in CLOSING) if self.kind == "sign" else 0
+
+    def is_sign(self, *texts: str) -> bool:
+        """Whether it is one of some signs, and no string or name."""
+        return self.kind == "sign" and self.text in texts
+
+    @property
+    def ends_operand(self) -> bool:
+        """Whether an operand of a formula may end with it."""
+        return self.kind in ("name", "number", "string") or self.text in (")", "]", "}", "'", ".'")
+
+
+Tokens: TypeAlias = Sequence[MatlabToken]
 
 
 @dataclass(frozen=True)
-class Statement:
-    """Tokens of one statement, and its text where it begins like a command: ``syms q1 q2 real``.
+class MatlabStatement:
+    """One statement.
 
     Attributes
     ----------
     tokens
         One or more.
-    words
-        The rest of its line, which commands take as words.
     """
 
     tokens: tuple[MatlabToken, ...]
-    words: str
 
     @property
     def line(self) -> int:
-        """Where it begins, from 1."""
+        """Line in which it begins, from 1."""
         return self.tokens[0].line
 
+    @property
+    def keyword(self) -> str:
+        """The name that it begins with; empty where it begins with something else."""
+        return self.tokens[0].text if self.tokens[0].kind == "name" else ""
 
-def statements(text: str, file: str, line_name: object) -> Iterator[Statement]:
+    @property
+    def texts(self) -> list[str]:
+        """The texts of its tokens."""
+        return [token.text for token in self.tokens]
+
+    @property
+    def command_names(self) -> list[str]:
+        """Names among the words of a command."""
+        return re.findall(r"[A-Za-z]\w*", self.tokens[0].words)
+
+    def assigned_names(self) -> set[str]:
+        """Return the names that it may assign."""
+        tokens, keyword = self.tokens, self.tokens[0].text
+        names: set[str] = set()
+        if keyword in ("syms", "global", "persistent"):
+            names |= set(self.command_names)
+        if keyword in ("for", "parfor", "catch"):
+            names |= set([token.text for token in tokens[1:] if token.kind == "name"][:1])
+        for k, token in enumerate(tokens):
+            if token.is_sign(*ASSIGNING):
+                names |= _names_assigned_before(tokens, k)
+            if token.is_sign(*STEPPING):
+                names |= {after.text for after in tokens[k + 1 : k + 2] if after.kind == "name"}
+        return names
+
+
+def _names_assigned_before(tokens: Tokens, end: int) -> set[str]:
+    """Return the names that the left-hand side in front of ``end`` assigns."""
+    is_list = end > 0 and tokens[end - 1].is_sign("]")
+    depth = 0
+    for k in range(end - 1, -1, -1):
+        depth -= tokens[k].nesting
+        if is_list and (depth == 0 or k == 0):
+            entries = [entry for row in split_rows(tokens[k + 1 : end - 1]) for entry in row]
+            return {entry[0].text for entry in entries if entry[0].kind == "name"}
+        if not is_list and depth < 0:
+            return set()
+        if not is_list and depth == 0 and tokens[k].kind == "name" and (k == 0 or tokens[k - 1].text != "."):
+            return {tokens[k].text}
+    return set()
+
+
+def closing(tokens: Tokens, k: int) -> int:
+    """Return where the bracket at k closes; the tokenizer has checked that it does."""
+    depth = 0
+    for end in range(k, len(tokens)):
+        depth += tokens[end].nesting
+        if depth == 0:
+            return end
+    return len(tokens) - 1
+
+
+def is_call(tokens: Tokens, *names: str) -> bool:
+    """Whether tokens are the call of a function of one of some names, and nothing else."""
+    is_named = len(tokens) > 2 and tokens[0].kind == "name" and tokens[0].text in names
+    return is_named and tokens[1].text == "(" and closing(tokens, 1) == len(tokens) - 1
+
+
+def split_rows(tokens: Tokens) -> list[list[Tokens]]:
+    """Split the inside of a matrix: at ; and new lines into rows, at commas and spaces into entries."""
+    rows: list[list[list[MatlabToken]]] = [[[]]]
+    depth = 0
+    for k, token in enumerate(tokens):
+        entry = rows[-1][-1]
+        if depth == 0 and (token.kind == "row" or token.is_sign(";")):
+            rows.append([[]])
+            continue
+        if depth == 0 and token.is_sign(","):
+            rows[-1].append([])
+            continue
+        if depth == 0 and token.is_spaced and entry and entry[-1].ends_operand and _begins_entry(tokens[k : k + 2]):
+            rows[-1].append([])
+        depth += token.nesting
+        rows[-1][-1].append(token)
+    filled: list[list[Tokens]] = [[entry for entry in row if entry] for row in rows]
+    return [row for row in filled if row]
+
+
+def _begins_entry(tokens: Tokens) -> bool:
+    """Whether the first token, behind a space, begins an entry: also a sign that stands close to what follows."""
+    token, after = tokens[0], tokens[1] if len(tokens) > 1 else None
+    if token.kind != "sign" or token.text in ("(", "[", "{", "@"):
+        return True
+    return token.text in ("+", "-", "~", "!") and after is not None and not after.is_spaced and after.kind != "row"
+
+
+def matlab_statements(text: str, file: str, line_name: Callable[[int], str]) -> Iterator[MatlabStatement]:
     """Yield the statements of a program.
+
+    Parameters
+    ----------
+    text
+        The program.
+    file
+        What messages begin with.
+    line_name
+        How messages name a line, which counts from 1.
 
     Raises
     ------
     AnswerError
         Brackets or strings that do not close, or a character that MATLAB does not have.
     """
-    name = line_name if callable(line_name) else str
-    found: list[MatlabToken] = []
-    brackets: list[tuple[str, int]] = []
-    words = ""
-    for token in _tokens(text, file, name, brackets):
-        ends = not brackets and (token.kind == "row" or (token.kind == "sign" and token.text in (";", ",")))
-        if ends:
-            if found:
-                yield Statement(tuple(found), words)
-            found = []
-            continue
-        if token.kind == "words":
-            words = token.text
-            continue
-        found.append(token)
-        if len(found) > MAX_TOKENS:
-            raise AnswerError(f"{file}: {name(found[0].line)}: a statement of more than {MAX_TOKENS} signs")
-    if brackets:
-        sign, line = brackets[-1]
-        raise AnswerError(f"{file}: {name(line)}: {sign!r} does not close")
-    if found:
-        yield Statement(tuple(found), words)
+    return _Tokenizer(file, line_name).statements(text)
 
 
-def _tokens(  # type: ignore[no-untyped-def]
-    text: str, file: str, name, brackets: list[tuple[str, int]]
-) -> Iterator[MatlabToken]:
-    """Yield tokens; ``brackets`` holds those that are open, and the end of a line inside them is a row or a space."""
-    block = 0
-    before = MatlabToken("row", "\n", 0, False)
-    for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
-        mark = line.strip()
-        if mark in ("%{", "#{"):
-            block += 1
-            continue
-        if block:
-            block -= mark in ("%}", "#}")
-            continue
-        at, spaced, goes_on = 0, True, False
+class _Tokenizer:
+    """Reads a program line by line; ``brackets`` are those that are open, each with its line."""
+
+    def __init__(self, file: str, line_name: Callable[[int], str]) -> None:
+        self.file = file
+        self.line_name = line_name
+        self.brackets: list[tuple[str, int]] = []
+        self.previous = MatlabToken("row", "\n", 0, False)
+
+    def _error(self, line: int, problem: str) -> AnswerError:
+        return AnswerError(f"{self.file}: {self.line_name(line)}: {problem}")
+
+    def statements(self, text: str) -> Iterator[MatlabStatement]:
+        tokens: list[MatlabToken] = []
+        for token in self._tokens(text):
+            if not self.brackets and (token.kind == "row" or token.is_sign(";", ",")):
+                if tokens:
+                    yield MatlabStatement(tuple(tokens))
+                tokens = []
+                continue
+            tokens.append(token)
+            if len(tokens) > MAX_TOKENS:
+                raise self._error(tokens[0].line, f"a statement of more than {MAX_TOKENS} signs")
+        if self.brackets:
+            sign, line = self.brackets[-1]
+            raise self._error(line, f"{sign!r} does not close")
+        if tokens:
+            yield MatlabStatement(tuple(tokens))
+
+    def _tokens(self, text: str) -> Iterator[MatlabToken]:
+        """Yield the tokens outside block comments."""
+        depth = 0
+        for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
+            mark = line.strip()
+            if mark in ("%{", "#{"):
+                depth += 1
+            elif depth:
+                depth -= mark in ("%}", "#}")
+            else:
+                yield from self._line_tokens(line, number)
+        if depth:
+            raise AnswerError(f"{self.file}: a comment that %{{ begins does not end")
+
+    def _line_tokens(self, line: str, number: int) -> Iterator[MatlabToken]:
+        """Yield a line's tokens, and its end where it ends a statement or a row of a matrix."""
+        at, is_spaced = 0, True
         while at < len(line):
             if match := SPACE.match(line, at):
-                at, spaced = match.end(), True
+                at, is_spaced = match.end(), True
                 continue
-            character = line[at]
-            if character in "%#":
-                break
+            is_at_row = self.previous.kind == "row" and not self.brackets
+            if line[at] in "%#" or (line[at] == "!" and is_at_row):
+                break  # a comment, or a command of the system's
             if line.startswith("...", at):
-                goes_on = True
-                break
-            if character == "!" and before.kind == "row" and not brackets:
-                break  # a command of the system's
-            at_start = not brackets and (before.kind == "row" or before.text in (";", ","))
-            is_quote = character == '"' or (character == "'" and not _is_transpose(before, spaced, brackets))
-            if is_quote:
-                match = re.compile(r"""'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*\"""").match(line, at)
-                if match is None:
-                    raise AnswerError(f"{file}: {name(number)}: a string that does not end")
-                token = MatlabToken("string", match[0], number, spaced)
-            else:
-                match = TOKEN.match(line, at)
-                if match is None:
-                    raise AnswerError(f"{file}: {name(number)}: found {character!r}, which no statement has")
-                token = MatlabToken(str(match.lastgroup), match[0], number, spaced)
-            at, spaced = match.end(), False
-            if token.kind == "sign" and token.text in OPENING:
-                brackets.append((token.text, number))
-            elif token.kind == "sign" and token.text in CLOSING:
-                if not brackets or OPENING.index(brackets[-1][0]) != CLOSING.index(token.text):
-                    raise AnswerError(f"{file}: {name(number)}: {token.text!r} without its opening bracket")
-                brackets.pop()
-            if at_start and token.kind == "name":
-                rest = line[at:] if token.text in COMMANDS else ""
-                yield MatlabToken("words", _words(rest), number, False)
-                if _is_command(token.text, rest):
-                    yield token
-                    before = token
-                    at = len(line) - len(_rest(rest))
-                    continue
+                self.previous = self.previous if self.brackets else MatlabToken("space", " ", number, True)
+                return
+            begins_statement = is_at_row or (not self.brackets and self.previous.text in (";", ","))
+            match = self._match(line, at, number, is_spaced)
+            kind, text = str(match.lastgroup), match[0]
+            at = match.end()
+            is_command = begins_statement and kind == "name" and text in COMMANDS
+            rest = line[at:] if is_command else ""
+            end = len(line) - len(_behind_words(rest))
+            token = MatlabToken(kind, text, number, is_spaced, line[at:end] if is_command else "")
+            self._count_bracket(token)
             yield token
-            before = token
-        if goes_on:
-            before = MatlabToken("space", " ", number, True) if not brackets else before
-            continue
-        if not brackets or brackets[-1][0] in "[{":
-            before = MatlabToken("row", "\n", number, True)
-            yield before
-    if block:
-        raise AnswerError(f"{file}: a comment that %{{ begins does not end")
+            self.previous, is_spaced = token, False
+            if _takes_words(rest):
+                at = end
+        if not self.brackets or self.brackets[-1][0] in "[{":
+            self.previous = MatlabToken("row", "\n", number, True)
+            yield self.previous
+
+    def _match(self, line: str, at: int, number: int, is_spaced: bool) -> re.Match[str]:
+        """Match the token that begins in a column of a line."""
+        is_in_matrix = bool(self.brackets) and self.brackets[-1][0] in "[{"
+        is_transpose = self.previous.ends_operand and not (is_spaced and is_in_matrix)
+        pattern, problem = TOKEN, f"found {line[at]!r}, which no statement has"
+        if line[at] == '"' or (line[at] == "'" and not is_transpose):
+            pattern, problem = STRING, "a string that does not end"
+        match = pattern.match(line, at)
+        if match is None:
+            raise self._error(number, problem)
+        return match
+
+    def _count_bracket(self, token: MatlabToken) -> None:
+        if token.nesting > 0:
+            self.brackets.append((token.text, token.line))
+        elif token.nesting < 0:
+            if not self.brackets or OPENING.index(self.brackets[-1][0]) != CLOSING.index(token.text):
+                raise self._error(token.line, f"{token.text!r} without its opening bracket")
+            self.brackets.pop()
 
 
-def _is_transpose(before: MatlabToken, spaced: bool, brackets: list[tuple[str, int]]) -> bool:
-    ends = before.kind in ("name", "number", "string") or before.text in (")", "]", "}", "'", ".'")
-    return ends and before.kind != "row" and not (spaced and brackets and brackets[-1][0] in "[{")
+def _takes_words(rest: str) -> bool:
+    """Whether a command is followed by words: a space, another word, and no = after it."""
+    has_word = re.match(r"[ \t]+(?:[A-Za-z_\-*'\"]|\d)", rest) is not None
+    return has_word and re.match(r"[ \t]+\w*[ \t]*(?:=[^=]|\()", rest.replace("(t)", "")) is None
 
 
-COMMANDS = frozenset(
-    (
-        "syms",
-        "clear",
-        "clearvars",
-        "close",
-        "clc",
-        "format",
-        "hold",
-        "warning",
-        "more",
-        "pkg",
-        "global",
-        "persistent",
-        "load",
-        "save",
-        "figure",
-        "grid",
-        "axis",
-        "diary",
-        "echo",
-        "disp",
-        "help",
-        "doc",
-        "graphics_toolkit",
-        "addpath",
-        "run",
-        "source",
-        "digits",
-        "reset",
-        "tic",
-        "toc",
-        "import",
-    )
-)
-
-
-def _is_command(word: str, rest: str) -> bool:
-    """Whether a statement is a command with words: the word, a space, another word, and no = after it."""
-    return re.match(r"[ \t]+(?:[A-Za-z_\-*'\"]|\d)", rest) is not None and (
-        word in COMMANDS and re.match(r"[ \t]+\w*[ \t]*(?:=[^=]|\()", rest.replace("(t)", "")) is None
-    )
-
-
-def _words(rest: str) -> str:
-    return rest[: len(rest) - len(_rest(rest))]
-
-
-def _rest(rest: str) -> str:
-    """Return what follows a command's words."""
+def _behind_words(rest: str) -> str:
+    """Return what follows a command's words in its line."""
     depth = 0
     for k, character in enumerate(rest):
         depth += (character in OPENING) - (character in CLOSING)

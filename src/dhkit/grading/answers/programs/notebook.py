@@ -7,42 +7,23 @@ import json
 import re
 import warnings
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.tokens import word_set
 
-HARMLESS_MAGICS = frozenset(
-    (
-        "matplotlib",
-        "config",
-        "timeit",
-        "pip",
-        "conda",
-        "ls",
-        "pwd",
-        "who",
-        "whos",
-        "precision",
-        "load_ext",
-        "autoreload",
-        "time",
-        "cd",
-        "lsmagic",
-        "autosave",
-        "pdb",
-        "xmode",
-        "colors",
-        "history",
-        "env",
-        "display",
-    )
+HARMLESS_MAGICS = word_set(
+    """
+    matplotlib config timeit pip conda ls pwd who whos precision load_ext autoreload time cd lsmagic autosave
+    pdb xmode colors history env display
+    """
 )
 """Magics that assign nothing."""
-WHOLE_CELLS = frozenset(
-    ("latex", "markdown", "html", "HTML", "javascript", "js", "svg", "SVG", "bash", "sh", "writefile")
-)
-"""Cells with this magic hold no Python, and assign nothing."""
+
+WHOLE_CELL_MAGICS = word_set("latex markdown html HTML javascript js svg SVG bash sh writefile timeit")
+"""Magics of cells that hold no Python, or Python that assigns nothing."""
+
 CELL_PREFIXES = frozenset(("time", "capture", "matplotlib"))
 """Magics in front of a cell that is otherwise ordinary."""
 
@@ -56,29 +37,33 @@ class Notebook:
     code
         Cells one below the other.
     suffix
-        .py, or .m of a kernel of MATLAB or Octave.
+        ``.py``, or ``.m`` for a kernel of MATLAB or Octave.
     starts
-        First lines of the cells, from 1, and the cells' numbers.
+        First line of each cell of code, from 1.
     notes
         What a reader should know.
     """
 
     code: str
     suffix: str
-    starts: tuple[tuple[int, int], ...]
+    starts: tuple[int, ...]
     notes: tuple[str, ...]
 
     def line_name(self, line: int) -> str:
-        """Return how messages name a line: ``cell 2, line 3``, cells of code counted from 1."""
-        k = bisect_right([start for start, _ in self.starts], line) - 1
-        if k < 0:
-            return f"line {line}"
-        start, cell = self.starts[k]
-        return f"cell {cell}, line {line - start + 1}"
+        """Return how messages name a line: ``cell 2, line 3``, cells of code and lines counted from 1."""
+        cell = bisect_right(self.starts, line)
+        return f"cell {cell}, line {line - self.starts[cell - 1] + 1}" if cell else f"line {line}"
 
 
 def notebook_code(text: str, file: str) -> Notebook:
     """Return the code of a notebook.
+
+    Parameters
+    ----------
+    text
+        The notebook, as JSON.
+    file
+        What messages begin with.
 
     Raises
     ------
@@ -87,11 +72,10 @@ def notebook_code(text: str, file: str) -> Notebook:
     """
     try:
         document = json.loads(text)
-        cells = document["cells"]
         language = str(document.get("metadata", {}).get("kernelspec", {}).get("language", "python")).lower()
-        code = [cell for cell in cells if cell["cell_type"] == "code"]
-        sources = [_source(cell["source"]) for cell in code]
-        counts = [cell.get("execution_count") for cell in code]
+        cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+        sources = [_source(cell["source"]) for cell in cells]
+        counts = [cell.get("execution_count") for cell in cells]
     except (ValueError, RecursionError):
         raise AnswerError(f"{file}: no notebook: not JSON") from None
     except (KeyError, TypeError, AttributeError):
@@ -100,15 +84,15 @@ def notebook_code(text: str, file: str) -> Notebook:
     if not is_matlab and language not in ("python", "python3", ""):
         raise AnswerError(f"{file}: a notebook of {language[:20]!r}; expected Python, MATLAB or Octave")
     lines: list[str] = []
-    starts: list[tuple[int, int]] = []
+    starts: list[int] = []
     for number, source in enumerate(sources, start=1):
-        starts.append((len(lines) + 1, number))
+        starts.append(len(lines) + 1)
         cell = source.replace("\r\n", "\n").replace("\r", "\n")
-        lines += cell.split("\n") if is_matlab else _without_magics(cell, f"{file}: cell {number}").split("\n")
-    return Notebook("\n".join(lines), ".m" if is_matlab else ".py", tuple(starts), _order(counts))
+        lines += (cell if is_matlab else _without_magics(cell, f"{file}: cell {number}")).split("\n")
+    return Notebook("\n".join(lines), ".m" if is_matlab else ".py", tuple(starts), _order_notes(counts))
 
 
-def _source(source: Any) -> str:
+def _source(source: object) -> str:
     if isinstance(source, str):
         return source
     if not isinstance(source, list) or not all(isinstance(line, str) for line in source):
@@ -116,7 +100,7 @@ def _source(source: Any) -> str:
     return "".join(source)
 
 
-def _order(counts: list[Any]) -> tuple[str, ...]:
+def _order_notes(counts: Sequence[object]) -> tuple[str, ...]:
     """Return a note where cells were run in another order than they stand in."""
     run = [count for count in counts if isinstance(count, int)]
     if run == sorted(run):
@@ -130,33 +114,26 @@ def _without_magics(cell: str, where: str) -> str:
         return cell
     lines = cell.split("\n")
     first = next((k for k, line in enumerate(lines) if line.strip()), 0)
-    head = re.match(r"%%\s*(\w+)", lines[first])
-    if head:
-        if head[1] in WHOLE_CELLS:
+    if magic := re.match(r"%%\s*(\w+)", lines[first]):
+        if magic[1] in WHOLE_CELL_MAGICS:
             return "\n".join("" for _ in lines)
-        if head[1] not in CELL_PREFIXES and head[1] != "timeit":
-            raise AnswerError(f"{where}: found %%{head[1][:20]}, which may assign any name")
-        if head[1] == "timeit":
-            return "\n".join("" for _ in lines)
+        if magic[1] not in CELL_PREFIXES:
+            raise AnswerError(f"{where}: found %%{magic[1][:20]}, which may assign any name")
         lines[first] = ""
-    for k, line in enumerate(lines):
-        lines[k] = _plain_line(line, f"{where}, line {k + 1}")
-    return "\n".join(lines)
+    return "\n".join(_without_magic(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1))
 
 
-def _plain_line(line: str, where: str) -> str:
+def _without_magic(line: str, where: str) -> str:
     """Return a line of a cell; ``pass`` for one that only a notebook understands: inside brackets it is an error."""
     stripped = line.strip()
-    indent = line[: len(line) - len(line.lstrip())]
     if stripped.startswith("%"):
         name = re.match(r"%\s*(\w+)", stripped)
         word = name[1] if name else ""
         if word not in HARMLESS_MAGICS or (word in ("time", "env", "timeit") and "=" in stripped):
             raise AnswerError(f"{where}: found %{word[:20]}, which may assign any name")
-        return f"{indent}pass"
-    if stripped.startswith(("!", "?")) or re.fullmatch(r"[\w.]+\?{1,2}", stripped):
-        return f"{indent}pass"
-    return line
+    elif not stripped.startswith(("!", "?")) and not re.fullmatch(r"[\w.]+\?{1,2}", stripped):
+        return line
+    return f"{line[: len(line) - len(line.lstrip())]}pass"
 
 
 def _is_python(cell: str) -> bool:

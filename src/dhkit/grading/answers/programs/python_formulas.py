@@ -1,89 +1,57 @@
-"""Right-hand sides of Python: which are formulas and matrices, and which names they read; the text stays as typed."""
+"""Right-hand sides of Python: formulas and matrices as typed, and the names that they read."""
 
 from __future__ import annotations
 
 import ast
-import io
 import math
-import re
-import tokenize
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import accumulate
+from itertools import groupby
 
-from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.bindings import Formula, Read, Use
+from dhkit.grading.answers.programs.bindings import (
+    MAX_ENTRIES,
+    MAX_INDEX,
+    PLAIN_NUMBER,
+    Formula,
+    Index,
+    Read,
+    Use,
+    join_formulas,
+)
+from dhkit.grading.answers.programs.python_text import PythonText, ascii_name
 from dhkit.grading.answers.rewriting import MODULES
-from dhkit.grading.answers.tokens import folded
+from dhkit.grading.answers.tokens import word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-UNCHANGED = frozenset(
-    ("simplify", "expand", "trigsimp", "factor", "cancel", "together", "powsimp", "expand_trig", "radsimp", "collect")
-)
+UNCHANGED = word_set("simplify expand trigsimp factor cancel together powsimp expand_trig radsimp collect")
 """sympy's functions and methods that write an expression in another way."""
+
 UNCHANGED_METHODS = UNCHANGED | {"doit", "applyfunc", "copy", "as_immutable", "as_mutable"}
-MATRIX_CALLS = frozenset(
-    (
-        "Matrix",
-        "ImmutableMatrix",
-        "MutableDenseMatrix",
-        "ImmutableDenseMatrix",
-        "array",
-        "matrix",
-        "asarray",
-        "DM",
-        "SX",
-    )
-)
+
+MATRIX_CALLS = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix array matrix asarray DM SX")
+"""Functions that make a matrix of lists of rows."""
+
 EXACT = frozenset(("Integer", "Rational", "int", "round", "floor", "ceil", "trunc"))
 """Functions that make another number of a quotient of floating-point numbers: Integer(1/3) is 0."""
+
 ZEROS = frozenset(("zeros", "zeros_like"))
-VECTORS = ("asarray", "array", "ravel", "squeeze", "flatten", "list", "tuple", "Matrix", "atleast_1d", "asanyarray")
-"""Functions that turn a vector into the same vector."""
+
 OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
-MAX_ENTRIES = 1_024
-MAX_INDEX = 1_000
 
 
-def spelled(name: str) -> str:
-    """Return an identifier in ASCII: Greek letters by their names, as the reader of formulas has them."""
-    if name.isascii():
-        return name
-    try:
-        plain, _ = folded(name)
-    except AnswerError:
-        plain = ""
-    return plain if plain.isidentifier() and plain.isascii() else "u" + name.encode("unicode_escape").hex()
-
-
-def constant_index(node: ast.expr) -> tuple[int, ...] | None:
+def constant_index(node: ast.expr) -> Index | None:
     """Return the numbers of an index; ``[..., 0, 1]`` counts behind leading axes. None of any other index."""
     parts = node.elts if isinstance(node, ast.Tuple) else [node]
     if parts and isinstance(parts[0], ast.Constant) and parts[0].value is Ellipsis:
         parts = parts[1:]
-    found: list[int] = []
-    for part in parts:
-        value = part.value if isinstance(part, ast.Constant) else None
-        if type(value) is not int or not 0 <= value <= MAX_INDEX:
-            return None
-        found.append(value)
-    return tuple(found)
+    numbers = [part.value if isinstance(part, ast.Constant) else None for part in parts]
+    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= MAX_INDEX)
+    return index if len(index) == len(parts) else None
 
 
-def joined(pieces: Sequence[str | Formula]) -> Formula:
-    """Return texts and formulas side by side, as one formula."""
-    texts: list[str] = []
-    reads: list[Read] = []
-    at, problem = 0, ""
-    for piece in pieces:
-        text = piece if isinstance(piece, str) else piece.text
-        if isinstance(piece, Formula):
-            reads += [replace(read, start=read.start + at, end=read.end + at) for read in piece.reads]
-            problem = problem or piece.problem
-        texts.append(text)
-        at += len(text)
-    return Formula("".join(texts), tuple(reads), problem=problem)
+def has_starred(nodes: Sequence[ast.expr]) -> bool:
+    """Whether a ``*`` unpacks one of several expressions."""
+    return any(isinstance(node, ast.Starred) for node in nodes)
 
 
 class PythonFormulas:
@@ -96,337 +64,244 @@ class PythonFormulas:
     """
 
     def __init__(self, text: str) -> None:
-        self.lines = text.split("\n")
-        self._columns: dict[int, list[int]] = {}
-        self.encoded = [None if line.isascii() else line.encode() for line in self.lines]
-
-    # Text
-
-    def _column(self, line: int, offset: int) -> int:
-        """Return a column in characters: the parser counts bytes."""
-        encoded = self.encoded[line - 1]
-        if encoded is None:
-            return offset
-        if line not in self._columns:
-            widths = accumulate((byte & 0xC0) != 0x80 for byte in encoded)  # bytes that begin a character
-            self._columns = {line: [0, *widths]}
-        return self._columns[line][offset]
-
-    def segment(self, node: ast.expr) -> str:
-        """Return an expression's text in one line: no comments, no line breaks, characters where they were."""
-        end_line, end_offset = node.end_lineno or node.lineno, node.end_col_offset or 0
-        first, last = self._column(node.lineno, node.col_offset), self._column(end_line, end_offset)
-        if node.lineno == end_line:
-            return self.lines[node.lineno - 1][first:last]
-        lines = [self.lines[node.lineno - 1][first:], *self.lines[node.lineno : end_line - 1]]
-        return _one_line("\n".join([*lines, self.lines[end_line - 1][:last]]))
-
-    def _offsets(self, root: ast.expr) -> dict[int, int]:
-        """Return where each line of an expression begins in its text."""
-        start = self._column(root.lineno, root.col_offset)
-        found = {root.lineno: -start}
-        at = len(self.lines[root.lineno - 1]) - start + 1
-        for line in range(root.lineno + 1, (root.end_lineno or root.lineno) + 1):
-            found[line] = at
-            at += len(self.lines[line - 1]) + 1
-        return found
-
-    # Formulas
+        self.source = PythonText(text)
 
     def formula(self, node: ast.expr) -> Formula:
         """Return an expression as a formula, a matrix, or why it cannot be read."""
-        wrappers: list[Read] = []
-        node = self._unwrapped(node, wrappers)
-        found = self._matrix(node) or self._scalar(node)
-        return replace(found, reads=(*wrappers, *found.reads)) if wrappers else found
+        inner, wrapper_reads = _unwrap(node)
+        return (self._matrix(inner) or self._scalar(inner)).after_reads(wrapper_reads)
 
-    def _unwrapped(self, node: ast.expr, wrappers: list[Read]) -> ast.expr:
-        """Take simplify(...) and the like away; their names must be the library's."""
-        while isinstance(node, ast.Call):
-            function = node.func
-            if any(keyword.arg in (None, "inplace") for keyword in node.keywords) or _has_starred(node.args):
-                return node
-            if isinstance(function, ast.Name) and function.id in UNCHANGED and node.args:
-                wrappers.append(Read(function.id, 0, 0, use=Use.CALL))
-                node = node.args[0]
-            elif isinstance(function, ast.Attribute) and _is_module_call(function, UNCHANGED) and node.args:
-                assert isinstance(function.value, ast.Name)  # noqa: S101
-                wrappers.append(Read(spelled(function.value.id), 0, 0, use=Use.MODULE))
-                node = node.args[0]
-            elif isinstance(function, ast.Attribute) and function.attr in UNCHANGED_METHODS:
-                simple = [arg.id if isinstance(arg, ast.Name) else getattr(arg, "attr", "") for arg in node.args]
-                if not all(name in UNCHANGED for name in simple) or (function.attr == "applyfunc" and not simple):
-                    return node
-                if _is_derivative(function.value):
-                    node = function.value
-                    continue
-                node = function.value
-            else:
-                return node
-        return node
-
-    # Matrices
+    def _scalar(self, node: ast.expr) -> Formula:
+        return _ScalarReader(self.source, node).formula()
 
     def _matrix(self, node: ast.expr) -> Formula | None:
-        """Return a matrix or a vector in brackets, perhaps with a factor; nothing where there is none."""
-        wrappers: list[Read] = []
+        """Return a matrix or a vector in brackets, perhaps with a factor; None where there is none."""
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
-            return self._scaled(node)
+            return self._scaled_matrix(node)
         called = _called(node)
-        if called in ZEROS and isinstance(node, ast.Call):
-            self._function_read(node.func, wrappers)
-            return Formula(self.segment(node), tuple(wrappers), is_zeros=True)
         rows: ast.expr | None = node
+        if called in ZEROS:
+            return Formula(self.source.segment(node), tuple(_function_reads(node)), is_zeros=True)
         if called in MATRIX_CALLS and isinstance(node, ast.Call):
-            self._function_read(node.func, wrappers)
-            if any(keyword.arg != "dtype" for keyword in node.keywords) or _has_starred(node.args):
+            if any(keyword.arg != "dtype" for keyword in node.keywords) or has_starred(node.args):
                 return None
-            rows = node.args[0] if len(node.args) == 1 else self._reshaped(node.args)
-        if not isinstance(rows, ast.List | ast.Tuple):
-            return None
-        found = self._listed(rows)
-        return None if found is None else replace(found, reads=(*wrappers, *found.reads))
+            rows = node.args[0] if len(node.args) == 1 else _reshape(node.args)
+        entries = self._entries(rows) if isinstance(rows, ast.List | ast.Tuple) else None
+        return _matrix_of(entries).after_reads(_function_reads(node)) if entries else None
 
-    @staticmethod
-    def _function_read(function: ast.expr, wrappers: list[Read]) -> None:
-        if isinstance(function, ast.Name):
-            wrappers.append(Read(spelled(function.id), 0, 0, use=Use.CALL))
-        elif isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-            wrappers.append(Read(spelled(function.value.id), 0, 0, use=Use.MODULE))
-
-    @staticmethod
-    def _reshaped(arguments: Sequence[ast.expr]) -> ast.expr | None:
-        """Return the rows of Matrix(2, 2, [a, b, c, d])."""
-        if len(arguments) != 3 or not isinstance(arguments[2], ast.List | ast.Tuple):
+    def _entries(self, rows: ast.List | ast.Tuple) -> dict[Index, Formula] | None:
+        """Return the entries of a list, or of a list of lists, by index from 0."""
+        is_nested = [isinstance(row, ast.List | ast.Tuple) for row in rows.elts]
+        if has_starred(rows.elts) or len(rows.elts) > MAX_ENTRIES or (any(is_nested) and not all(is_nested)):
             return None
-        shape = [x.value for x in arguments[:2] if isinstance(x, ast.Constant) and isinstance(x.value, int)]
-        entries = arguments[2].elts
-        if len(shape) != 2 or not all(0 < k <= MAX_INDEX for k in shape):
-            return None
-        rows, columns = shape
-        if len(entries) != rows * columns:
-            return None
-        at = [ast.List(entries[i * columns : (i + 1) * columns], ast.Load()) for i in range(rows)]
-        return ast.List(list[ast.expr](at), ast.Load())
-
-    def _listed(self, rows: ast.List | ast.Tuple) -> Formula | None:
-        entries: dict[tuple[int, ...], Formula] = {}
-        pieces: list[str | Formula] = ["["]
-        if not rows.elts or _has_starred(rows.elts) or len(rows.elts) > MAX_ENTRIES:
-            return None
-        nested = [isinstance(row, ast.List | ast.Tuple) for row in rows.elts]
-        if any(nested) and not all(nested):
-            return None
+        entries: dict[Index, Formula] = {}
         for i, row in enumerate(rows.elts):
-            pieces += [", "] if i else []
             if not isinstance(row, ast.List | ast.Tuple):
-                entries[(i,)] = self._scalar_unwrapped(row)
-                pieces.append(entries[(i,)])
+                entries[(i,)] = self._scalar_entry(row)
                 continue
-            if not row.elts or _has_starred(row.elts):
+            if not row.elts or has_starred(row.elts) or any(isinstance(x, ast.List | ast.Tuple) for x in row.elts):
                 return None
-            pieces.append("[")
-            for j, element in enumerate(row.elts):
-                if isinstance(element, ast.List | ast.Tuple):
-                    return None
-                entries[(i, j)] = self._scalar_unwrapped(element)
-                pieces += [", ", entries[(i, j)]] if j else [entries[(i, j)]]
-            pieces.append("]")
+            entries |= {(i, j): self._scalar_entry(element) for j, element in enumerate(row.elts)}
             if len(entries) > MAX_ENTRIES:
                 return None
-        return replace(joined([*pieces, "]"]), entries=entries)
+        return entries
 
-    def _scalar_unwrapped(self, node: ast.expr) -> Formula:
-        wrappers: list[Read] = []
-        found = self._scalar(self._unwrapped(node, wrappers))
-        return replace(found, reads=(*wrappers, *found.reads)) if wrappers else found
+    def _scalar_entry(self, node: ast.expr) -> Formula:
+        inner, wrapper_reads = _unwrap(node)
+        return self._scalar(inner).after_reads(wrapper_reads)
 
-    def _scaled(self, node: ast.BinOp) -> Formula | None:
+    def _scaled_matrix(self, node: ast.BinOp) -> Formula | None:
         """Return a matrix times a formula, or divided by one, multiplied out."""
-        left = _called(node.left) in MATRIX_CALLS and isinstance(node.left, ast.Call)
-        right = _called(node.right) in MATRIX_CALLS and isinstance(node.op, ast.Mult)
-        if left == right:
+        is_product = isinstance(node.op, ast.Mult)
+        is_left = _called(node.left) in MATRIX_CALLS
+        if is_left == (is_product and _called(node.right) in MATRIX_CALLS):
             return None
-        matrix = self._matrix(node.left if left else node.right)
-        scalar = self._scalar(node.right if left else node.left)
-        if matrix is None or matrix.entries is None or matrix.problem or scalar.problem:
+        matrix = self._matrix(node.left if is_left else node.right)
+        factor = self._scalar(node.right if is_left else node.left)
+        if matrix is None or matrix.entries is None or matrix.problem or factor.problem:
             return None
-        before: list[str | Formula] = [] if left else ["(", scalar, ")*"]
-        after: list[str | Formula] = [")*(" if isinstance(node.op, ast.Mult) else ")/(", scalar, ")"]
-        after = after if left else [")"]
-        entries = {index: joined([*before, "(", entry, *after]) for index, entry in matrix.entries.items()}
-        rows: dict[int, list[Formula]] = {}
-        for index, entry in entries.items():
-            rows.setdefault(index[0], []).append(entry)
-        is_flat = len(next(iter(entries))) == 1
-        pieces: list[str | Formula] = ["["]
-        for i, row in rows.items():
-            pieces += ([", "] if i else []) + ([] if is_flat else ["["])
-            for j, entry in enumerate(row):
-                pieces += [", ", entry] if j else [entry]
-            pieces += [] if is_flat else ["]"]
-        reads = tuple(read for read in matrix.reads if read.start == read.end)
-        whole = joined([*pieces, "]"])
-        return replace(whole, entries=entries, reads=(*reads, *whole.reads))
 
-    # Scalars
+        def scale(entry: Formula) -> Formula:
+            if is_left:
+                return join_formulas(["(", entry, ")*(" if is_product else ")/(", factor, ")"])
+            return join_formulas(["(", factor, ")*(", entry, ")"])
 
-    def _scalar(self, root: ast.expr) -> Formula:
-        """Return an expression without brackets, its names, and their places."""
-        text = self.segment(root)
-        offsets = self._offsets(root)
-        reads: list[Read] = []
-        changes: list[tuple[int, int, str]] = []
-        waiting: list[ast.expr] = [root]
+        scaled = _matrix_of({index: scale(entry) for index, entry in matrix.entries.items()})
+        return scaled.after_reads([read for read in matrix.reads if read.start == read.end])
 
-        def span(node: ast.expr) -> tuple[int, int]:
-            end_line = node.end_lineno or node.lineno
-            return (
-                offsets[node.lineno] + self._column(node.lineno, node.col_offset),
-                offsets[end_line] + self._column(end_line, node.end_col_offset or 0),
-            )
 
-        while waiting:
-            node = waiting.pop()
-            start, end = span(node)
-            match node:
-                case ast.BinOp(left, op, right) if isinstance(op, OPERATORS):
-                    waiting += [left, right]
-                case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
-                    waiting.append(operand)
-                case ast.Constant(value) if type(value) in (int, float):
-                    if NUMBER.fullmatch(text[start:end]) is None:
-                        return _problem(text, f"the number {text[start:end][:20]!r} is not read")
-                    if text[start:end].endswith("."):
-                        changes.append((start, end, f"{text[start:end]}0"))
-                case ast.Name(name):
-                    reads.append(Read(spelled(name), start, end))
-                case ast.Subscript(ast.Name(name), index):
-                    if isinstance(index, ast.Constant) and isinstance(index.value, str):
-                        reads.append(Read(spelled(name), start, end, member=index.value))
-                        continue
-                    numbers = constant_index(index)
-                    if numbers is None or numbers == ():
-                        return _problem(text, f"{text[start:end][:40]!r} is not read")
-                    reads.append(Read(spelled(name), start, end, index=numbers))
-                case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
-                    i, j = constant_index(first), constant_index(second)
-                    if i is None or j is None or len(i) != 1 or len(j) != 1:
-                        return _problem(text, f"{text[start:end][:40]!r} is not read")
-                    reads.append(Read(spelled(name), start, end, index=(*i, *j)))
-                case ast.Attribute(ast.Name(base), member):
-                    if member == "pi":
-                        reads.append(Read(spelled(base), start, start, use=Use.MODULE))
-                        changes.append((start, end, "pi"))
-                    else:
-                        reads.append(Read(spelled(base), start, end, member=spelled(member)))
-                case ast.Call():
-                    why = self._call(node, span, text, reads, changes, waiting)
-                    if why:
-                        return _problem(text, why)
-                case _:
-                    return _problem(text, f"{text[start:end][:40]!r} is not read")
-        return replace(_changed(text, reads, changes), number=_number(root))
+def _matrix_of(entries: dict[Index, Formula]) -> Formula:
+    """Return a matrix, or a vector, of its entries, written as lists."""
+    pieces: list[str | Formula] = ["["]
+    for i, row in groupby(entries.items(), key=lambda item: item[0][0]):
+        pieces += [", "] if i else []
+        for (_, *column), entry in row:
+            pieces += [", " if column[0] else "["] if column else []
+            pieces.append(entry)
+        pieces += ["]"] if column else []
+    return replace(join_formulas([*pieces, "]"]), entries=entries)
 
-    def _call(
-        self,
-        node: ast.Call,
-        span: Callable[[ast.expr], tuple[int, int]],
-        text: str,
-        reads: list[Read],
-        changes: list[tuple[int, int, str]],
-        waiting: list[ast.expr],
-    ) -> str:
-        """Read a call; return why it cannot be."""
-        start, end = span(node)
-        what = f"{text[start:end][:40]!r} is not read"
-        function = node.func
-        if _has_starred(node.args) or node.keywords:
-            return what
-        if timed := self._by_time(node):
-            name, order, uses = timed
-            reads.append(Read(spelled(name), start, start))
-            reads += [Read(use.name, start, start, use=use.use) for use in uses]
-            changes.append((start, end, f"diff({spelled(name)}, t{', 2' if order == 2 else ''})"))
-            return ""
-        if problem := _exact_problem(node):
-            return problem
-        if isinstance(function, ast.Name):
-            of_time = len(node.args) == 1 and isinstance(node.args[0], ast.Name) and node.args[0].id == "t"
-            if of_time and function.id not in FUNCTION_NAMES:
-                first, last = span(function)
-                reads.append(Read(spelled(function.id), first, last))
-                first, last = span(node.args[0])
-                reads.append(Read("t", first, last, use=Use.TIME))
-                return ""
-            first, last = span(function)
-            reads.append(Read(spelled(function.id), first, last, use=Use.CALL))
-            waiting += node.args
-            return ""
-        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-            if function.attr not in FUNCTION_NAMES or (len(function.attr) == 1 and function.attr != "S"):
-                return what
-            first, last = span(function)
-            module = spelled(function.value.id)
-            reads.append(Read(module, first, first, use=Use.MODULE))
-            if module not in MODULES:
-                changes.append((first, last, function.attr))
-            waiting += node.args
-            return ""
-        return what
 
-    @staticmethod
-    def _by_time(node: ast.Call) -> tuple[str, int, list[Read]] | None:
-        """Return the name, the order and further names of diff(q1, t), q1.diff(t, 2) and Derivative(q1(t), t)."""
-        function, arguments = node.func, list(node.args)
-        uses: list[Read] = []
-        match function:
-            case ast.Name("diff" | "Derivative" as called):
-                uses.append(Read(called, 0, 0, use=Use.CALL))
-            case ast.Attribute(ast.Name(module), "diff" | "Derivative") if len(arguments) > 1 and not _is_time(
-                arguments[0]
+def _unwrap(node: ast.expr) -> tuple[ast.expr, list[Read]]:
+    """Take simplify(...) and the like off an expression; return also their names, which must be the library's."""
+    reads: list[Read] = []
+    while isinstance(node, ast.Call):
+        if any(keyword.arg in (None, "inplace") for keyword in node.keywords) or has_starred(node.args):
+            break
+        match node:
+            case ast.Call(ast.Name(name), [inner, *_]) if name in UNCHANGED:
+                reads += _function_reads(node)
+            case ast.Call(ast.Attribute(ast.Name(module), name), [inner, *_]) if (
+                name in UNCHANGED and module in MODULES
             ):
-                uses.append(Read(spelled(module), 0, 0, use=Use.MODULE))
-            case ast.Attribute(value, "diff"):
-                arguments.insert(0, value)
+                reads += _function_reads(node)
+            case ast.Call(ast.Attribute(inner, method), arguments) if method in UNCHANGED_METHODS:
+                functions = [x.id if isinstance(x, ast.Name) else getattr(x, "attr", "") for x in arguments]
+                if not all(name in UNCHANGED for name in functions) or (method == "applyfunc" and not functions):
+                    break
             case _:
-                return None
-        if len(arguments) < 2:
-            return None
-        inner, *rest = arguments
-        order = 1
-        if isinstance(inner, ast.Call) and len(inner.args) == 1 and _is_time(inner.args[0]):
-            inner = inner.func
-        if isinstance(inner, ast.Call) and (before := PythonFormulas._by_time(inner)):
-            name, order, more = before
-            uses += more
-            order += 1
-        elif isinstance(inner, ast.Name):
-            name = inner.id
-        else:
-            return None
-        match rest:
-            case [time] if _is_time(time):
-                pass
-            case [time, ast.Constant(2)] if _is_time(time):
-                order += 1
-            case [time, again] if _is_time(time) and _is_time(again):
-                order += 1
-            case [ast.Tuple([time, ast.Constant(2)])] if _is_time(time):
-                order += 1
+                break
+        node = inner
+    return node, reads
+
+
+def _function_reads(call: ast.expr) -> list[Read]:
+    """Return the read of the function's name, or of its module's, in a call."""
+    match call:
+        case ast.Call(ast.Name(name)):
+            return [Read(ascii_name(name), 0, 0, use=Use.CALL)]
+        case ast.Call(ast.Attribute(ast.Name(module))):
+            return [Read(ascii_name(module), 0, 0, use=Use.MODULE)]
+    return []
+
+
+def _reshape(arguments: Sequence[ast.expr]) -> ast.List | None:
+    """Return the rows of Matrix(2, 2, [a, b, c, d])."""
+    match arguments:
+        case [ast.Constant(int(rows)), ast.Constant(int(columns)), ast.List(entries) | ast.Tuple(entries)] if (
+            0 < rows <= MAX_INDEX and 0 < columns <= MAX_INDEX and len(entries) == rows * columns
+        ):
+            starts = range(0, len(entries), columns)
+            return ast.List([ast.List(entries[k : k + columns], ast.Load()) for k in starts], ast.Load())
+    return None
+
+
+class _UnreadableError(Exception):
+    """An expression that is not read; the message says why."""
+
+
+class _ScalarReader:
+    """Reads one expression without brackets of lists: the names in it and their places in its text."""
+
+    def __init__(self, source: PythonText, root: ast.expr) -> None:
+        self.root = root
+        self.text = source.segment(root)
+        self.span = source.spans(root)
+        self.reads: list[Read] = []
+        self.respellings: list[tuple[int, int, str]] = []
+        """Pieces of the text, by start and end, and what is written in place of each."""
+        self.waiting: list[ast.expr] = [root]
+
+    def formula(self) -> Formula:
+        try:
+            while self.waiting:
+                self._read(self.waiting.pop())
+        except _UnreadableError as error:
+            return Formula(self.text, problem=str(error))
+        return replace(_respell(self.text, self.reads, self.respellings), number=_number(self.root))
+
+    def _read(self, node: ast.expr) -> None:
+        start, end = self.span(node)
+        match node:
+            case ast.BinOp(left, op, right) if isinstance(op, OPERATORS):
+                self.waiting += [left, right]
+            case ast.UnaryOp(ast.UAdd() | ast.USub(), operand):
+                self.waiting.append(operand)
+            case ast.Constant(value) if type(value) in (int, float):
+                typed = self.text[start:end]
+                if PLAIN_NUMBER.fullmatch(typed) is None:
+                    raise _UnreadableError(f"the number {typed[:20]!r} is not read")
+                if typed.endswith("."):
+                    self.respellings.append((start, end, f"{typed}0"))
+            case ast.Name(name):
+                self.reads.append(Read(ascii_name(name), start, end))
+            case ast.Subscript(ast.Name(name), ast.Constant(str(member))):
+                self.reads.append(Read(ascii_name(name), start, end, member=member))
+            case ast.Subscript(ast.Name(name), index) if numbers := constant_index(index):
+                self.reads.append(Read(ascii_name(name), start, end, index=numbers))
+            case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
+                i, j = constant_index(first), constant_index(second)
+                if i is None or j is None or len(i) != 1 or len(j) != 1:
+                    raise self._unreadable(node)
+                self.reads.append(Read(ascii_name(name), start, end, index=(*i, *j)))
+            case ast.Attribute(ast.Name(base), "pi"):
+                self.reads.append(Read(ascii_name(base), start, start, use=Use.MODULE))
+                self.respellings.append((start, end, "pi"))
+            case ast.Attribute(ast.Name(base), member):
+                self.reads.append(Read(ascii_name(base), start, end, member=ascii_name(member)))
+            case ast.Call():
+                self._read_call(node)
             case _:
-                return None
-        return (name, order, [*uses, Read("t", 0, 0, use=Use.TIME)]) if order <= 2 else None
+                raise self._unreadable(node)
+
+    def _unreadable(self, node: ast.expr) -> _UnreadableError:
+        start, end = self.span(node)
+        return _UnreadableError(f"{self.text[start:end][:40]!r} is not read")
+
+    def _read_call(self, node: ast.Call) -> None:
+        start, end = self.span(node)
+        if has_starred(node.args) or node.keywords:
+            raise self._unreadable(node)
+        if derivative := _time_derivative(node):
+            name, order, uses = derivative
+            self.reads.append(Read(ascii_name(name), start, start))
+            self.reads += [replace(read, start=start, end=start) for read in uses]
+            self.respellings.append((start, end, f"diff({ascii_name(name)}, t{', 2' if order == 2 else ''})"))
+            return
+        if problem := _exact_problem(node):
+            raise _UnreadableError(problem)
+        first, last = self.span(node.func)
+        match node:
+            case ast.Call(ast.Name(name), [ast.Name("t") as time]) if name not in FUNCTION_NAMES:
+                self.reads.append(Read(ascii_name(name), first, last))
+                self.reads.append(Read("t", *self.span(time), use=Use.TIME))
+            case ast.Call(ast.Name(name)):
+                self.reads.append(Read(ascii_name(name), first, last, use=Use.CALL))
+                self.waiting += node.args
+            case ast.Call(ast.Attribute(ast.Name(module), name)) if name in FUNCTION_NAMES and (
+                len(name) > 1 or name == "S"
+            ):
+                self.reads.append(Read(ascii_name(module), first, first, use=Use.MODULE))
+                if ascii_name(module) not in MODULES:
+                    self.respellings.append((first, last, name))
+                self.waiting += node.args
+            case _:
+                raise self._unreadable(node)
 
 
-def _is_time(node: ast.expr) -> bool:
-    return (isinstance(node, ast.Name) and node.id == "t") or (
-        isinstance(node, ast.Attribute) and node.attr == "_t" and isinstance(node.value, ast.Name)
-    )
+def _respell(text: str, reads: Sequence[Read], respellings: Sequence[tuple[int, int, str]]) -> Formula:
+    """Return a text with other spellings of some of its pieces, and its reads where they are then."""
+    pieces: list[str] = []
+    moved: list[Read] = []
+    at = shift = 0
+    waiting = sorted(reads, key=lambda read: (read.start, read.end))[::-1]
+    for start, end, spelling in sorted(respellings):
+        while waiting and waiting[-1].start < start:
+            moved.append(_move(waiting.pop(), shift))
+        while waiting and waiting[-1].start < end:  # names inside what is respelled are not in the new text
+            moved.append(replace(waiting.pop(), start=start + shift, end=start + shift))
+        pieces += [text[at:start], spelling]
+        at = end
+        shift += len(spelling) - (end - start)
+    moved += [_move(read, shift) for read in reversed(waiting)]
+    return Formula("".join([*pieces, text[at:]]), tuple(moved))
 
 
-def _is_derivative(node: ast.expr) -> bool:
-    return isinstance(node, ast.Call) and PythonFormulas._by_time(node) is not None
+def _move(read: Read, shift: int) -> Read:
+    return replace(read, start=read.start + shift, end=read.end + shift)
+
+
+# Calls
 
 
 def _called(node: ast.expr) -> str:
@@ -437,59 +312,63 @@ def _called(node: ast.expr) -> str:
     return ""
 
 
+def _time_derivative(node: ast.Call) -> tuple[str, int, list[Read]] | None:
+    """Return the name, the order and further names of diff(q1, t), q1.diff(t, 2) and Derivative(q1(t), t)."""
+    arguments = list(node.args)
+    uses: list[Read] = []
+    match node.func:
+        case ast.Name("diff" | "Derivative"):
+            uses += _function_reads(node)
+        case ast.Attribute(ast.Name(), "diff" | "Derivative") if len(arguments) > 1 and not _is_time(arguments[0]):
+            uses += _function_reads(node)
+        case ast.Attribute(value, "diff"):
+            arguments.insert(0, value)
+        case _:
+            return None
+    if len(arguments) < 2:
+        return None
+    inner, *rest = arguments
+    name, order = "", 1
+    if isinstance(inner, ast.Call) and len(inner.args) == 1 and _is_time(inner.args[0]):
+        inner = inner.func
+    if isinstance(inner, ast.Call) and (nested := _time_derivative(inner)):
+        name, order, inner_uses = nested
+        uses += inner_uses
+        order += 1
+    elif isinstance(inner, ast.Name):
+        name = inner.id
+    match rest:
+        case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])]:
+            times = [time, time]
+        case [_] | [_, _]:
+            times = rest
+        case _:
+            return None
+    order += len(times) - 1
+    if not name or order > 2 or not all(map(_is_time, times)):
+        return None
+    return name, order, [*uses, Read("t", 0, 0, use=Use.TIME)]
+
+
+def _is_time(node: ast.expr) -> bool:
+    match node:
+        case ast.Name("t") | ast.Attribute(ast.Name(), "_t"):
+            return True
+    return False
+
+
 def _exact_problem(node: ast.Call) -> str:
     """Return why Integer(...) or Rational(...) is not read: its arguments have to be numbers as they stand."""
     called = _called(node)
-    if called not in EXACT:
-        return ""
     numbers = [x.operand if isinstance(x, ast.UnaryOp) and isinstance(x.op, ast.USub) else x for x in node.args]
     types = [type(x.value) if isinstance(x, ast.Constant) else None for x in numbers]
-    if called in ("Integer", "int") and types == [int]:
-        return ""
-    if called == "Rational" and types in ([int], [float], [int, int]):
-        return ""
-    return f"{called}(...) of anything but whole numbers is not read"
-
-
-def _is_module_call(function: ast.Attribute, names: frozenset[str]) -> bool:
-    return isinstance(function.value, ast.Name) and function.attr in names and function.value.id in MODULES
-
-
-def _has_starred(nodes: Sequence[ast.expr]) -> bool:
-    return any(isinstance(node, ast.Starred) for node in nodes)
-
-
-def _problem(text: str, why: str) -> Formula:
-    return Formula(text, problem=why)
-
-
-def _changed(text: str, reads: Sequence[Read], changes: Sequence[tuple[int, int, str]]) -> Formula:
-    """Return a text with other spellings of some of its pieces, and its reads where they are then."""
-    pieces: list[str] = []
-    moved: list[Read] = []
-    at = shift = 0
-    kept = sorted(reads, key=lambda read: (read.start, read.end))
-    k = 0
-    for start, end, new in sorted(changes):
-        while k < len(kept) and kept[k].start < start:
-            moved.append(_moved(kept[k], shift))
-            k += 1
-        while k < len(kept) and kept[k].start < end:  # names inside what is spelled anew stand nowhere
-            moved.append(replace(kept[k], start=start + shift, end=start + shift))
-            k += 1
-        pieces += [text[at:start], new]
-        at = end
-        shift += len(new) - (end - start)
-    moved += [_moved(read, shift) for read in kept[k:]]
-    return Formula("".join([*pieces, text[at:]]), tuple(moved))
-
-
-def _moved(read: Read, shift: int) -> Read:
-    return replace(read, start=read.start + shift, end=read.end + shift)
+    is_exact = called in ("Integer", "int") and types == [int]
+    is_exact = is_exact or (called == "Rational" and types in ([int], [float], [int, int]))
+    return "" if is_exact or called not in EXACT else f"{called}(...) of anything but whole numbers is not read"
 
 
 def _number(node: ast.expr) -> float | None:
-    """Return the value of a number, of one with a sign, and of a quotient of two."""
+    """Return the value of a number, of one with a sign, and of a quotient of two; None of any other expression."""
     match node:
         case ast.Constant(value) if type(value) in (int, float):
             try:
@@ -499,31 +378,11 @@ def _number(node: ast.expr) -> float | None:
         case ast.UnaryOp(ast.USub(), operand):
             inner = _number(operand)
             return None if inner is None else -inner
-        case ast.BinOp(ast.Constant() as above, ast.Div(), ast.Constant() as below):
-            dividend, divisor = _number(above), _number(below)
-            return dividend / divisor if dividend is not None and divisor and math.isfinite(dividend) else None
-        case ast.Call(ast.Name("Rational"), [above, below]):
-            dividend, divisor = _number(above), _number(below)
-            return dividend / divisor if dividend is not None and divisor else None
+        case ast.BinOp(ast.Constant() as left, ast.Div(), ast.Constant() as right):
+            numerator, denominator = _number(left), _number(right)
+            is_finite = numerator is not None and math.isfinite(numerator)
+            return numerator / denominator if numerator is not None and is_finite and denominator else None
+        case ast.Call(ast.Name("Rational"), [left, right]):
+            numerator, denominator = _number(left), _number(right)
+            return numerator / denominator if numerator is not None and denominator else None
     return None
-
-
-def _one_line(text: str) -> str:
-    """Return text of several lines in one, with spaces for comments, continuation signs and line breaks."""
-    lines = text.split("\n")
-    if "#" in text:
-        starts: dict[int, int] = {}
-        try:
-            for token in tokenize.generate_tokens(io.StringIO(f"({text}\n)").readline):
-                if token.type == tokenize.COMMENT:
-                    starts[token.start[0] - 1] = token.start[1] - (token.start[0] == 1)
-        except (tokenize.TokenError, SyntaxError, IndentationError):
-            pass
-        for line, column in starts.items():
-            if line < len(lines):
-                lines[line] = lines[line][:column] + " " * (len(lines[line]) - column)
-    return (
-        " ".join(f"{line[:-1]} " if line.endswith("\\") else line for line in lines)
-        .replace("\t", " ")
-        .replace("\f", " ")
-    )

@@ -1,0 +1,254 @@
+r"""LaTeX documents as statements: displays and formulas in the text, with the document's macros put in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from dhkit.errors import AnswerError
+from dhkit.grading.answers.documents.latex_rows import ROWS
+from dhkit.grading.answers.documents.latex_statements import (
+    STARTS,
+    STARTS_WITH_RELATION,
+    has_relation,
+    latex_statements,
+)
+from dhkit.grading.answers.documents.statements import Statement
+from dhkit.grading.answers.latex import DOTS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, TIMES, UPRIGHT
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
+
+MAX_STATEMENTS = 5_000
+"""Largest number of statements of a document."""
+
+MAX_MACROS = 300
+"""Largest number of macros that a document defines."""
+
+MACRO = re.compile(
+    r"\\(?:(?:re)?newcommand|providecommand|DeclareMathOperator|DeclareRobustCommand"
+    r"|(?:New|Renew|Declare|Provide)DocumentCommand|DeclareMathSymbol|DeclareMathAccent"
+    r"|(?:New|Renew|Declare)CommandCopy)(?![A-Za-z])\*?"
+    r"\s*\{?\s*\\([A-Za-z]+)\s*\}?|\\(?:[gex]?def|let|futurelet|mathchardef|chardef)\s*\\([A-Za-z]+)"
+)
+"""The definition of a macro of letters, up to its name."""
+
+CHANGES = re.compile(
+    r"\\(?:catcode|mathcode|lccode|uccode|csname|endcsname|expandafter|scantokens|lowercase|uppercase|aftergroup)"
+    r"(?![A-Za-z])|\\renewenvironment\s*\{(?:"
+    + "|".join(sorted(ROWS))
+    + r"|[bpvBV]?matrix|smallmatrix|array|document)\*?\}"
+    + r"|\\(?:[gex]?def|let|renewcommand|futurelet|mathchardef|chardef)(?![A-Za-z])"
+)
+"""Commands that may change the meaning of anything behind them, and definitions, also of macros that are no letters."""
+
+READ_MACROS = frozenset(
+    {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *TIMES, *DOTS, *UPRIGHT, *SIZES, *SPACE_NAMES}
+    | {"sqrt", "over", "partial", "top", "begin", "end", "label", "tag", "equiv", "approx", "pm", "mp", "mbox"}
+)
+"""Macros that have a meaning, which no document should change."""
+
+SYMBOL = re.compile(
+    r"(?:\\[A-Za-z]+|[A-Za-z])(?:\s*\{\s*\\?[A-Za-z]+(?:_(?:\w|\{\w+\}))?\s*\})?(?:_(?:[A-Za-z0-9]|\{[A-Za-z0-9,]+\}))?",
+    re.ASCII,
+)
+"""One symbol, perhaps with an accent and an index: a macro that stands for it is replaced by it."""
+
+HIDDEN = re.compile(r"\\begin\s*\{(verbatim\*?|comment|lstlisting|minted|filecontents\*?)\}|\\iffalse(?![A-Za-z])")
+
+INNER_ROWS = frozenset(["cases", "dcases", "rcases", "split", "aligned", "gathered", "multlined", "alignedat"])
+"""Environments that stand inside displays."""
+
+OPENING = re.compile(
+    r"(?<!\\)\$\$?|(?<!\\)\\\[|\\\(|\\begin\{(?P<name>(?:" + "|".join(sorted(ROWS - INNER_ROWS)) + r")\*?)\}"
+)
+CLOSERS = {"$": "$", "$$": "$$", "\\[": "\\]", "\\(": "\\)"}
+
+
+class Display(NamedTuple):
+    """A display, or a formula in the text."""
+
+    line: int
+    """Line in which its inside begins, from 1."""
+    inside: str
+    is_inline: bool
+    """Whether it stands in the text."""
+
+
+class Macro(NamedTuple):
+    """A macro that a document defines."""
+
+    line: int
+    """Line of the definition, from 1."""
+    symbol: str | None
+    """The one symbol that it stands for; None for any other macro, and for one that is defined twice."""
+
+
+def document_statements(text: str) -> Iterator[Statement]:
+    r"""Yield the statements of a document's mathematics; of text without dollars and displays, of all of it.
+
+    Raises
+    ------
+    AnswerError
+        More statements than are read, or a command that may change the meaning of anything behind it.
+    """
+    for count, statement in enumerate(_statements(text)):
+        if count >= MAX_STATEMENTS:
+            raise AnswerError(f"more than {MAX_STATEMENTS} equations")
+        yield statement
+
+
+def _statements(text: str) -> Iterator[Statement]:
+    text = text.replace("\r\n", "\n").replace("\r", "\n").replace("\f", " ")
+    text = re.sub(r"(?<!\\)((?:\\\\)*)%[^\n]*", r"\1", text)
+    text = _blank(text, HIDDEN, _end_of_hidden)
+    _refuse_changes(text)
+    macros = _macros(text)
+    preamble, begins, body = text.partition("\\begin{document}")
+    if begins:
+        text = re.sub(r"[^\n]", "", preamble) + body.partition("\\end{document}")[0]
+    text = _blank(text, MACRO, _end_of_definition)
+    last: Statement | None = None
+    for display in _displays(text):
+        inside, problems = _expand(display.inside, macros)
+        statements = list(latex_statements(inside, display.line))
+        lost = [why for name, why in problems.items() if not any(f"\\{name}" in s.text for s in statements)]
+        for k, statement in enumerate(statements):
+            used = [why for name, why in problems.items() if _uses(statement.text, name)]
+            if used or lost:
+                statement = replace(statement, problem=used[0] if used else statement.problem or lost[0])
+            is_rest = STARTS_WITH_RELATION.match(statement.text) or not has_relation(statement.text)
+            goes_on = k == 0 and not display.is_inline and STARTS.match(statement.text) is not None and is_rest
+            if goes_on and last is not None and not statement.targets:
+                yield replace(last, problem=f"it goes on in another display, in line {display.line}")
+                last = None
+                continue
+            if last is not None:
+                yield last
+            last = statement
+    if last is not None:
+        yield last
+
+
+def _blank(text: str, pattern: re.Pattern[str], end_of: Callable[[re.Match[str]], int]) -> str:
+    """Return a text with line breaks alone from each match to its end; matches inside another one do not count."""
+    pieces: list[str] = []
+    at = 0
+    for match in pattern.finditer(text):
+        if match.start() >= at:
+            end = end_of(match)
+            pieces += [text[at : match.start()], "\n" * text.count("\n", match.start(), end)]
+            at = end
+    return "".join([*pieces, text[at:]])
+
+
+def _end_of_hidden(match: re.Match[str]) -> int:
+    """Return where a listing or a comment ends."""
+    closer = f"\\end{{{match[1]}}}" if match[1] else "\\fi"
+    end = match.string.find(closer, match.end())
+    return len(match.string) if end < 0 else end + len(closer)
+
+
+def _end_of_definition(match: re.Match[str]) -> int:
+    """Return where the body of a macro ends: it is no statement."""
+    text, end = match.string, match.end()
+    if body := re.compile(r"(?:\s*\[[^\]\n]*\]|#\d|\s)*\{").match(text, end):
+        depth, end = 1, body.end()
+        while depth and end < len(text):
+            depth += (text[end] == "{") - (text[end] == "}")
+            end += 1
+    return end
+
+
+def _displays(text: str) -> Iterator[Display]:
+    """Yield displays and formulas in the text; paragraphs where there are none."""
+    line, counted, at, has_math = 1, 0, 0, False
+    absent: set[str] = set()
+    while match := OPENING.search(text, at):
+        name = match["name"]
+        closer = f"\\end{{{name}}}" if name else CLOSERS[match[0]]
+        end = -1 if closer in absent else text.find(closer, match.end())
+        while match[0] in ("$", "$$") and end > 0 and text[end - 1] == "\\":
+            end = text.find(closer, end + 1)
+        if end < 0:
+            absent.add(closer)
+            at = match.end()
+            continue
+        has_math = True
+        inside = text[match.end() : end]
+        line += text.count("\n", counted, match.end())
+        counted = match.end()
+        environment = name.rstrip("*") if name else ""
+        if environment in ("alignat", "xalignat", "IEEEeqnarray"):
+            inside = re.sub(r"\A\s*(?:\[[^\]\n]*\])?\s*\{[^{}]*\}", "", inside)
+        if environment in ("eqnarray", "IEEEeqnarray"):
+            inside = rf"\begin{{eqnarray}}{inside}\end{{eqnarray}}"
+        yield Display(line, inside, match[0] in ("$", "\\("))
+        at = end + len(closer)
+    if has_math:
+        return
+    line = 1
+    for paragraph in re.split(r"(\n[ \t]*\n)", text):
+        yield Display(line, paragraph, False)
+        line += paragraph.count("\n")
+
+
+# Macros
+
+
+def _refuse_changes(text: str) -> None:
+    """Refuse what may change the meaning of signs, or of macros whose names are not read.
+
+    Raises
+    ------
+    AnswerError
+        Such a command, with its line.
+    """
+    definitions = {match.start() for match in MACRO.finditer(text)}
+    for match in CHANGES.finditer(text):
+        if match.start() not in definitions:
+            line = text.count("\n", 0, match.start()) + 1
+            raise AnswerError(f"line {line}: {match[0]} may change what formulas mean, and is not read")
+
+
+def _macros(text: str) -> dict[str, Macro]:
+    """Return the macros that a document defines, by name.
+
+    Raises
+    ------
+    AnswerError
+        More than :data:`MAX_MACROS`.
+    """
+    macros: dict[str, Macro] = {}
+    line, at = 1, 0
+    for match in MACRO.finditer(text):
+        line += text.count("\n", at, match.start())
+        at = match.start()
+        name = match[1] or match[2]
+        body = re.compile(r"\s*\{([^{}]*(?:\{[^{}]*\}[^{}]*)*)\}").match(text, match.end())
+        symbol = body[1].strip() if body else ""
+        is_command = text.startswith(("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start())
+        is_symbol = SYMBOL.fullmatch(symbol) is not None and is_command
+        if name in READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
+            is_symbol = False
+        if len(macros) > MAX_MACROS:
+            raise AnswerError(f"more than {MAX_MACROS} macros")
+        macros[name] = Macro(line, symbol if is_symbol and name not in macros else None)
+    return macros
+
+
+def _uses(text: str, macro: str) -> bool:
+    return re.search(rf"\\{macro}(?![A-Za-z])", text) is not None
+
+
+def _expand(text: str, macros: Mapping[str, Macro]) -> tuple[str, dict[str, str]]:
+    """Return a display with macros for one symbol put in, and why those that are used otherwise are not read."""
+    problems: dict[str, str] = {}
+    for name, (line, symbol) in macros.items():
+        if not _uses(text, name):
+            continue
+        if symbol is None or any(other in macros for other in re.findall(r"\\([A-Za-z]+)", symbol)):
+            problems[name] = f"the macro \\{name}, which line {line} defines, is not read"
+        else:
+            text = re.sub(rf"\\{name}(?![A-Za-z])", f"{{{symbol}}}".replace("\\", r"\\"), text)
+    return text, problems

@@ -1,0 +1,187 @@
+"""Entry points of grading: files and answers of the Python API, judged against the robot that they concern."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from dhkit.description import Description, Robot, library_robot, read_robot, robots
+from dhkit.description.robot import description_of, takes_robot
+from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.answers.objects import entries_of
+from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
+from dhkit.grading.answers.sources import LANGUAGES, read_source
+from dhkit.grading.judging.truth import truth_of
+from dhkit.grading.mistakes.diagnosis import variants_of
+from dhkit.grading.report import GradeReport
+from dhkit.grading.rubric import Rubric
+from dhkit.grading.sheet_judge import judge_sheet
+
+MAX_PREPARED_JOINTS = 4
+"""Largest arm whose mistakes are all derived ahead; for larger arms that takes longer than most sheets need."""
+MAX_NAME_CHARACTERS = 200
+"""Longest name of a robot file that a sheet may give."""
+IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
+
+
+def grade(
+    path: str | Path,
+    robot: Robot | None = None,
+    rubric: Rubric | None = None,
+    *,
+    task: AnswerSheet | None = None,
+    seed: int | None = None,
+    explain: bool = True,
+) -> GradeReport:
+    """Judge an answer sheet, or the answers that a program or a paper assigns; nothing in it is executed.
+
+    Work and size are bounded; for limits of time and memory see :func:`dhkit.grading.batch.grade_all`.
+
+    Parameters
+    ----------
+    path
+        File that ends in .toml, .py, .m, .tex or .ipynb.
+    robot
+        Arm or description that the answers concern; by default the robot that the sheet names.
+    rubric
+        Its ``digits`` say which decimals may be rounded.
+    task
+        Task from :func:`dhkit.grading.answers.sheet.read_task`. It takes precedence over the sheet's own [task]; its
+        [names] count if the sheet has none.
+    seed
+        Seed of the random states at which answers outside the exact ring are tried; by default from the system's
+        entropy.
+    explain
+        Whether to look for mistakes; verdicts do not depend on it.
+
+    Raises
+    ------
+    AnswerError
+        The sheet cannot be judged; the message names the key, what was found and what was expected.
+    DescriptionError
+        The robot file describes no robot.
+    """
+    path, digits = Path(path), (rubric or Rubric()).digits
+    given = None if robot is None else description_of(robot)
+    if path.suffix.lower() == ".ipynb" or path.suffix.lower() in LANGUAGES:
+        if given is None:
+            raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
+        sheet = read_source(path, given)
+    elif path.suffix.lower() == ".toml":
+        sheet = read_sheet(path)
+    else:
+        raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected .toml, .py, .m, .tex or .ipynb")
+    description = given or robot_of(sheet, path.parent)
+    if task is not None:
+        sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))
+    report = judge_sheet(description, sheet, digits, seed=seed, explain=explain)
+    return replace(report, own_robot=given is None)
+
+
+def _merge_names(own: Names, given: Names) -> Names:
+    """Return a sheet's names, completed by those of the task."""
+    parameters = {**given.parameters, **own.parameters}
+    q, qd, qdd = own.q or given.q, own.qd or given.qd, own.qdd or given.qdd
+    return replace(own, q=q, qd=qd, qdd=qdd, absolute=own.absolute or given.absolute, parameters=parameters)
+
+
+@takes_robot
+def grade_answers(
+    description: Description,
+    answers: Mapping[str, object],
+    names: Mapping[str, object] | None = None,
+    task: Mapping[str, object] | None = None,
+    rubric: Rubric | None = None,
+    *,
+    seed: int | None = None,
+    explain: bool = True,
+) -> GradeReport:
+    """Judge answers that are text, numbers, sympy or CasADi expressions, or functions.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    answers
+        Answers by quantity: M, C, h, g, tau, K, V, L, A1 ... An, T, J, and dh and ik as tables as on a sheet.
+    names, task
+        Tables as on a sheet: ``{"q": ["th1", "th2"], "angles": "absolute"}``, ``{"friction": True}``.
+    rubric
+        Its ``digits`` say which decimals may be rounded.
+    seed, explain
+        As for :func:`grade`.
+
+    Raises
+    ------
+    AnswerError
+        Answers that cannot be judged.
+    """
+    entries: dict[str, object] = {}
+    for name, value in answers.items():
+        try:
+            entries[name] = value if name in ("dh", "ik") else entries_of(value, description.n)
+        except AnswerError as error:
+            raise AnswerError(f"{name}: {error}") from None
+    sheet = sheet_of({"answer": entries, "names": dict(names or {}), "task": dict(task or {})}, "answers")
+    report = judge_sheet(description, sheet, (rubric or Rubric()).digits, seed=seed, explain=explain)
+    return replace(report, sheet=None)
+
+
+def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
+    """Return the robot that a sheet names: one of the library, or a file in the sheet's own folder.
+
+    Raises
+    ------
+    AnswerError
+        No robot, an unknown one, or a path that leaves the folder.
+    DescriptionError
+        The file describes no robot.
+    """
+    name, place = sheet.robot, f"{sheet.file}: robot"
+    if not name:
+        raise AnswerError(f"{place}: found nothing; expected a library name, or a robot file beside the sheet")
+    if not name.endswith(".toml"):
+        try:
+            return library_robot(name)
+        except DescriptionError as error:
+            raise AnswerError(f"{place}: {error}") from None
+    if len(name) > MAX_NAME_CHARACTERS or not name.isprintable():
+        raise AnswerError(f"{place}: {name[:40]!r} is no file name")
+    inside = Path(folder).resolve()
+    try:
+        path = (inside / name).resolve()
+    except (ValueError, OSError, RuntimeError):  # a NUL in the name, a name that is too long, a link to itself
+        raise AnswerError(f"{place}: {name[:60]!r} is no file name") from None
+    if not path.is_relative_to(inside):
+        raise AnswerError(f"{place}: {name!r} leaves the sheet's folder; expected a file in it")
+    return read_robot(path)
+
+
+def prepare(description: Description | None, report: GradeReport | None = None) -> None:
+    """Import and derive what the next sheets need, so that processes forked from this one inherit it.
+
+    Parameters
+    ----------
+    description
+        Robot of all sheets; None if each sheet names its own, of which the library's robots are prepared.
+    report
+        Report of a judged sheet: the mistakes of its quantities are derived, for arms of up to
+        :data:`MAX_PREPARED_JOINTS` joints. Without a report the libraries are imported and the robot's equations
+        derived.
+    """
+    if report is None:
+        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": IDENTITY}}))
+        import mpmath  # noqa: F401
+        import scipy.optimize  # noqa: F401
+
+        return
+    if description is None:
+        if report.robot not in robots():
+            return
+        description = library_robot(report.robot)
+    if description.n > MAX_PREPARED_JOINTS or report.digest != description.digest:
+        return
+    for quantity in report.quantities:
+        if quantity in quantity_names(description.n):
+            variants_of(truth_of(description)).prepare(quantity)

@@ -1,0 +1,317 @@
+"""Judging of a whole answer sheet: every quantity on it judged, explained and noted in one report."""
+
+from __future__ import annotations
+
+import difflib
+import secrets
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.errors import AnswerError, DescriptionError, DhkitError
+from dhkit.expressions.syntax import Tree
+from dhkit.grading.answers.given import (
+    Given,
+    given_branches,
+    given_quantity,
+    given_rows,
+    vocabulary_of,
+    with_entries_gathered,
+)
+from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names, shape_of
+from dhkit.grading.answers.typeset import typeset
+from dhkit.grading.answers.vocabulary import Vocabulary
+from dhkit.grading.judging.consistency import Consistency
+from dhkit.grading.judging.functions import judge_function
+from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
+from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
+from dhkit.grading.judging.truth import Truth, truth_of
+from dhkit.grading.mistakes.explaining import explain as explain_mistakes
+from dhkit.grading.report import (
+    Diagnosis,
+    Entry,
+    GradeReport,
+    KinematicJudgement,
+    Note,
+    NoteKind,
+    Verdict,
+    entry_name,
+)
+from dhkit.symbolic.ring import RingError
+
+
+def judge_sheet(
+    description: Description, sheet: AnswerSheet, digits: int = 4, *, seed: int | None = None, explain: bool = True
+) -> GradeReport:
+    """Judge everything on a sheet.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    sheet
+        The answers, names and task.
+    digits
+        Significant digits from which a decimal may have been rounded.
+    seed
+        Seed of the random states at which answers outside the exact ring are tried. By default from the system's
+        entropy, so that no sheet can be written for the states that are tried. The report holds it, for replay.
+    explain
+        Whether to look for mistakes; verdicts do not depend on it.
+
+    Raises
+    ------
+    AnswerError
+        Answers of another shape, unknown quantities, names that stand for two things.
+    DescriptionError
+        The robot has no bodies, and equations of motion were handed in.
+    """
+    start = time.perf_counter()
+    seed = secrets.randbits(53) if seed is None else seed
+    truth = truth_of(description, sheet.names.absolute, sheet.task.friction)
+    vocabulary = vocabulary_of(description, sheet, truth.coordinates.sums)
+    judge = _SheetJudge(sheet, truth, vocabulary, digits, seed)
+    judged, refused = judge.quantities()
+    others, other_refused = judge.kinematics(explain)
+    refused |= other_refused
+    if not judged and not others:
+        raise next(
+            iter(refused.values()),
+            AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity"),
+        )
+    follows, agreement, diagnosis = _explain(truth, judged, digits) if explain else ({}, [], [])
+    entries = [entry for name, quantity in judged.items() for entry in _entries(quantity, follows.get(name, {}))]
+    notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
+    notes += [*_notes(truth, judged, vocabulary), *agreement]
+    entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
+    judged_at = {p: value for quantity in judged.values() for p, value in _numbers_in(truth, quantity).items()}
+    for other in others:
+        judged_at |= other.judged_at
+        entries += other.entries
+        diagnosis += other.diagnosis if explain else ()
+        notes += other.notes
+    on_sheet = {entry.quantity for entry in entries}
+    entries += [
+        Entry(name, (), Verdict.INCOMPLETE, statement="asked for, and not on the sheet")
+        for name in sheet.task.asked
+        if name not in on_sheet
+    ]
+    return GradeReport(
+        robot=description.name,
+        digest=description.digest,
+        version=_version(),
+        entries=tuple(entries),
+        diagnosis=tuple(diagnosis),
+        notes=tuple(notes),
+        sheet=sheet.file,
+        student=sheet.student,
+        seconds=time.perf_counter() - start,
+        left_out=sheet.left_out,
+        judged_at=judged_at,
+        seed=seed,
+        proof_required=sheet.task.proof_required,
+    )
+
+
+def _version() -> str:
+    try:
+        return version("dhkit-robotics")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+@dataclass(frozen=True, eq=False)
+class _SheetJudge:
+    """Judges the quantities of one sheet; ``digits`` and ``seed`` as for :func:`judge_sheet`."""
+
+    sheet: AnswerSheet
+    truth: Truth
+    vocabulary: Vocabulary
+    digits: int
+    seed: int
+
+    def quantities(self) -> tuple[dict[str, JudgedQuantity], dict[str, DhkitError]]:
+        """Judge the equations and transforms; return them by name, and the errors of those that were refused."""
+        judged: dict[str, JudgedQuantity] = {}
+        refused: dict[str, DhkitError] = {}
+        names = QuantityNames(self.truth.description)
+        for name, value in with_entries_gathered(self.sheet.answers, names).items():
+            if _is_empty(value):
+                continue
+            try:
+                judged[name] = self._quantity(name, value, names)
+            except AnswerError as error:
+                refused[name] = self._refusal(error)
+            except DescriptionError as error:
+                refused[name] = error
+        return judged, refused
+
+    def _refusal(self, error: AnswerError) -> AnswerError:
+        return AnswerError(f"{self.sheet.file}: answer: {error}")
+
+    def _quantity(self, name: str, value: object, names: QuantityNames) -> JudgedQuantity:
+        known = quantity_names(names.n)
+        if name not in known:
+            meant = ALIASES.get(name) or next(iter(difflib.get_close_matches(name, known, n=1)), "")
+            hint = f"did you mean {meant!r}?" if meant else f"expected {', '.join(known)}, dh, ik"
+            if name in self.truth.description.parameters:
+                hint = f"it is a parameter of the robot; give all of {meant or 'the quantity'} as a list"
+            raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
+        if callable(value):
+            return judge_function(name, value, self.truth, self.seed)
+        given = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
+        return judge_quantity(name, given, self.truth, self.sheet.task, self.digits, self.seed)
+
+    def kinematics(self, explain: bool) -> tuple[list[KinematicJudgement], dict[str, DhkitError]]:
+        """Judge the table and the inverse kinematics; return them, and the errors of those that were refused."""
+        judged: list[KinematicJudgement] = []
+        refused: dict[str, DhkitError] = {}
+        for name, is_given in (("dh", self.sheet.table), ("ik", self.sheet.branches)):
+            if is_given:
+                try:
+                    judged.append(self._table() if name == "dh" else self._inverse(explain))
+                except AnswerError as error:
+                    refused[name] = self._refusal(error)
+        return judged, refused
+
+    # Tables and inverse kinematics are imported here: few sheets have them, and they import all of kinematics.
+
+    def _table(self) -> KinematicJudgement:
+        from dhkit.grading.judging.tables import judge_table
+
+        description, (convention, rows) = self.truth.description, self.sheet.table or ("", ())
+        return _judge_rows(
+            "dh",
+            given_rows(rows, description.n, self.vocabulary),
+            lambda trees: judge_table(description, trees, convention, self.seed, self.sheet.task),
+        )
+
+    def _inverse(self, explain: bool) -> KinematicJudgement:
+        from dhkit.grading.judging.inverse import judge_inverse
+
+        description = self.truth.description
+        vocabulary = vocabulary_of(description, self.sheet, inverse=True)
+        return _judge_rows(
+            "ik",
+            given_branches(self.sheet.branches, description.n, vocabulary),
+            lambda trees: judge_inverse(description, trees, seed=self.seed, explain=explain),
+        )
+
+
+def _judge_rows(
+    name: str, rows: Sequence[Sequence[Given]], judge: Callable[[Sequence[Sequence[Tree]]], KinematicJudgement]
+) -> KinematicJudgement:
+    """Judge rows of a table, or branches of inverse kinematics; all are unreadable if an entry cannot be read."""
+    texts = [", ".join(entry.text for entry in row) for row in rows]
+    if all(entry.tree is not None for row in rows for entry in row):
+        judgement = judge([[entry.tree for entry in row if entry.tree is not None] for row in rows])
+        pairs = zip(judgement.entries, texts, strict=True)
+        return replace(judgement, entries=tuple(replace(entry, answer=text) for entry, text in pairs))
+    errors = [next((e.error for e in row if e.error), "not judged: another row cannot be read") for row in rows]
+    return KinematicJudgement(
+        tuple(
+            Entry(name, (i,), Verdict.UNREADABLE, text, statement=error)
+            for i, (text, error) in enumerate(zip(texts, errors, strict=True))
+        )
+    )
+
+
+def _explain(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int
+) -> tuple[dict[str, dict[tuple[int, ...], str]], list[Note], list[Diagnosis]]:
+    """Return what wrong entries follow from, which quantities agree with each other, and the mistakes.
+
+    If an answer is too long for that, return a note instead.
+    """
+    consistency = Consistency(truth, judged)
+    try:
+        follows = {name: consistency.follows(name) for name in judged}
+        return follows, consistency.notes(), explain_mistakes(truth, judged, digits, follows)
+    except RingError as error:
+        return {}, [Note(NoteKind.NOT_EXPLAINED, values=(str(error)[:160],))], []
+
+
+def _is_empty(value: object) -> bool:
+    """Whether nothing was handed in: an entry of a template that stayed empty."""
+    if isinstance(value, list):
+        return all(map(_is_empty, value))
+    return isinstance(value, str) and not value.strip()
+
+
+def _entries(quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> Iterator[Entry]:
+    for given in quantity.given:
+        finding = quantity.findings[given.index]
+        text, latex = typeset(given.tree) if given.tree is not None else ("", "")
+        yield Entry(
+            quantity.name,
+            given.index,
+            finding.verdict,
+            given.text,
+            latex,
+            "missing" if given.is_missing else finding.statement,
+            *finding.texts,
+            finding.witness,
+            follows.get(given.index, ""),
+            text,
+        )
+
+
+def _numbers_in(truth: Truth, quantity: JudgedQuantity) -> dict[str, float]:
+    """Return the parameters that an answer holds as numbers, with the file's values, SI units and rad."""
+    values = truth.arm(quantity.name).parameters
+    return {parameter: values[parameter] for parameter in sorted(quantity.numbers)}
+
+
+def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary) -> list[Note]:
+    """Return the notes on quantities of equations and transforms."""
+    notes = []
+    for name, quantity in judged.items():
+        if quantity.numbers:
+            numbers = tuple(f"{p} = {value:g}" for p, value in _numbers_in(truth, quantity).items())
+            notes.append(Note(NoteKind.NUMBERS, name, numbers))
+        notes += [Note(NoteKind.SIDES_DIFFER, entry_name(name, index)) for index in quantity.contradictions]
+        unread = (entry.index for entry in quantity.given if entry.is_partly_read)
+        notes += [Note(NoteKind.SIDES_UNREAD, entry_name(name, index)) for index in unread]
+    if "C" in judged and (kind := _factorization(truth, judged["C"])):
+        notes.append(Note(kind, "C"))
+    notes += [Note(NoteKind.TAKEN_FOR, values=(typed, meant)) for typed, meant in vocabulary.taken_for.items()]
+    notes += [Note(NoteKind.UP_TO_A_CONSTANT, name) for name in ("V", "L") if _is_shifted(judged.get(name))]
+    return notes
+
+
+def _is_shifted(energy: JudgedQuantity | None) -> bool:
+    """Whether an energy is right and differs from the truth, by a constant then."""
+    if energy is None or energy.wrong or energy.answers is None:
+        return False
+    return not energy.answers[()].numerator_of_difference(energy.right(())).is_zero
+
+
+def _factorization(truth: Truth, judged: JudgedQuantity) -> NoteKind | None:
+    """Return which factorization of the Coriolis torques a right C is; None for a wrong or unreadable C.
+
+    C is judged by C qd, which alone is determined.
+    """
+    if judged.wrong or any(entry.tree is None for entry in judged.given):
+        return None
+    lag, coordinates = truth.lagrangian, truth.coordinates
+    C = np.empty((lag.n, lag.n), dtype=object)
+    reader = RingReader(lag.arm.ring)
+    try:
+        for entry in judged.given:
+            element = reader.read(entry.tree).element() if entry.tree else None
+            if element is None:
+                return NoteKind.BY_TORQUES
+            C[entry.index] = element
+    except (OutsideTheRingError, AnswerError):
+        return NoteKind.BY_TORQUES
+    if all(element.is_zero for element in (C - coordinates.in_y("C", lag.C)).flat):
+        return NoteKind.CHRISTOFFEL
+    rate = np.array([[entry.by_time() for entry in row] for row in truth.of("M")], dtype=object)
+    N = rate - 2 * C
+    is_skew = all(element.is_zero for element in (N + N.T).flat)
+    return NoteKind.SKEW if is_skew else NoteKind.NOT_SKEW

@@ -1,0 +1,133 @@
+"""Laws of the readers of answers, one piece at a time; whole files and sheets are in the other tests."""
+
+import ast
+
+import pytest
+
+from dhkit import Arm
+from dhkit.errors import AnswerError
+from dhkit.expressions import read
+from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.computer_algebra import from_mathematica, is_mathematica
+from dhkit.grading.answers.derivatives import node_count, time_derivative
+from dhkit.grading.answers.documents.latex_rows import matrix_rows, rows_of
+from dhkit.grading.answers.documents.latex_source import document_statements
+from dhkit.grading.answers.programs.bindings import Formula, Read, join_formulas
+from dhkit.grading.answers.programs.matlab_formulas import MatlabFormulas
+from dhkit.grading.answers.programs.matlab_statements import matlab_statements
+from dhkit.grading.answers.programs.notebook import Notebook
+from dhkit.grading.answers.programs.python_effects import bound_names, part_names
+from dhkit.grading.answers.programs.python_formulas import PythonFormulas
+from dhkit.grading.answers.programs.python_text import PythonText, ascii_name
+from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.tokens import replace_runs, split_tokens
+
+
+def line_name(line):
+    return f"line {line}"
+
+
+def test_runs_of_tokens_are_replaced_once():
+    tokens = split_tokens("a b a b a", list(range(9)), "a b a b a")
+
+    def read_run(k):
+        return (
+            ([Token("name", "c", tokens[k].at)], k + 2) if [t.text for t in tokens[k : k + 2]] == ["a", "b"] else None
+        )
+
+    assert [t.text for t in replace_runs(tokens, read_run)] == ["c", "c", "a"]
+
+
+def test_places_in_joined_formulas_move_with_the_text():
+    entry = Formula("q[0]", (Read("q", 0, 4, (0,)),))
+    joined = join_formulas(["sin(", entry, ") + ", entry])
+    assert [joined.text[r.start : r.end] for r in joined.reads] == ["q[0]", "q[0]"]
+
+
+def test_a_segment_is_one_line_and_spans_point_into_it():
+    source = "x = (ä +  # a comment\n     b*c)\n"
+    value = ast.parse(source).body[0].value
+    text = PythonText(source)
+    segment, span = text.segment(value), text.spans(value)
+    assert "\n" not in segment and "comment" not in segment
+    assert {segment[slice(*span(node))] for node in ast.walk(value) if isinstance(node, ast.Name)} == {"ä", "b", "c"}
+    assert ascii_name("θ") == "theta" and ascii_name("q1") == "q1"
+
+
+@pytest.mark.parametrize(
+    ("text", "index"), [("q[0]", (0,)), ("M[0, 1]", (0, 1)), ("M[0][1]", (0, 1)), ("M[..., 2, 3]", (2, 3))]
+)
+def test_python_indices_count_from_zero(text, index):
+    (name,) = PythonFormulas(text).formula(ast.parse(text, mode="eval").body).reads
+    assert name.index == index and (name.start, name.end) == (0, len(text))
+
+
+def test_names_bound_and_parts_assigned_however_deep():
+    statements = ast.parse("for i in x:\n    with a as b:\n        M[i].y = 1\n        del K[0]\n").body
+    assert set(bound_names(statements)) == {"i", "b", "M", "K"}
+    assert part_names(statements[0]) == ["M", "K"]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("[a, b(2)] = f(c)", {"a", "b"}),
+        ("s.x(3) = 1", {"s"}),
+        ("k++", {"k"}),
+        ("syms q1 q2 real", {"q1", "q2", "real"}),
+        ("for k = 1:3", {"k"}),
+        ("disp(x)", set()),
+    ],
+)
+def test_names_that_a_matlab_statement_may_assign(text, names):
+    (statement,) = matlab_statements(text, "file", line_name)
+    assert statement.assigned_names() == names
+
+
+def test_matlab_indices_count_from_one_and_transposes_are_no_strings():
+    (statement,) = matlab_statements("M = [a(1) -b'; c, d(2,1)]", "file", line_name)
+    formula = MatlabFormulas(lambda name: False).formula(statement.tokens[2:])
+    assert formula.entries is not None and set(formula.entries) == {(0, 0), (0, 1), (1, 0), (1, 1)}
+    assert [r.index for r in formula.reads] == [(0,), None, None, (1, 0)]
+    with pytest.raises(AnswerError, match="line 2: a string that does not end"):
+        list(matlab_statements("a = 1;\nb = 'x", "file", line_name))
+
+
+def test_lines_of_a_notebook_belong_to_cells():
+    notebook = Notebook("a\nb\nc", ".py", (1, 3), ())
+    assert [notebook.line_name(line) for line in (1, 2, 3)] == ["cell 1, line 1", "cell 1, line 2", "cell 2, line 1"]
+
+
+def test_entries_with_digits_in_two_readings():
+    names = QuantityNames(Arm.load("puma560").description)
+    assert [str(t) for t in names.entries("M12")] == ["M(1,2)"]
+    assert [str(t) for t in names.entries("A1_14")] == ["A1(1,4)"]
+    assert names.entries("M_7_1") == [] and names.quantity("U") == "V"
+
+
+def test_rows_of_displays_and_of_matrices():
+    rows = list(rows_of(r"\begin{align} a &= b \\ &+ c \end{align}", 5))
+    assert [" ".join(row.text.split()) for row in rows if row.text.strip()] == ["a = b", "+ c"]
+    assert matrix_rows(r"\begin{bmatrix} a & {b & c} \\ d & e \end{bmatrix}") == [["a", "{b & c}"], ["d", "e"]]
+    assert matrix_rows("a + b") is None
+
+
+def test_macros_for_one_symbol_are_put_in_and_others_refused():
+    text = "\\newcommand{\\w}{\\omega}\n\\newcommand{\\f}[1]{#1^2}\n$a = \\w$\n$b = \\f{c}$\n"
+    first, second = document_statements(text)
+    assert (first.line, first.problem) == (3, "") and "omega" in first.formulas[-1]
+    assert "the macro \\f, which line 2 defines" in second.problem
+
+
+def test_mathematica_becomes_plain_text():
+    text = "Derivative[1][q1][t] + ArcTan[x, y]"
+    assert is_mathematica(text)
+    plain = from_mathematica(split_tokens(text, list(range(len(text))), text), text)
+    assert "".join(t.text for t in plain) == "ddt(q1)+atan2(y,x)"
+
+
+def test_time_derivatives_count_their_nodes():
+    tree = time_derivative(read("sin(q1)*q2"))
+    assert node_count(tree, 100) == node_count(tree, node_count(tree, 100))
+    with pytest.raises(AnswerError, match="an acceleration, qdd1"):
+        time_derivative(read("qdd1"))
