@@ -269,7 +269,7 @@ VALUES = {
     bench.PeakMemory: lambda: timed().memory[0],
     bench.Requirement: lambda: timed().requirements[0],
     bench.Row: lambda: timed().rows[1],
-    bench.Task: lambda: bench.Task(lambda items: lambda: None, lambda count: []),
+    bench.Task: lambda: bench.PlanTask(lambda items: lambda: None, lambda count: []),
     bench.ThreadScaling: lambda: timed().scaling[0],
     bench.Verdict: lambda: timed().rows[0].verdict,
     bench.Workload: lambda: bench.Workload.of(planar(), 10, 1, 0),

@@ -45,8 +45,8 @@ class Fdyn:
         kp, kd = controller.kp, controller.kd
 
         def torque(robot: Any, t: float, q: Array, qd: Array) -> Array:
-            wanted_q, wanted_qd, wanted_qdd = (rows[0] for rows in reference.sampled(np.array([t])))
-            tau: Array = robot.rne(q, qd, wanted_qdd + kd * (wanted_qd - qd) + kp * (wanted_q - q))
+            setpoint_q, setpoint_qd, setpoint_qdd = (rows[0] for rows in reference.sampled(np.array([t])))
+            tau: Array = robot.rne(q, qd, setpoint_qdd + kd * (setpoint_qd - qd) + kp * (setpoint_q - q))
             return tau
 
         found = self.robot.fdyn(duration, q0, torque, qd0=qd0, solver_args=self._options)

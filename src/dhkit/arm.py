@@ -1,4 +1,4 @@
-"""The front door: one robot, with everything that dhkit does for it."""
+"""The class ``Arm``: a robot with all methods of dhkit, which delegate to the packages."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Arm:
     def __init__(self, description: Description) -> None:
         object.__setattr__(self, "_description", description)
 
-    # Where arms come from
+    # Constructors
 
     @classmethod
     def load(cls, name: str | Path, *, base: str | None = None, tip: str | None = None) -> Arm:
@@ -64,12 +64,12 @@ class Arm:
         name
             Name or path.
         base, tip
-            Of a URDF: the chain's first and last link; the root, and the end of the only chain, if not given.
+            First and last link of the chain in a URDF; by default its root, and the end of its only chain.
 
         Raises
         ------
         DescriptionError
-            No such robot, or a file that describes none.
+            No such robot, or a file that does not describe a robot.
         ModelError
             A URDF that is refused, or has no such chain, or several and no tip was given.
         """
@@ -96,7 +96,7 @@ class Arm:
         as_designed: bool = False,
         package_dirs: Sequence[str | Path] = (),
     ) -> Arm:
-        """Return a chain of a URDF as an arm; see :func:`dhkit.model.extract_dh`, which also says what was done.
+        """Return a chain of a URDF as an arm; see :func:`dhkit.model.extract_dh`, which also reports the steps.
 
         Examples
         --------
@@ -151,17 +151,20 @@ class Arm:
         )
 
     def with_tool(self, T: ArrayLike) -> Arm:
-        """Return this arm with its tool at T in DH frame n, shape (4, 4)."""
+        """Return this arm with its tool at the pose T (4, 4), m, in DH frame n."""
         return Arm(describe.with_tool(self._description, T))
 
     def with_base(self, T: ArrayLike) -> Arm:
-        """Return this arm with frame 0 at T in the world, shape (4, 4)."""
+        """Return this arm with frame 0 at the pose T (4, 4), m, in the world."""
         return Arm(describe.with_base(self._description, T))
 
     def with_payload(
         self, mass: Quantity | Payload, com: Sequence[Quantity] = (0, 0, 0), inertia: ArrayLike | None = None
     ) -> Arm:
-        """Return this arm with a load, kg, its com in the tool's frame; see :func:`dhkit.description.with_payload`."""
+        """Return this arm with a payload: mass, kg, and com (3,), m, in the tool's frame.
+
+        See :func:`dhkit.description.with_payload`.
+        """
         if isinstance(mass, describe.Payload):
             return Arm(mass.carried(self._description))
         return Arm(describe.with_payload(self._description, mass, com, inertia))
@@ -182,14 +185,14 @@ class Arm:
         return Arm(describe.with_limits(self._description, lower=lower, upper=upper, velocity=velocity, torque=torque))
 
     def with_uniform_links(self, masses: Sequence[Quantity] | None = None) -> Arm:
-        """Return this arm with thin uniform rods for links; see :func:`dhkit.description.with_uniform_links`."""
+        """Return this arm whose links are thin uniform rods; see :func:`dhkit.description.with_uniform_links`."""
         return Arm(describe.with_uniform_links(self._description, masses))
 
     def lock(self, joints: Mapping[int | str, Quantity]) -> Arm:
-        """Return this arm with joints frozen, by place from 0 or by name; see :func:`dhkit.description.lock`."""
+        """Return this arm with joints locked, by index from 0 or by name; see :func:`dhkit.description.lock`."""
         return Arm(describe.lock(self._description, joints))
 
-    # What it is
+    # Properties
 
     @property
     def description(self) -> Description:
@@ -213,7 +216,7 @@ class Arm:
 
     @cached_property
     def limits(self) -> Limits:
-        """The joints' limits of position, velocity and torque; of acceleration and jerk a description has none."""
+        """The joints' limits of position, velocity and torque; a description has none of acceleration and jerk."""
         from dhkit.trajectories import Limits
 
         return Limits.of(self._description)
@@ -224,7 +227,7 @@ class Arm:
         Raises
         ------
         DescriptionError
-            Another ending.
+            Another suffix than ``.toml``.
         ModelError
             A file cannot be read or written.
         """
@@ -236,7 +239,7 @@ class Arm:
 
     @cached_property
     def dh(self) -> DHTable:
-        """The Denavit-Hartenberg table; prints as one."""
+        """The Denavit-Hartenberg table, which prints as a table."""
         return DHTable.of(self._description)
 
     @cached_property
@@ -247,13 +250,13 @@ class Arm:
     def compile(self, progress: Callable[[int, int], None] | None = None) -> None:
         """Compile all kernels of this arm now, for control loops, servers and benchmarks.
 
-        Without it a kernel is compiled when large batches have asked for 65,536 items, and interpreted until then. What
-        is compiled stays in the cache for later processes. ``DHKIT_KERNELS=off`` still interprets.
+        Otherwise a kernel is interpreted, and compiled after 65,536 items in large batches. Compiled kernels stay in
+        the cache for later processes. With ``DHKIT_KERNELS=off`` all kernels are interpreted.
 
         Parameters
         ----------
         progress
-            Called with how many kernels are ready and how many there are.
+            Called with the number of compiled kernels and of all kernels.
         """
         from dhkit.dynamics import dynamic_kernels
         from dhkit.kinematics import kinematic_kernels
@@ -267,13 +270,13 @@ class Arm:
     # Kinematics
 
     def fk(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the tool's pose in the world, shape (..., 4, 4), for q (..., n)."""
+        """Return the tool's pose in the world, shape (..., 4, 4), m, for q (..., n), rad and m."""
         from dhkit.kinematics import forward_kinematics
 
         return forward_kinematics(self._description, q, out, threads)
 
     def frames(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), for q (..., n)."""
+        """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), m, for q (..., n), rad and m."""
         from dhkit.kinematics import frames
 
         return frames(self._description, q, out, threads)
@@ -281,7 +284,7 @@ class Arm:
     def jacobian(
         self, q: ArrayLike, frame: ReferenceAxes = "world", out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return the tool's Jacobian, shape (..., 6, n): velocity of the tool's origin, then angular velocity.
+        """Return the tool's Jacobian, shape (..., 6, n), m and rad: linear velocity of the tool's origin, then angular.
 
         ``frame="world"`` gives both in the world's axes (Pinocchio's LOCAL_WORLD_ALIGNED, not its WORLD), ``"tool"`` in
         the tool's (Pinocchio's LOCAL).
@@ -298,7 +301,7 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the Jacobian's time derivative along a motion, shape (..., 6, n)."""
+        """Return the Jacobian's time derivative at q, qd (..., n), shape (..., 6, n), m/s and rad/s."""
         from dhkit.kinematics import jacobian_dot
 
         return jacobian_dot(self._description, q, qd, frame, out, threads)
@@ -306,9 +309,10 @@ class Arm:
     def ik(
         self, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
     ) -> IKSolutions:
-        """Return all solutions of fk(q) = T in closed form, for poses (..., 4, 4).
+        """Return all closed-form solutions of fk(q) = T for poses (..., 4, 4), m.
 
-        See :func:`dhkit.kinematics.inverse_kinematics`; ``seed`` decides the joint that is free at a wrist singularity.
+        See :func:`dhkit.kinematics.inverse_kinematics`; ``seed`` (n,) sets the joint that is free at a wrist
+        singularity.
         """
         from dhkit.kinematics import inverse_kinematics
 
@@ -317,7 +321,7 @@ class Arm:
     def ik_chunks(
         self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1
     ) -> Iterator[tuple[slice, IKSolutions]]:
-        """Return an iterator over poses (N, 4, 4): which, and their solutions, which the next chunk overwrites.
+        """Yield slices of poses (N, 4, 4), m, and their solutions, which the next chunk overwrites.
 
         Several times faster than one call for a million poses; see
         :func:`dhkit.kinematics.inverse_kinematics_in_chunks`.
@@ -363,13 +367,13 @@ class Arm:
 
     @property
     def family(self) -> Classification:
-        """What the axes are like, and whether inverse kinematics have a closed form; prints as words."""
+        """Geometry of the axes and the family of closed-form inverse kinematics, if any; prints as text."""
         from dhkit.kinematics import classify
 
         return classify(self._description)
 
     def manipulability(self, q: ArrayLike, motion: Motion = "translational") -> Array:
-        """Return how well the tool can move at q, shape (...); see :func:`dhkit.kinematics.manipulability`."""
+        """Return the manipulability at q (..., n), shape (...); see :func:`dhkit.kinematics.manipulability`."""
         from dhkit.kinematics import manipulability
 
         return manipulability(self._description, q, motion)
@@ -383,13 +387,13 @@ class Arm:
         threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> Workspace:
-        """Return where the tool can be, by random states; see :func:`dhkit.kinematics.workspace`."""
+        """Return the positions that the tool can reach, from random states; see :func:`dhkit.kinematics.workspace`."""
         from dhkit.kinematics import workspace
 
         return workspace(self._description, samples, seed, edge=edge, threads=threads, progress=progress)
 
     def singularities(self) -> Singularities:
-        """Return where the arm is singular, in closed form; see :func:`dhkit.kinematics.singularities`."""
+        """Return the singularities of the arm in closed form; see :func:`dhkit.kinematics.singularities`."""
         from dhkit.kinematics import singularities
 
         return singularities(self._description)
@@ -403,25 +407,25 @@ class Arm:
     # Dynamics
 
     def mass_matrix(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the mass matrix M, shape (..., n, n), drives included, for q (..., n)."""
+        """Return the mass matrix M with drives, shape (..., n, n), kg m^2, kg m and kg, for q (..., n), rad and m."""
         from dhkit.dynamics import mass_matrix
 
         return mass_matrix(self._description, q, out, threads)
 
     def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the Coriolis matrix C by Christoffel symbols, shape (..., n, n)."""
+        """Return the Coriolis matrix C by Christoffel symbols, shape (..., n, n), so that C qd is in N m and N."""
         from dhkit.dynamics import coriolis_matrix
 
         return coriolis_matrix(self._description, q, qd, out, threads)
 
     def gravity_torque(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the torques g that hold the arm at rest, shape (..., n)."""
+        """Return the torques g that hold the arm at rest, shape (..., n), N m and N."""
         from dhkit.dynamics import gravity_torque
 
         return gravity_torque(self._description, q, out, threads)
 
     def bias(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return C qd + g, shape (..., n)."""
+        """Return C qd + g, shape (..., n), N m and N."""
         from dhkit.dynamics import bias
 
         return bias(self._description, q, qd, out, threads)
@@ -436,9 +440,9 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the joint torques of a motion, shape (..., n).
+        """Return the joint torques of a motion, shape (..., n), N m and N.
 
-        See :func:`dhkit.dynamics.inverse_dynamics`; ``wrench`` (..., 6) is what the environment does to the tool.
+        See :func:`dhkit.dynamics.inverse_dynamics`; ``wrench`` (..., 6) acts on the tool from outside, N and N m.
         """
         from dhkit.dynamics import inverse_dynamics
 
@@ -454,7 +458,7 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the joint accelerations that torques cause, shape (..., n).
+        """Return the joint accelerations under torques, shape (..., n), rad/s^2 and m/s^2.
 
         See :func:`dhkit.dynamics.forward_dynamics`.
         """
@@ -463,7 +467,7 @@ class Arm:
         return forward_dynamics(self._description, q, qd, tau, wrench, friction, out, threads)
 
     def kinetic_energy(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the kinetic energy, shape (...), J, drives included."""
+        """Return the kinetic energy with drives, shape (...), J."""
         from dhkit.dynamics import kinetic_energy
 
         return kinetic_energy(self._description, q, qd, out, threads)
@@ -483,7 +487,7 @@ class Arm:
     def friction_torque(
         self, qd: ArrayLike, friction: Friction | None = None, out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return the torques that friction takes, shape (..., n); see :func:`dhkit.dynamics.friction_torque`."""
+        """Return the friction torques, shape (..., n), N m and N; see :func:`dhkit.dynamics.friction_torque`."""
         from dhkit.dynamics import friction_torque
 
         return friction_torque(self._description, qd, friction, out, threads)
@@ -516,18 +520,18 @@ class Arm:
         tolerance: float = 1e-13,
         progress: Callable[[int, int], None] | None = None,
     ) -> SimulationResult:
-        """Return how the arm moves under a controller; see :func:`dhkit.control.simulate`.
+        """Simulate the arm under a controller; see :func:`dhkit.control.simulate`.
 
         Parameters
         ----------
         controller, reference, duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance, progress
-            As there.
+            As for that function.
         plant
-            The arm that moves, where it differs from this one: another payload, other parameters, the same joints.
+            The arm that moves, if it differs from this one: another payload, other parameters, the same joints.
         friction
-            Of the joints: True for a step with stiction, or a :class:`Friction` that is smooth.
+            Friction of the joints: True for a step with stiction, or a smooth :class:`Friction`.
         restitution
-            Of the joint stops, 0 to 1; None for joints that pass their limits.
+            Coefficient of restitution of the joint stops, 0 to 1; None for no stops.
         pushes
             Wrenches on the tool or on links.
         """
@@ -569,16 +573,16 @@ class Arm:
         threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> BatchResult:
-        """Return how many arms move, their states advanced together; see :func:`dhkit.control.simulate_batch`.
+        """Simulate a batch of arms, with their states advanced together; see :func:`dhkit.control.simulate_batch`.
 
         Parameters
         ----------
         plant
             The arm that moves, or one for each run: other payloads, other parameters, the same joints.
         controller, reference, duration, q0, qd0, rate, plant_rate, friction, keep, sensors, saturation
-            As there.
+            As for that function.
         threads, progress
-            As there.
+            As for that function.
         """
         from dhkit.control import simulate_batch
 
@@ -655,11 +659,11 @@ class Arm:
         )
 
     def _moving(self, plant: Robot | None) -> Description:
-        """Return what moves: a plant, an arm or its description, or this arm where none is given."""
+        """Return the description of the arm that moves: a plant's, an arm's, or by default this arm's."""
         return self._description if plant is None else describe.description_of(plant)
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return A (2n, 2n) and B (2n, n) of the arm near a state; see :func:`dhkit.control.linearize`."""
+        """Return A (2n, 2n) and B (2n, n), SI units, of the arm near a state; see :func:`dhkit.control.linearize`."""
         from dhkit.control import linearize
 
         return linearize(self._description, q, qd)
@@ -770,7 +774,7 @@ class Arm:
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> Planner:
-        """Return a planner of optimal motions, made once and asked often; see :class:`dhkit.planning.Planner`."""
+        """Return a planner of optimal motions, to be used for many motions; see :class:`dhkit.planning.Planner`."""
         from dhkit.planning import Planner
 
         return Planner(self._description, objective, limits, constraints, intervals, friction)
@@ -798,7 +802,7 @@ class Arm:
         progress: ProgressCall | None = None,
         compare: bool = True,
     ) -> Trajectory:
-        """Return the best motion between two configurations, or to a pose of the tool; its planners are kept.
+        """Return the best motion between two configurations, or to a pose of the tool; planners are cached.
 
         Arguments are those of :class:`dhkit.planning.Planner` and of its :meth:`~dhkit.planning.Planner.solve`.
 
@@ -879,7 +883,7 @@ class Arm:
         return certify(self._description, motion, limits, friction, payload)
 
     def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
-        """Return how far the links are from obstacles, and from each other; see :func:`dhkit.planning.distance`."""
+        """Return the distances of the links from obstacles and from each other; see :func:`dhkit.planning.distance`."""
         from dhkit.planning import distance
 
         return distance(self._description, q, obstacles, self_collision)
@@ -899,7 +903,7 @@ class Arm:
     ) -> GradeReport:
         """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
 
-        Entries may be given one by one: ``M11=...``, ``g2=...``; a rubric makes marks of the verdicts.
+        Entries may be given one by one: ``M11=...``, ``g2=...``; with a rubric, verdicts become marks.
 
         Examples
         --------
@@ -915,8 +919,8 @@ class Arm:
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
         """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.
 
-        ``symbols="none"``: in numbers; ``"file"``: in the file's parameters; ``"inertial"``: every inertial parameter
-        is a symbol.
+        ``symbols="none"`` has numbers, ``"file"`` the file's parameters, ``"inertial"`` a symbol for every inertial
+        parameter.
         """
         from dhkit.symbolic import lagrangian
 
@@ -929,37 +933,37 @@ class Arm:
 
     @cached_property
     def symbolic(self) -> SymbolicKinematics:
-        """Kinematics to be read: exact ``A(1)`` ... ``A(n)``, ``T`` and ``J`` as text, LaTeX, sympy and code."""
+        """Symbolic kinematics: exact ``A(1)`` ... ``A(n)``, ``T`` and ``J`` as text, LaTeX, sympy and code."""
         from dhkit.symbolic import symbolic_kinematics
 
         return symbolic_kinematics(self._description)
 
     def base_parameters(self) -> BaseParameters:
-        """Return the fewest inertial parameters that decide the torques; see :func:`dhkit.symbolic.base_parameters`."""
+        """Return the fewest parameters that determine the torques; see :func:`dhkit.symbolic.base_parameters`."""
         from dhkit.symbolic import base_parameters
 
         return base_parameters(self._description)
 
-    # The reference path
+    # URDF, Pinocchio, verification
 
     def urdf(self) -> str:
-        """Return the arm as URDF text; meshes are named as ``meshes/...`` beside it."""
+        """Return the arm as URDF text, with meshes named ``meshes/...`` relative to it."""
         from dhkit.model import urdf_text
 
         return urdf_text(self._description)
 
     def write_urdf(self, path: str | Path, mesh_prefix: str | None = None) -> tuple[Path, ...]:
-        """Write the URDF and, beside it, the meshes that it names; see :func:`dhkit.model.write_urdf`."""
+        """Write the URDF and its meshes beside it; see :func:`dhkit.model.write_urdf`."""
         from dhkit.model import write_urdf
 
         return write_urdf(self._description, path, mesh_prefix)
 
     @property
     def model(self) -> PinocchioModel:
-        """The arm's Pinocchio model, with gravity, armature, friction and limits set; one object, made once.
+        """The arm's Pinocchio model, with gravity, armature, friction and limits set; one object, built once.
 
-        What is changed in it stays changed, for this object alone: equality, pickling, ``verify``, certificates of
-        motions and all else in dhkit go back to the description. :meth:`pinocchio_model` is a fresh one.
+        Changes of it stay in this object: equality, pickling, ``verify``, certificates of motions and everything else
+        in dhkit use the description. :meth:`pinocchio_model` returns a new model.
 
         Raises
         ------
@@ -979,12 +983,12 @@ class Arm:
         return pinocchio_model(self._description)
 
     def verify(self, samples: int = 1000, seed: int = 0) -> VerificationReport:
-        """Hold our kinematics and dynamics against Pinocchio's over random states; ``.ok`` says whether they agree."""
+        """Compare dhkit's kinematics and dynamics with Pinocchio's at random states; ``.ok`` is true if they agree."""
         from dhkit.verification import verify
 
         return verify(self._description, samples, seed)
 
-    # Showing
+    # Viewer
 
     def view(self, *, frames: bool = False, port: int = 0, token: str | None = None) -> View:
         """Return a view of the arm for a browser; see :class:`dhkit.viewer.View`."""
@@ -1004,7 +1008,7 @@ class Arm:
         return hash(self._description)
 
     def __getstate__(self) -> dict[str, Description]:
-        """Leave out what can be made again, and the Pinocchio model, which may have been changed."""
+        """Return the description alone: derived values are computed again, and the Pinocchio model may have changed."""
         return {"_description": self._description}
 
     def __setstate__(self, state: dict[str, Description]) -> None:
@@ -1015,14 +1019,14 @@ class Arm:
 
     def __repr__(self) -> str:
         described = f"{self._description.kinds}, {self._description.convention.value} DH"
-        return repr_line(f"Arm {self.name}", said=", ".join([described, *self._description.carried_words]))
+        return repr_line(f"Arm {self.name}", said=", ".join([described, *self._description.tool_texts]))
 
     def _repr_html_(self) -> str:
         return self._description._repr_html_()
 
 
 def _listed(pushes: Sequence[Push]) -> tuple[Push, ...]:
-    """Return pushes as a tuple, one alone too."""
+    """Return pushes as a tuple, also for a single push."""
     from dhkit.control import Push
 
     return (pushes,) if isinstance(pushes, Push) else tuple(pushes)

@@ -1,6 +1,6 @@
-"""How values show themselves as a prompt's or a notebook cell's last expression: in one line, and as a small table.
+"""Reprs of values: one line at a prompt, a small table in a notebook.
 
-Texts come from files and from people: all of them are made one line of printable characters, cut and escaped here.
+Texts may come from files and users: all are reduced to one line of printable characters, shortened and escaped here.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from html import escape
 from typing import Any
 
 LONGEST_LINE = 120
-"""Characters of a repr."""
+"""Largest length of a repr, characters."""
 SHORTEST_NAME = 40
-"""Characters that a name keeps in a repr, however much there is to say."""
+"""Length that a name keeps in a repr in any case, characters."""
 MOST_ROWS = 12
-"""Rows of a table in a notebook."""
+"""Largest number of rows of a table in a notebook."""
 LONGEST_CELL = 80
-"""Characters of a table's cell."""
+"""Largest length of a cell of a table, characters."""
 MOST_LINES = 6
-"""Lines below a table."""
+"""Largest number of lines below a table."""
 LONGEST_TEXT = 200
-"""Characters of a heading, and of a line below a table."""
+"""Largest length of a heading and of a line below a table, characters."""
 ALIGNMENTS = {"l": "left", "r": "right"}
 
 
 def plain(text: str, most: int) -> str:
-    """Return text as one line of printable characters: no escapes, no controls, nothing that turns its direction.
+    """Return text as one line of printable characters: without escapes, control characters and marks of direction.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def plain(text: str, most: int) -> str:
 
 
 def listed(values: Iterable[Any]) -> str:
-    """Return numbers as a person reads them, four digits.
+    """Return numbers as text with four digits.
 
     Examples
     --------
@@ -50,13 +50,13 @@ def listed(values: Iterable[Any]) -> str:
 
 
 def counted(count: float, noun: str) -> str:
-    """Return how many there are, such as ``1 pose``, ``2 branches`` and ``2.5 points``."""
+    """Return a count with its noun, such as ``1 pose``, ``2 branches`` and ``2.5 points``."""
     number = str(int(count)) if float(count).is_integer() else f"{count:.4g}"
     return f"{number} {noun}" if count == 1 else f"{number} {noun}{'es' if noun.endswith(('ch', 'sh')) else 's'}"
 
 
 def repr_line(kind: str, of: str = "", said: str = "") -> str:
-    """Return ``<kind of name: what is said>`` in 120 characters; a long name is cut before what is said.
+    """Return ``<kind of name: what is said>`` in 120 characters; a long name is shortened first.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def repr_line(kind: str, of: str = "", said: str = "") -> str:
 def value_line(value: Any) -> str:
     """Return a dataclass as its constructor is written, in 120 characters; arrays as lists.
 
-    Numbers are rounded to four digits where the line is too long otherwise, and of long lists the beginning is left.
+    If the line is too long, numbers are rounded to four digits and lists are shortened.
     """
     for number, most in (repr, LONGEST_LINE), (_rounded, LONGEST_LINE), (_rounded, 3):
         named = (f"{item.name}={_written(getattr(value, item.name), number, most)}" for item in fields(value))
@@ -96,17 +96,17 @@ def html_table(
     Parameters
     ----------
     headings
-        Of the columns; none for a table without.
+        Headings of the columns; empty for a table without headings.
     rows
-        Their cells; below the first ``most`` rows it says how many more there are.
+        Cells of the rows; a line below the first ``most`` rows gives the number of the others.
     caption
-        What the table is.
+        Caption of the table.
     align
-        A letter a column, ``l`` or ``r``, as in LaTeX; the last one counts for all that follow.
+        A letter for each column, ``l`` or ``r``, as in LaTeX; the last one applies to all that follow.
     count
-        How many rows there are, where ``rows`` are only the first.
+        Number of all rows, if ``rows`` has only the first.
     most, longest
-        Rows that are shown, and characters of a cell.
+        Largest number of rows, and largest length of a cell.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def html_table(
 
 
 def html_lines(lines: Sequence[str]) -> str:
-    """Return texts as a list, nothing where there are none."""
+    """Return texts as an HTML list; empty without texts."""
     shown = [_escaped(line, LONGEST_TEXT) for line in lines[:MOST_LINES]]
     if len(lines) > MOST_LINES:
         shown.append(f"… and {len(lines) - MOST_LINES} more")
@@ -140,7 +140,7 @@ def html_lines(lines: Sequence[str]) -> str:
 
 
 def html_block(heading: str, *parts: str) -> str:
-    """Return a heading above what is HTML already; MathJax leaves it alone, so that LaTeX is seen as it was written."""
+    """Return HTML parts below a heading, which MathJax does not change, so that LaTeX is shown as source."""
     head = f"<b>{_escaped(heading, LONGEST_TEXT)}</b>"
     return f'<div class="mathjax_ignore tex2jax_ignore">{head}{"".join(parts)}</div>'
 
@@ -154,7 +154,7 @@ def _rounded(number: float) -> str:
 
 
 def _written(value: Any, number: Callable[[float], str], most: int) -> str:
-    """Return a field's value, of arrays and sequences at most so many entries."""
+    """Return a field's value as text, with at most ``most`` entries of arrays and sequences."""
     if hasattr(value, "tolist"):
         value = (value[: most + 1] if value.ndim else value).tolist()
     if isinstance(value, float):

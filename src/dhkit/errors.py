@@ -1,4 +1,4 @@
-"""What dhkit raises: one base, a few kinds, each with one line that says what and where."""
+"""Exceptions of dhkit: a common base and a few kinds, with messages of one line that say what and where."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def from_checkout(extra: str) -> str:
-    """Return how to install one of dhkit's extras; the distribution is not published yet."""
+    """Return the command that installs one of dhkit's extras; the distribution is not published yet."""
     return f"`.venv/bin/pip install -e '.[{extra}]'` in dhkit's checkout"
 
 
@@ -15,7 +15,7 @@ class DhkitError(Exception):
 
 
 class ExpressionError(DhkitError):
-    """Text that is no expression, or an expression that has no finite value."""
+    """Text that is not an expression, or an expression without a finite value."""
 
 
 class DescriptionError(DhkitError):
@@ -35,7 +35,7 @@ class UnreachableError(PlanningError):
 
 
 class SimulationError(DhkitError):
-    """A simulation that cannot go on: names the time; ``result`` is what was simulated until then, or None."""
+    """A simulation that cannot continue: names the time; ``result`` has the rows until then, or is None."""
 
     result: Any = None
 

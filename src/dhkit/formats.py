@@ -1,6 +1,6 @@
-"""Printers, readers and writers of values by name: a value looks its own up here, and imports none of them.
+"""Registry of printers, readers and writers by name, so that values need not import them.
 
-Packages register the functions when they are imported; a function's module is imported when it is first used.
+Packages register functions when they are imported; a function's module is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ _MODULES: dict[str, str] = {}
 
 
 def register_formats(module: str, *functions: str) -> None:
-    """Make functions of a module known by their names."""
+    """Register functions of a module by their names."""
     _MODULES.update(dict.fromkeys(functions, module))
 
 
 def format_function(name: str) -> Callable[..., Any]:
-    """Return the function registered by this name."""
+    """Return the function registered under a name."""
     function: Callable[..., Any] = getattr(importlib.import_module(_MODULES[name]), name)
     return function

@@ -1,4 +1,4 @@
-"""Names of a package that are imported when first used, so that importing the package takes no time (PEP 562)."""
+"""Lazy imports: names of a package are imported when first used, so that importing the package is fast (PEP 562)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def lazy_names(
     Parameters
     ----------
     package
-        Its ``__name__``.
+        ``__name__`` of the package.
     homes
-        Modules, and the names that each of them gives to the package.
+        Modules, and the names that the package takes from each.
     folders
-        Modules of the package that are its attributes without having been imported before.
+        Modules of the package that are available as its attributes, imported on first use.
     """
     modules = {name: module for module, names in homes.items() for name in names}
 

@@ -11,8 +11,8 @@ from dhkit import Arm, Obstacle, Trajectory
 from dhkit.cli import main
 from dhkit.cli.arguments import objective
 from dhkit.viewer import View
-from dhkit.viewer.protocol import decode_animation, decode_obstacles
 from dhkit.viewer.session import Slot
+from viewer.messages import decode_animation, decode_obstacles
 
 KEPT = 1e-6
 """Share of a limit that a certified motion may exceed it by."""

@@ -12,8 +12,8 @@ from dhkit import Arm, FrictionCompensation, Payload, PDGravity, SimulationResul
 from dhkit.cli import main
 from dhkit.cli.simulation_task import chosen_motion
 from dhkit.viewer import View
-from dhkit.viewer.protocol import decode_animation
 from dhkit.viewer.session import Slot
+from viewer.messages import decode_animation
 
 ARM = Arm.load("planar2r")
 ENDS = ("--from", "0.1", "0.2", "--to", "0.5", "-0.3", "--duration", "1")

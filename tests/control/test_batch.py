@@ -1,4 +1,7 @@
-"""A batch of arms moves as each of them does alone, and one that fails does not touch the others."""
+"""A batch of arms moves as each of them does alone, and one that fails does not touch the others.
+
+Modules: batch, batch_result, batch_run, step_kernel.
+"""
 
 import numpy as np
 import pytest

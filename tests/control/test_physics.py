@@ -1,4 +1,7 @@
-"""The simulated arm obeys mechanics: against Pinocchio, in energy, with friction and at its stops."""
+"""The simulated arm obeys mechanics: against Pinocchio, in energy, with friction and at its stops.
+
+Modules: events, integrators, plant, runs, timing.
+"""
 
 from dataclasses import replace
 

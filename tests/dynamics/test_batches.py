@@ -19,7 +19,7 @@ from dhkit.dynamics import (
     wrench_torque,
 )
 from dhkit.errors import DescriptionError
-from dhkit.kernels.kernel import SHARE
+from dhkit.kernels.kernel import MIN_ITEMS_PER_THREAD
 from dynamics_reference import motions
 
 FUNCTIONS = {
@@ -68,7 +68,7 @@ def test_batch_axes_broadcast(function, arm):
 @every
 def test_threads_and_arrays_of_the_caller(function, arm):
     count, _ = FUNCTIONS[function]
-    states = motions(arm, 2 * SHARE + 7)[:count]
+    states = motions(arm, 2 * MIN_ITEMS_PER_THREAD + 7)[:count]
     expected = function(arm, *states)
     out = np.full_like(expected, 7.0)
     assert function(arm, *states, out=out, threads=3) is out

@@ -1,4 +1,7 @@
-"""The regressor in numbers: linear, equal to the exact one and to Pinocchio's."""
+"""The regressor in numbers: linear, equal to the exact one and to Pinocchio's.
+
+Modules: regressor, velocity_regressor.
+"""
 
 from __future__ import annotations
 

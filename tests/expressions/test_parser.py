@@ -1,4 +1,7 @@
-"""What the parser reads, and what it refuses, fast."""
+"""What the parser reads, and what it refuses, fast.
+
+Modules: budget, functions, parser, syntax.
+"""
 
 import contextlib
 import time

@@ -1,4 +1,7 @@
-"""Kernels: equal results interpreted and compiled, when they are compiled, on one thread and several."""
+"""Kernels: equal results interpreted and compiled, when they are compiled, on one thread and several.
+
+Modules: batches, interpreter, kernel, llvm_source, machine_code, stages, threads, vectors.
+"""
 
 import signal
 import subprocess

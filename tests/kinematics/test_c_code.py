@@ -1,4 +1,7 @@
-"""The C code compiles without a warning and computes what dhkit computes."""
+"""The C code compiles without a warning and computes what dhkit computes.
+
+Modules: programs.
+"""
 
 import ctypes
 import subprocess

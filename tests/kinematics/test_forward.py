@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 
 from dhkit.description import library_robot, link_transforms
-from dhkit.kernels.kernel import SHARE
+from dhkit.kernels.kernel import MIN_ITEMS_PER_THREAD
 from dhkit.kinematics import forward_kinematics, frames, jacobian, jacobian_dot
 from random_arms import states, tables
 
@@ -41,7 +41,7 @@ def test_a_batch_is_its_elements(function, name):
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_large_batches_on_threads_and_into_arrays_of_the_caller(function):
     arm = library_robot("puma560")
-    q = states(arm, 2 * SHARE + 7)
+    q = states(arm, 2 * MIN_ITEMS_PER_THREAD + 7)
     expected = function(arm, q)
     out = np.full_like(expected, 7.0)
     assert function(arm, q, out=out, threads=3) is out

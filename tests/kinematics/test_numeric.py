@@ -1,4 +1,7 @@
-"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, what is said of failures."""
+"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, what is said of failures.
+
+Modules: candidates, newton, newton_program, numeric.
+"""
 
 import time
 

@@ -1,4 +1,7 @@
-"""Laws of singularities in closed form: a determinant that is a product, and configurations where it vanishes."""
+"""Laws of singularities in closed form: a determinant that is a product, and configurations where it vanishes.
+
+Modules: singular_factors, singularities.
+"""
 
 import json
 from dataclasses import replace

@@ -217,8 +217,8 @@ def test_a_position_has_its_tolerance(begin, read, q, there):
 def test_a_rotation_has_its_tolerance(angle, there):
     T, turned = np.eye(4), np.eye(4)
     turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    assert ToolAt(T, True, 0.005, 0.02).met(turned) is there
-    assert ToolAt(T, False, 0.005, 0.02).met(turned)
+    assert ToolAt(T, True, 0.005, 0.02).is_reached(turned) is there
+    assert ToolAt(T, False, 0.005, 0.02).is_reached(turned)
 
 
 def test_a_goal_that_the_arm_begins_in_has_to_be_left_first(begin, read):
@@ -271,8 +271,10 @@ def test_the_share_of_a_score(begin, read, tmp_path):
     program.write_text(OWN.replace("puma560_cao", "planar2r"))
     wait_for(lambda: met(lab) == [True], seconds=60.0)
     report = states(lab)["own"]["report"]
-    assert OwnScore("fk", 1.0).met(report)
-    assert not OwnScore("controller", 0.1).met(report) and not OwnScore("fk", 0.1).met({"error": "it died"})
+    assert OwnScore("fk", 1.0).is_reached(report)
+    assert not OwnScore("controller", 0.1).is_reached(report) and not OwnScore("fk", 0.1).is_reached(
+        {"error": "it died"}
+    )
 
 
 def test_a_lab_without_one_and_a_lab_of_another_robot(open_lab, read, tmp_path):

@@ -18,6 +18,7 @@ from PIL import Image
 from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import pose
+from dhkit.viewer.scene import first_configuration
 from lab.controls import button, labelled, panel
 
 pytestmark = pytest.mark.slow
@@ -83,7 +84,7 @@ def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(visit):
     page.settle()
     shown = float(page.evaluate(f"{labelled('shoulder, value')}.value"))
     wait_for(lambda: abs(lab.desk.q[1] / DEGREE - shown) < 1e-9)
-    assert np.abs(np.delete(lab.desk.q - lab.desk.first(lab.desk.arm), 1)).max() == 0
+    assert np.abs(np.delete(lab.desk.q - first_configuration(lab.desk.arm.description), 1)).max() == 0
 
 
 def test_a_number_is_typed_and_a_wrong_one_is_refused(visit):

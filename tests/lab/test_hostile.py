@@ -30,12 +30,12 @@ from dhkit import Arm
 from dhkit.control import make_controller
 from dhkit.errors import ModelError
 from dhkit.lab import live as live_module
-from dhkit.lab.live import MOST_PUSHES, Live
+from dhkit.lab.live import MAX_PUSHES, Live
 from dhkit.lab.serving import kept_token
-from dhkit.viewer.handlers import MOST_PAGES, MOST_REQUESTS
-from dhkit.viewer.protocol import HEADER, decode_header
-from dhkit.viewer.streams import MOST_FLOATS, Samples
+from dhkit.viewer.handlers import MAX_PAGES, MAX_REQUESTS
+from dhkit.viewer.protocol import HEADER, MAX_SAMPLE_NUMBERS, Samples
 from lab.test_requests import BAD, states, wait_for
+from viewer.messages import decode_header
 
 PATIENCE = 20.0
 LATE = 4.0
@@ -370,7 +370,7 @@ def test_frames_that_are_no_websocket_end_their_page(lab, data):
 def test_a_page_that_only_shows_says_so_however_often_it_is_asked():
     async def ask(url):
         async with page(url) as client:
-            return {(await client.ask("python"))["error"] for _ in range(2 * MOST_REQUESTS)}
+            return {(await client.ask("python"))["error"] for _ in range(2 * MAX_REQUESTS)}
 
     with Arm.load("planar2r").view() as view:
         assert run(ask(view.url)) == {"this page only shows; it has nothing to ask for"}
@@ -397,7 +397,7 @@ def test_a_flood_of_requests_is_answered_or_refused(lab):
 
     kinds = run(both())
     assert kinds["answer"] >= 1
-    assert max(most) <= MOST_REQUESTS
+    assert max(most) <= MAX_REQUESTS
 
 
 @needs_proc
@@ -417,7 +417,7 @@ def test_a_page_that_takes_no_answers_is_not_read_from(lab):
                 sent += connection.send(message * 1000)
         assert sent < 50e6
         assert memory() - before < GROWTH
-        assert all(page._unanswered <= MOST_REQUESTS for page in lab.view._live().pages)
+        assert all(page._unanswered <= MAX_REQUESTS for page in lab.view._live().pages)
         run(slider_works(lab.url))
         connection.close()
 
@@ -464,7 +464,7 @@ def test_many_pages_at_once_are_each_answered_and_see_the_same(lab):
 def test_more_pages_than_can_be_served_are_turned_away(lab):
     async def crowd():
         async with contextlib.AsyncExitStack() as stack:
-            for _ in range(MOST_PAGES):
+            for _ in range(MAX_PAGES):
                 await stack.enter_async_context(page(lab.url))
             with pytest.raises(HTTPClientError, match="503"):
                 await stack.enter_async_context(page(lab.url))
@@ -529,7 +529,7 @@ def test_what_waits_for_a_page_that_never_acknowledges_is_bounded(lab):
     waiting = slow.session._waiting
     assert len(waiting) <= len(server._state)
     for kept in (waiting, server._state):
-        assert all(m.rows.size <= MOST_FLOATS for *_, m in kept.values() if isinstance(m, Samples))
+        assert all(m.rows.size <= MAX_SAMPLE_NUMBERS for *_, m in kept.values() if isinstance(m, Samples))
     assert not slow.ws_connection.stream.writing() or len(slow.ws_connection.stream._write_buffer) < 2e6
     run(slider_works(lab.url))
     lab.answer("control.stop", {})
@@ -554,7 +554,7 @@ def test_memory_stays_where_it_is_while_a_simulation_streams_to_a_slow_page(lab)
 
 
 def short_run(monkeypatch, most):
-    monkeypatch.setattr(live_module, "MOST_ROWS", most)
+    monkeypatch.setattr(live_module, "MAX_ROWS", most)
     arm = Arm.load("planar2r")
     run = Live(arm, arm, None, np.zeros(2), 1000.0)
     run.take(make_controller("pd-gravity", arm.description, 20.0, 1.0, np.zeros(2)))
@@ -576,7 +576,7 @@ def test_a_long_run_is_kept_whole_in_bounded_memory(monkeypatch):
 
 def test_pushes_at_a_time_are_bounded(monkeypatch):
     run = short_run(monkeypatch, 100)
-    for _ in range(MOST_PUSHES):
+    for _ in range(MAX_PUSHES):
         run.push(None, np.array([1.0, 0.0, 0.0]), 0.05)
     with pytest.raises(ValueError, match="pushes act already"):
         run.push(None, np.array([1.0, 0.0, 0.0]), 0.05)

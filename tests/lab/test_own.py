@@ -8,10 +8,10 @@ import pytest
 
 from dhkit import Arm
 from dhkit.lab import Lab
-from dhkit.viewer.protocol import decode_ghosts
 from dhkit.viewer.session import Slot
 from lab.test_requests import states, wait_for
 from programs.puma_solutions import solution
+from viewer.messages import decode_ghosts
 
 CONTROLLER = "def controller(t, q, qd, setpoint):\n    return 300 * (setpoint.q - q) - 30 * qd\n"
 

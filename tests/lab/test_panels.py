@@ -11,7 +11,7 @@ from dhkit import Arm
 from dhkit.description import pose
 from dhkit.errors import ModelError
 from dhkit.lab import Lab
-from dhkit.lab.transforms_panel import MOST_TRIANGLES, Solid
+from dhkit.lab.transforms_panel import MAX_TRIANGLES, Solid
 from dhkit.lab.workspace_panel import boundary_distance
 
 PRINTED = 5.1e-5
@@ -79,8 +79,8 @@ def test_an_entry_is_derived_as_a_formula(open_lab):
 
 
 def test_the_ellipsoid_follows_the_arm_until_it_is_taken_away(open_lab):
-    from dhkit.viewer.protocol import decode_ellipsoids
     from dhkit.viewer.session import Slot
+    from viewer.messages import decode_ellipsoids
 
     lab = open_lab("puma560")
     drawn = lambda: decode_ellipsoids(lab.view._state[Slot.ELLIPSOIDS])  # noqa: E731 - read anew each time
@@ -126,8 +126,8 @@ def test_a_stretched_puma_is_at_its_outer_boundary_and_no_state_is_beyond():
 
 
 def test_points_and_a_slice_are_sampled_in_the_background(open_lab):
-    from dhkit.viewer.protocol import decode_points
     from dhkit.viewer.session import Slot
+    from viewer.messages import decode_points
 
     lab = open_lab("stanford")
     lab.answer("workspace.show", {"kind": "points"})
@@ -237,7 +237,7 @@ def test_solids_of_files_have_each_vertex_once(tmp_path):
         (
             "many.stl",
             trimesh.exchange.stl.export_stl(trimesh.creation.icosphere(5)),
-            f"expected at most {MOST_TRIANGLES}",
+            f"expected at most {MAX_TRIANGLES}",
         ),
         (
             "nan.stl",

@@ -10,10 +10,27 @@ from scipy.io import savemat
 
 from dhkit import Arm
 from dhkit.description import from_toml, pose_parts
-from dhkit.viewer.protocol import decode_animation, decode_ghosts, decode_pose
+from dhkit.lab.control_panel import ControlPanel
+from dhkit.lab.dynamics_panel import DynamicsPanel
+from dhkit.lab.lab import JointPanel
+from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.own_panel import OwnPanel
+from dhkit.lab.python_panel import PythonPanel
+from dhkit.lab.requests import RequestHandler
+from dhkit.lab.submit_panel import SubmitPanel
+from dhkit.lab.table_panel import TablePanel
+from dhkit.lab.task_panel import TaskPanel
+from dhkit.lab.tool_panel import ToolPanel
+from dhkit.lab.transforms_panel import TransformsPanel
+from dhkit.lab.workspace_panel import WorkspacePanel
+from dhkit.viewer.protocol import Samples
 from dhkit.viewer.session import Slot
-from dhkit.viewer.streams import Samples, decode_samples, decode_state
+from viewer.messages import decode_animation, decode_ghosts, decode_pose, decode_samples, decode_state
 
+PANELS = (
+    *(JointPanel, ToolPanel, TablePanel, MotionPanel, OwnPanel, ControlPanel, DynamicsPanel),
+    *(WorkspacePanel, SubmitPanel, TransformsPanel, TaskPanel, PythonPanel),
+)
 ROBOTS = ["puma560", "planar2r", "cobra600", "stanford", "panda"]
 
 
@@ -43,6 +60,15 @@ def wait_for(what, seconds=20.0):
         assert time.monotonic() < deadline, "it did not come"
         time.sleep(0.02)
     return found
+
+
+def test_each_request_is_answered_by_one_panel_and_refuses_unknown_fields(open_lab):
+    declared = [h.request for panel in PANELS for h in vars(panel).values() if isinstance(h, RequestHandler)]
+    lab = open_lab("planar2r")
+    assert sorted(declared) == sorted(lab._requests)
+    for request in declared:
+        with pytest.raises(ValueError, match=f"^{request}: found field 'junk'; expected "):
+            lab.answer(request, {"junk": 1})
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -16,7 +16,7 @@ from lab.test_requests import samples, states, wait_for
 
 
 def held(lab, t):
-    return lab._control._live.wanted(t)
+    return lab._control._live.setpoints(t)
 
 
 @pytest.fixture
@@ -43,14 +43,14 @@ def test_a_reference_that_stands_still_has_no_acceleration(puma):
 def test_a_change_leaves_alone_what_it_does_not_concern(puma):
     puma.answer("control.start", {"reference": "sine", "controller": "adaptive"})
     live = puma._control._live
-    wanted, controller, plant = live.wanted, live.controller, live._plant
+    wanted, controller, plant = live.setpoints, live.controller, live._plant
     puma.answer("control.change", {"payload": 1.0})
-    assert live.wanted is wanted and live.controller is controller and live._plant is not plant
+    assert live.setpoints is wanted and live.controller is controller and live._plant is not plant
     puma.answer("control.change", {"bandwidth": 15.0})
-    assert live.wanted is wanted and live.controller is not controller
+    assert live.setpoints is wanted and live.controller is not controller
     controller = live.controller
     puma.answer("control.change", {"reference": "hold"})
-    assert live.wanted is not wanted and live.controller is controller
+    assert live.setpoints is not wanted and live.controller is controller
 
 
 def test_what_cannot_be_followed_changes_nothing(puma):

@@ -1,4 +1,7 @@
-"""Every way in which there is no motion, and what is said of it."""
+"""Every way in which there is no motion, and what is said of it.
+
+Modules: feasibility, goals.
+"""
 
 import math
 import re

@@ -1,4 +1,7 @@
-"""What a planner is asked for: ways, loads, constraints, time, interruption."""
+"""What a planner is asked for: ways, loads, constraints, time, interruption.
+
+Modules: assembly, guess, integration, mesh, planner, point, problem, request, search, solver, task.
+"""
 
 import pickle
 import threading

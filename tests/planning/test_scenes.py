@@ -1,4 +1,7 @@
-"""Spheres and boxes on the direct way, passed at the clearance that was asked for."""
+"""Spheres and boxes on the direct way, passed at the clearance that was asked for.
+
+Modules: collision_avoidance.
+"""
 
 import numpy as np
 import pytest

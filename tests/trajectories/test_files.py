@@ -1,4 +1,7 @@
-"""Files come back as they were, and damaged ones are refused in one line."""
+"""Files come back as they were, and damaged ones are refused in one line.
+
+Modules: archives, files, labels, ros_yaml, tables.
+"""
 
 import io
 import zipfile

@@ -1,4 +1,7 @@
-"""Samples out of .mat files as MATLAB and Simulink users save them; what is wrong is named with its variable."""
+"""Samples out of .mat files as MATLAB and Simulink users save them; what is wrong is named with its variable.
+
+Modules: matlab_samples.
+"""
 
 import struct
 

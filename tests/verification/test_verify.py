@@ -1,4 +1,7 @@
-"""Verification finds nothing where nothing is wrong, and what is wrong where something is."""
+"""Verification finds nothing where nothing is wrong, and what is wrong where something is.
+
+Modules: comparison, differences, reference, report, second_opinion, states.
+"""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ PIXELS = 4.0  # a ball's outline is a little off its centre in perspective
 FLOAT32 = 2e-6  # m, on an arm of 2 m
 BETWEEN_PANELS = slice(70, 620)  # rows: the panels have the trace's color too
 LOST = 2.0  # s until a page says that the connection is lost
-STATES = [(0.4, 0.2), (-0.9, 0.9), (0.9, -0.4)]
+MAX_PANEL_MESSAGES = [(0.4, 0.2), (-0.9, 0.9), (0.9, -0.4)]
 """In each of them the ball is in front of the column, seen from where the page looks."""
 
 
@@ -64,11 +64,11 @@ def check_tool(page, picture, arm, q):
 
 def test_an_offline_file_shows_the_arm_and_asks_nobody(page, signal_arm, tmp_path):
     view = View(signal_arm)
-    view.show(STATES[0])
+    view.show(MAX_PANEL_MESSAGES[0])
     open_offline(page, view, tmp_path)
     picture = page.screenshot()
     assert shows_the_arm(picture)
-    check_tool(page, picture, signal_arm, STATES[0])
+    check_tool(page, picture, signal_arm, MAX_PANEL_MESSAGES[0])
     assert hosts(page) == []
     assert page.errors == []
 
@@ -86,7 +86,7 @@ def test_an_empty_scene_shows_no_arm(page, signal_arm, tmp_path):
 def test_a_live_page_follows(page, signal_arm):
     with View(signal_arm) as view:
         page.open(view.url)
-        for q in STATES:
+        for q in MAX_PANEL_MESSAGES:
             view.show(q)
             view.wait()
             picture = page.screenshot()
@@ -197,11 +197,11 @@ def test_a_lost_page_comes_back_with_the_latest_state(page, signal_arm):
         server = view._server
         for connected in tuple(server.pages):
             server._loop.call_soon_threadsafe(connected.close)
-        view.show(STATES[1])
+        view.show(MAX_PANEL_MESSAGES[1])
         page.until("!document.getElementById('banner').hidden")
         page.until("document.getElementById('banner').hidden")
         view.wait()
-        check_tool(page, page.screenshot(), signal_arm, STATES[1])
+        check_tool(page, page.screenshot(), signal_arm, MAX_PANEL_MESSAGES[1])
 
 
 def test_a_page_says_when_python_is_gone(page, signal_arm):
@@ -221,7 +221,7 @@ def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal
     page.resize(*size)
     page.scheme("dark" if dark else "light")
     view = View(signal_arm, frames=True)
-    view.play(([0, 1], [STATES[0], STATES[1]]))
+    view.play(([0, 1], [MAX_PANEL_MESSAGES[0], MAX_PANEL_MESSAGES[1]]))
     open_offline(page, view, tmp_path)
     page.press(" ")
     panels = page.evaluate(
@@ -250,7 +250,7 @@ def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal
 
 def test_the_whole_page_works_by_keyboard(page, signal_arm, tmp_path):
     view = View(signal_arm)
-    view.play(([0, 1], [STATES[0], STATES[1]]))
+    view.play(([0, 1], [MAX_PANEL_MESSAGES[0], MAX_PANEL_MESSAGES[1]]))
     open_offline(page, view, tmp_path)
     page.press("End")
     assert page.evaluate("dhkit.player.time") == 1
@@ -311,7 +311,7 @@ def test_a_large_cloud_is_all_in_view(page, signal_arm, tmp_path):
 
 
 def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
-    q = STATES[0]
+    q = MAX_PANEL_MESSAGES[0]
     ellipsoid = velocity_ellipsoid(signal_arm, q)
     view = View(signal_arm)
     view.show(q)
@@ -347,23 +347,23 @@ def check_copies(page, layer, transforms):
 
 def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(page, signal_arm):
     with View(signal_arm) as view:
-        view.show(STATES[0])
+        view.show(MAX_PANEL_MESSAGES[0])
         page.open(view.url)
-        view.ghosts([STATES[1], STATES[2]], BLUE)
+        view.ghosts([MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]], BLUE)
         view.wait()
-        check_copies(page, "ghosts", node_transforms(signal_arm, [STATES[1], STATES[2]]))
+        check_copies(page, "ghosts", node_transforms(signal_arm, [MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]]))
         picture = page.screenshot()
         assert shows_the_arm(picture)
-        check_tool(page, picture, signal_arm, STATES[0])
-        for q in (STATES[1], STATES[2]):  # a bluish ball where each ghost's tool is
+        check_tool(page, picture, signal_arm, MAX_PANEL_MESSAGES[0])
+        for q in (MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]):  # a bluish ball where each ghost's tool is
             x, y = projected(page, world_to_tool(signal_arm, q)[:3, 3]).astype(int)
             r, g, b = picture[y, x]
             assert b > r + 25
             assert b > g + 25
-        view.show(STATES[2])
+        view.show(MAX_PANEL_MESSAGES[2])
         view.ghosts(None)
         view.wait()
-        check_tool(page, page.screenshot(), signal_arm, STATES[2])
+        check_tool(page, page.screenshot(), signal_arm, MAX_PANEL_MESSAGES[2])
         assert page.evaluate("dhkit.stage.overlays.empty") is True
         assert page.errors == []
 
@@ -409,7 +409,7 @@ def test_a_simulation_plays_with_its_reference_as_a_ghost(page, signal_arm, tmp_
 def test_the_ghost_of_a_simulation_goes_with_it(page, signal_arm):
     with View(signal_arm) as view:
         page.open(view.url)
-        for replay in (lambda: view.play(([0, 1], STATES[:2])), lambda: view.show(STATES[0])):
+        for replay in (lambda: view.play(([0, 1], MAX_PANEL_MESSAGES[:2])), lambda: view.show(MAX_PANEL_MESSAGES[0])):
             view.play(apart(signal_arm))
             view.wait()
             assert page.evaluate("dhkit.stage.overlays.layers.companion.group.children.length") == 3
@@ -418,7 +418,7 @@ def test_the_ghost_of_a_simulation_goes_with_it(page, signal_arm):
             view.wait()
             assert page.evaluate("dhkit.stage.overlays.layers.companion.group.children.length") == 0
             assert page.evaluate("document.getElementById('overlays').hidden") is True
-        check_tool(page, page.screenshot(), signal_arm, STATES[0])
+        check_tool(page, page.screenshot(), signal_arm, MAX_PANEL_MESSAGES[0])
         assert page.errors == []
 
 

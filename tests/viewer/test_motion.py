@@ -1,4 +1,4 @@
-"""Laws of sampled motions."""
+"""Laws of motions that are sampled for a page."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dhkit.description import library_robot
-from dhkit.viewer.motion import MAX_FRAMES, MIN_FRAMES, check_motion, sampled
+from dhkit.viewer.motion import MAX_FRAMES, MIN_FRAMES, check_motion, resample
 
 ARM = library_robot("planar2r")
 ROUNDING = 1e-9  # times near 1e3 s, interpolated
@@ -18,7 +18,7 @@ def test_samples_lie_on_the_motion_with_its_ends(count, duration, seed):
     times = np.cumsum(rng.uniform(0.1, 1, count))
     times = 5.0 + duration * (times - times[0]) / (times[-1] - times[0])
     q = rng.uniform(-3, 3, (count, 2))
-    t, samples = sampled(times, q)
+    t, samples = resample(times, q)
     assert MIN_FRAMES <= len(t) <= MAX_FRAMES
     assert t[0] == 0
     assert t[-1] == pytest.approx(duration)

@@ -14,7 +14,7 @@ import pytest
 
 from dhkit.description import library_robot
 from dhkit.viewer import View, notebook
-from dhkit.viewer.protocol import decode_ghosts
+from viewer.messages import decode_ghosts
 from viewer.pictures import shows_the_arm
 
 FLOAT32 = 1e-6

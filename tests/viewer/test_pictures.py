@@ -8,7 +8,7 @@ from dhkit import Arm, robots
 from dhkit.control import PDGravity
 from dhkit.viewer import View
 from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs
-from dhkit.viewer.pictures import GROUND, Ghost, _rasterized, picture, pictures
+from dhkit.viewer.pictures import GROUND_COLOR, Ghost, _rasterize, picture, pictures
 from dhkit.viewer.scene import node_transforms
 
 
@@ -36,7 +36,7 @@ def test_each_pixel_has_the_color_of_the_nearest_triangle():
     rng = np.random.default_rng(4)
     corners = np.concatenate([rng.uniform(-8, 32, (12, 3, 2)), rng.uniform(1, 5, (12, 3, 1))], axis=2)
     colors, image = rng.integers(0, 255, (12, 3)).astype(float), np.full((20, 24, 3), 250, np.uint8)
-    assert np.array_equal(_rasterized(corners, colors, image), by_pixel(corners, colors, image))
+    assert np.array_equal(_rasterize(corners, colors, image), by_pixel(corners, colors, image))
 
 
 def test_neighbours_leave_no_gap_between_them():
@@ -44,7 +44,7 @@ def test_neighbours_leave_no_gap_between_them():
     corners = np.array(
         [[*points[0], 2], [*points[1], 2], [*points[2], 2], [*points[0], 2], [*points[2], 2], [*points[3], 2]]
     )
-    drawn = _rasterized(corners.reshape(2, 3, 3), np.zeros((2, 3)), np.full((20, 20, 3), 255, np.uint8))
+    drawn = _rasterize(corners.reshape(2, 3, 3), np.zeros((2, 3)), np.full((20, 20, 3), 255, np.uint8))
     for row in drawn[..., 0]:
         dark = np.flatnonzero(row == 0)
         assert len(dark) == 0 or len(dark) == dark[-1] - dark[0] + 1
@@ -53,7 +53,7 @@ def test_neighbours_leave_no_gap_between_them():
 @pytest.mark.parametrize("name", robots())
 def test_the_whole_arm_is_in_view_and_fills_it(name):
     image = np.asarray(picture(Arm.load(name).description, size=(200, 150), frames=True)).astype(int)
-    differs = np.abs(image - GROUND).max(axis=-1) > 60  # the grid differs by less
+    differs = np.abs(image - GROUND_COLOR).max(axis=-1) > 60  # the grid differs by less
     rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
     assert rows[0] > 0
     assert rows[-1] < 149
@@ -166,7 +166,7 @@ def test_a_view_is_drawn_with_its_ghosts_path_and_frames(tmp_path):
 def test_arms_of_every_size_are_drawn_and_fill_the_picture(length):
     arm = Arm.from_dh([[0, 0, length, 0], [0, 0, length, 0]])
     image = np.asarray(picture(arm.description, [0.3, 0.5], size=(120, 90))).astype(int)
-    differs = np.abs(image - GROUND).max(axis=-1) > 60
+    differs = np.abs(image - GROUND_COLOR).max(axis=-1) > 60
     assert np.ptp(np.flatnonzero(differs.any(axis=0))) > 40
 
 
@@ -178,7 +178,7 @@ def test_many_large_triangles_behind_each_other_take_no_memory():
     colors = np.zeros((60, 3))
     colors[-1] = 200
     tracemalloc.start()
-    drawn = _rasterized(corners, colors, np.zeros((900, 1200, 3), np.uint8))
+    drawn = _rasterize(corners, colors, np.zeros((900, 1200, 3), np.uint8))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 1e9  # all at once would need 4e9

@@ -11,10 +11,11 @@ from hypothesis.extra.numpy import arrays
 from dhkit.description import library_robot
 from dhkit.model.shapes import link_parts
 from dhkit.viewer import protocol
-from dhkit.viewer.protocol import MessageType, ProtocolError
+from dhkit.viewer.protocol import MAX_SAMPLE_NUMBERS, MessageType, ProtocolError, Samples, encode_state
 from dhkit.viewer.requests import Request, Shown, decode_message
 from dhkit.viewer.scene import build_scene
-from dhkit.viewer.streams import MOST_FLOATS, Samples, decode_samples, decode_state, encode_state
+from viewer import messages
+from viewer.messages import decode_samples, decode_state
 
 number = st.floats(-1e3, 1e3, width=32)
 joints = st.integers(1, 9)
@@ -28,10 +29,10 @@ def drawn(draw, *shape):
 def test_a_pose_comes_back(data, n, time):
     q, T = drawn(data.draw, n), drawn(data.draw, n + 2, 4, 4)
     message = protocol.encode_pose(q, T, time)
-    pose = protocol.decode_pose(message)
+    pose = messages.decode_pose(message)
     assert np.array_equal(pose.q, q)
     assert np.array_equal(pose.transforms, T[:, :3])
-    header = protocol.decode_header(message)
+    header = messages.decode_header(message)
     assert (header.type, header.joints, header.sequence, header.time) == (MessageType.POSE, n, 0, time)
 
 
@@ -41,7 +42,7 @@ def test_an_animation_comes_back(data, n, count, trace, accompanied):
     q, T = drawn(data.draw, count, n), drawn(data.draw, count, n + 2, 4, 4)
     ghost = (drawn(data.draw, count, n + 2, 4, 4), np.array([1, 2, 3], dtype=np.uint8)) if accompanied else None
     message = protocol.encode_animation(times, q, T, trace=trace, ghost=ghost)
-    back = protocol.decode_animation(message)
+    back = messages.decode_animation(message)
     assert (back.ghost is not None) == accompanied
     if ghost is not None:
         assert np.array_equal(back.ghost, ghost[0][:, :, :3])
@@ -55,13 +56,13 @@ def test_an_animation_comes_back(data, n, count, trace, accompanied):
 @given(st.data(), st.integers(0, 20))
 def test_a_trace_comes_back(data, count):
     points = drawn(data.draw, count, 3)
-    assert np.array_equal(protocol.decode_trace(protocol.encode_trace(points)), points)
+    assert np.array_equal(messages.decode_trace(protocol.encode_trace(points)), points)
 
 
 @given(st.data(), st.integers(0, 20))
 def test_points_come_back(data, count):
     points, colors = drawn(data.draw, count, 3), data.draw(arrays(np.uint8, (count, 3)))
-    cloud = protocol.decode_points(protocol.encode_points(points, colors))
+    cloud = messages.decode_points(protocol.encode_points(points, colors))
     assert np.array_equal(cloud.points, points)
     assert np.array_equal(cloud.colors, colors)
 
@@ -69,13 +70,13 @@ def test_points_come_back(data, count):
 @given(st.data(), st.integers(0, 5))
 def test_ellipsoids_come_back(data, count):
     T = drawn(data.draw, count, 4, 4)
-    assert np.array_equal(protocol.decode_ellipsoids(protocol.encode_ellipsoids(T)), T[:, :3])
+    assert np.array_equal(messages.decode_ellipsoids(protocol.encode_ellipsoids(T)), T[:, :3])
 
 
 @given(st.data(), joints, st.integers(0, 8))
 def test_ghosts_come_back(data, n, count):
     T, tints = drawn(data.draw, count, n + 2, 4, 4), data.draw(arrays(np.uint8, (count, 3)))
-    ghosts = protocol.decode_ghosts(protocol.encode_ghosts(T, tints))
+    ghosts = messages.decode_ghosts(protocol.encode_ghosts(T, tints))
     assert np.array_equal(ghosts.transforms, T[:, :, :3])
     assert np.array_equal(ghosts.tints, tints)
 
@@ -83,7 +84,7 @@ def test_ghosts_come_back(data, n, count):
 @given(st.data(), st.integers(0, 5))
 def test_obstacles_come_back(data, count):
     T, half_edges, radii = drawn(data.draw, count, 4, 4), drawn(data.draw, count, 3), drawn(data.draw, count)
-    back = protocol.decode_obstacles(protocol.encode_obstacles(T, half_edges, radii))
+    back = messages.decode_obstacles(protocol.encode_obstacles(T, half_edges, radii))
     assert np.array_equal(back.transforms, T[:, :3])
     assert np.array_equal(back.half_edges, half_edges)
     assert np.array_equal(back.radii, radii)
@@ -93,7 +94,7 @@ def test_obstacles_come_back(data, count):
 def test_a_scene_comes_back(name):
     arm = library_robot(name)
     scene = build_scene(arm, link_parts(arm))
-    about, commands = protocol.decode_scene(protocol.encode_scene(scene))
+    about, commands = messages.decode_scene(protocol.encode_scene(scene))
     assert about == scene.about
     assert [c["path"] for c in commands] == [c["path"] for c in scene.commands]
     assert commands == list(scene.commands)
@@ -103,7 +104,7 @@ def test_a_scene_comes_back(name):
 def test_a_stamp_changes_the_sequence_only(sequence, visible):
     message = protocol.encode_frames(visible)
     stamped = protocol.stamped(message, sequence)
-    header = protocol.decode_header(stamped)
+    header = messages.decode_header(stamped)
     assert header.sequence == sequence % 2**32
     assert header.flags == visible
     assert protocol.stamped(stamped, 0) == message
@@ -117,14 +118,14 @@ def test_a_pose_of_a_six_axis_arm_is_small():
 @given(st.binary(max_size=40))
 def test_foreign_bytes_are_refused_or_a_header(content):
     try:
-        assert protocol.decode_header(content).type in MessageType
+        assert messages.decode_header(content).type in MessageType
     except ProtocolError:
         assert len(content) < 16 or content[0] not in list(MessageType)
 
 
 def test_a_message_of_another_kind_is_named():
     with pytest.raises(ProtocolError, match="message type is FRAMES; expected POSE"):
-        protocol.decode_pose(protocol.encode_frames(True))
+        messages.decode_pose(protocol.encode_frames(True))
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -173,7 +174,7 @@ def test_requests_states_and_samples_come_back():
     found = decode_samples(both.encoded())
     assert (found.name, found.columns, found.restart, found.rows.shape) == ("control", ("t", "e1"), True, (4, 2))
     assert np.array_equal(found.rows, both.rows)
-    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((MOST_FLOATS, 2), np.float32)))
-    assert many.rows.size == MOST_FLOATS
+    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((MAX_SAMPLE_NUMBERS, 2), np.float32)))
+    assert many.rows.size == MAX_SAMPLE_NUMBERS
     anew = both.followed_by(Samples("control", ("t", "e1", "e2"), np.zeros((1, 3), np.float32)))
     assert anew.restart and anew.rows.shape == (1, 3)

@@ -13,9 +13,10 @@ from tornado.websocket import websocket_connect
 
 from dhkit.errors import ModelError
 from dhkit.viewer.page import MODULES
-from dhkit.viewer.protocol import decode_header, encode_frames
+from dhkit.viewer.protocol import encode_frames
 from dhkit.viewer.server import ViewerServer
 from dhkit.viewer.session import Slot
+from viewer.messages import decode_header
 
 CONNECTIONS = 200
 PATIENCE = 10.0

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dhkit.viewer.session import OF_ONE_ARM, STATES, Session, Slot
+from dhkit.viewer.session import MAX_PANEL_MESSAGES, OF_ONE_ARM, Session, Slot
 
 PANELS = [Slot.PANELS + k for k in range(20)]
 SLOTS = [*(slot for slot in Slot if slot < Slot.PANELS), *PANELS]
@@ -22,7 +22,7 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
             slot, sequence = sent[message]
             lane = under_way["panel shown" if slot in PANELS else "picture shown"]
             lane.append(sequence)
-            assert len(lane) <= (STATES if slot in PANELS else 1)
+            assert len(lane) <= (MAX_PANEL_MESSAGES if slot in PANELS else 1)
             if slot == Slot.SCENE:
                 for other in OF_ONE_ARM:
                     page.pop(other, None)
@@ -31,7 +31,7 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
     pump()
     for sequence, step in enumerate(steps, start=100):
         if isinstance(step, str):
-            session.shown(under_way[step].pop(0) if under_way[step] else 0)
+            session.acknowledge(under_way[step].pop(0) if under_way[step] else 0)
         else:
             message = b"%d" % sequence
             if step == Slot.SCENE:
@@ -42,7 +42,7 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
         pump()
     while any(under_way.values()):
         for lane in under_way.values():
-            session.shown(lane.pop(0) if lane else 0)
+            session.acknowledge(lane.pop(0) if lane else 0)
         pump()
     assert session.settled
     assert page == {slot: message for slot, (_, message) in latest.items()}
@@ -53,12 +53,12 @@ def test_a_new_page_gets_the_scene_first():
     order = []
     while (message := session.next()) is not None:
         order.append(message)
-        session.shown({b"pose": 1, b"scene": 2, b"frames": 3}[message])
+        session.acknowledge({b"pose": 1, b"scene": 2, b"frames": 3}[message])
     assert order == [b"scene", b"frames", b"pose"]
 
 
 def test_an_acknowledgement_of_something_else_frees_nothing():
     session = Session({Slot.SCENE: (5, b"scene"), Slot.MOTION: (6, b"pose")})
     assert session.next() == b"scene"
-    session.shown(6)
+    session.acknowledge(6)
     assert session.next() is None

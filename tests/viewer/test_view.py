@@ -12,7 +12,10 @@ from dhkit.errors import DescriptionError, ModelError
 from dhkit.kinematics.manipulability import force_ellipsoid, velocity_ellipsoid
 from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
-from dhkit.viewer.protocol import (
+from dhkit.viewer.scene import node_transforms, scene_size
+from dhkit.viewer.session import Slot
+from simulation_results import swinging
+from viewer.messages import (
     decode_animation,
     decode_ellipsoids,
     decode_ghosts,
@@ -21,9 +24,6 @@ from dhkit.viewer.protocol import (
     decode_pose,
     decode_trace,
 )
-from dhkit.viewer.scene import node_transforms, scene_size
-from dhkit.viewer.session import Slot
-from simulation_results import swinging
 
 FLOAT32 = 1e-6
 TABLE_DRAWN = 1_500_000  # bytes

@@ -16,7 +16,7 @@ from dhkit.cli import analysis_commands, motion_commands, robot_commands
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import ReaderGone, say
 from dhkit.cli.streams import accept_every_letter
-from dhkit.description.joint_words import DEGREES
+from dhkit.description.joint_text import DEGREES
 from dhkit.errors import DhkitError
 
 MAX_WORD_LENGTH, MAX_MESSAGE_LENGTH = 120, 600

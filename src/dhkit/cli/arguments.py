@@ -13,7 +13,7 @@ from typer.core import TyperCommand
 
 from dhkit.arm import Arm
 from dhkit.description import Array, check_pose, pose
-from dhkit.description.joint_words import degrees_hint, joint_words, outside_words
+from dhkit.description.joint_text import degrees_hint, joint_text, violated_limit_text
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 
@@ -90,12 +90,12 @@ def _told(arm: Arm, q: Array, what: str, outside: str) -> Array:
     numbers = arm.description.numbers
     for i, joint in enumerate(arm.description.joints):
         slides = not joint.is_revolute
-        beyond = outside_words(q[i], numbers.lower[i], numbers.upper[i], slides=slides)
+        beyond = violated_limit_text(q[i], numbers.lower[i], numbers.upper[i], slides=slides)
         hint = degrees_hint(q[i], slides=slides)
         if beyond and outside == "refused":
             break
         if (beyond and outside == "told") or hint:
-            words = beyond or f"{joint_words(q[i], slides=slides)}{hint}"
+            words = beyond or f"{joint_text(q[i], slides=slides)}{hint}"
             sys.stderr.write(f"dhkit: warning: {what}: {joint.name} is {words}\n")
             break
     return q
@@ -137,19 +137,19 @@ def objective(text: str) -> Objective:
     >>> str(objective("time + 1e-4 effort"))
     '1 time + 0.0001 effort'
     """
-    from dhkit.planning.objectives import NAMED, Objective
+    from dhkit.planning.objectives import OBJECTIVES, Objective
 
     terms = []
     for term in PLUS.split(text):
         words = term.replace("*", " ").split()
-        if not words or words[-1] not in NAMED:
+        if not words or words[-1] not in OBJECTIVES:
             raise DescriptionError(
-                f"--objective: found {term.strip()!r}; expected {', '.join(NAMED)}, or a sum of them"
+                f"--objective: found {term.strip()!r}; expected {', '.join(OBJECTIVES)}, or a sum of them"
             )
         factor = float(numbers(words[:-1], "--objective", [1])[0]) if words[1:] else 1.0
         if factor <= 0:
             raise DescriptionError(f"--objective: found {term.strip()!r}; expected a positive factor")
-        terms.append(factor * NAMED[words[-1]])
+        terms.append(factor * OBJECTIVES[words[-1]])
     return Objective(tuple(terms))
 
 

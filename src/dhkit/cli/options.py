@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from dhkit.arm import Arm
-from dhkit.description.joint_words import DEGREES
+from dhkit.description.joint_text import DEGREES
 
 Robot = Annotated[
     str, typer.Argument(help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP.")

@@ -14,7 +14,7 @@ from dhkit.cli.arguments import columns, joint_values, numbers
 from dhkit.cli.quickest import ends
 from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, make_controller
 from dhkit.description import Array, Payload
-from dhkit.description.joint_words import joint_words
+from dhkit.description.joint_text import joint_text
 from dhkit.dynamics import Friction
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, read_motion
@@ -114,7 +114,7 @@ def _name_of(arm: Arm, q: Array) -> str:
     known = {"zero": np.zeros(arm.n)} | dict(arm.configurations)
     found = next((name for name, values in known.items() if np.array_equal(values, q)), None)
     slides = arm.description.numbers.prismatic.tolist()
-    return found or "(" + ", ".join(joint_words(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
+    return found or "(" + ", ".join(joint_text(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
 
 
 def _has_limits(arm: Arm) -> bool:

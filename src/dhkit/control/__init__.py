@@ -1,4 +1,4 @@
-"""Simulation and controllers: an arm as a plant, what drives it, and what becomes of it."""
+"""Simulation and controllers: plants, controllers, references, sensors and results."""
 
 from dhkit.control.adaptive import Adaptive
 from dhkit.control.batch import simulate_batch

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.gains import effective_inertia, gain, positive, told
+from dhkit.control.gains import effective_inertia, gain, gains_text, positive
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Description, Robot, description_of, require_bodies
 from dhkit.description.arrays import number_array
@@ -16,8 +16,8 @@ from dhkit.dynamics import inertial_parameters, mass_matrix, parameter_grouping,
 from dhkit.errors import DescriptionError
 from dhkit.verification import random_motions
 
-STATES = 2000
-"""Random motions over which the regressor's square is averaged for the default adaptation gains."""
+RANDOM_STATES = 2000
+"""Number of random motions over which the squared regressor is averaged for the default adaptation gains."""
 
 
 class Adaptive:
@@ -45,19 +45,19 @@ class Adaptive:
     adaptation
         Gamma, in units of p squared over J: a positive number, the diagonal (m,), or a positive definite matrix (m, m).
     estimate
-        p at the start, shape (m,).
+        p at the start, shape (m,), in SI units of the base parameters.
     masses
-        Without ``estimate``, the estimate starts from the arm's own parameters times this factor.
+        Factor of the arm's own parameters from which the estimate starts, if ``estimate`` is not given.
 
     Attributes
     ----------
     estimate
-        p now, shape (m,).
+        Current p, shape (m,).
 
     Raises
     ------
     ValueError
-        A gain that is negative or not finite, or Gamma not positive definite; an estimate of another shape.
+        A gain that is negative or not finite, a Gamma that is not positive definite, an estimate of another shape.
     TypeError
         No arm, or what is no numbers.
     DescriptionError
@@ -67,7 +67,7 @@ class Adaptive:
     estimate: Array
 
     batches = False
-    """It takes the states of one arm, not those of a batch."""
+    """False: the controller takes the state of one arm, not states of a batch."""
 
     def __init__(
         self,
@@ -85,12 +85,12 @@ class Adaptive:
         self.decay, self.kd = gain(decay, "decay", n), gain(kd, "kd", n)
         grouping = parameter_grouping(self.description)
         self._columns = list(grouping.columns)
-        self.adaptation = _adaptation(adaptation, len(grouping))
+        self.adaptation = _adaptation_gains(adaptation, len(grouping))
         if estimate is None:
             own = grouping.matrix @ inertial_parameters(self.description)
             self._start: Array = positive(masses, "masses") * own
         else:
-            self._start = _estimate(estimate, len(grouping))
+            self._start = _first_estimate(estimate, len(grouping))
         self.reset()
 
     @classmethod
@@ -120,7 +120,8 @@ class Adaptive:
         adaptation
             a, 1/s.
         q
-            Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
+            Joint values at which the effective inertias are computed, shape (n,); their average over random
+            configurations inside the limits unless given.
         estimate, masses
             As for the class.
 
@@ -150,7 +151,7 @@ class Adaptive:
         self._rate: Array = np.zeros_like(self.estimate)
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,), and keep the estimate's rate until the next call."""
+        """Return the torques, shape (n,), N m and N, and store the estimate's rate for the next call."""
         Y, known, s = self._terms(q, qd, setpoint)
         rate = self.adaptation @ (Y.T @ s)
         if self._time is not None:
@@ -160,11 +161,11 @@ class Adaptive:
         return tau
 
     def initial_state(self, q: Array | None = None) -> Array:
-        """Return the estimate at the start, shape (m,), wherever the arm is."""
+        """Return the estimate at the start, shape (m,), which does not depend on q."""
         return self._start.copy()
 
     def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
-        """Return the torques, shape (n,), and the estimate's rate, shape (m,), for an estimate ``state`` (m,)."""
+        """Return the torques, shape (n,), and the rate of the estimate, shape (m,), at an estimate ``state`` (m,)."""
         Y, known, s = self._terms(q, qd, setpoint)
         return Y @ state + known, self.adaptation @ (Y.T @ s)
 
@@ -174,11 +175,11 @@ class Adaptive:
         Parameters
         ----------
         q, qd
-            The state, shape (n,).
+            Joint values and rates, shape (n,), rad, m and per second.
         setpoint
-            What is asked for there.
+            The setpoint at that time.
         estimate, true
-            p and p*, shape (m,). M is that of the controller's arm, which is to be the true one.
+            p and p*, shape (m,). M is that of the controller's arm, which has to be the true arm.
         """
         _, s = self._reference(q, qd, setpoint)
         wrong = estimate - true
@@ -186,8 +187,8 @@ class Adaptive:
         return float(s @ M @ s + wrong @ np.linalg.solve(self.adaptation, wrong)) / 2
 
     def __repr__(self) -> str:
-        said = f"{counted(len(self.estimate), 'parameter')}, {told(decay=self.decay, kd=self.kd)}"
-        return repr_line(type(self).__name__, self.description.name, said)
+        text = f"{counted(len(self.estimate), 'parameter')}, {gains_text(decay=self.decay, kd=self.kd)}"
+        return repr_line(type(self).__name__, self.description.name, text)
 
     def _reference(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array]:
         """Return qd_r and s."""
@@ -195,7 +196,7 @@ class Adaptive:
         return qd_r, qd_r - qd
 
     def _terms(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array, Array]:
-        """Return Y in base parameters, the torques that need no estimate, and s."""
+        """Return Y in base parameters, the torques that do not depend on the estimate, and s."""
         qd_r, s = self._reference(q, qd, setpoint)
         qdd_r = setpoint.qdd + self.decay * (setpoint.qd - qd)
         Y = velocity_regressor(self.description, q, qd, qd_r, qdd_r)[:, self._columns]
@@ -204,17 +205,17 @@ class Adaptive:
 
 def _inverse_excitation(description: Description, kd: Array) -> Array:
     """Return <Y^T K_D^-1 Y>^-1 over random motions, shape (m, m)."""
-    q, qd, qdd = random_motions(description, STATES)
+    q, qd, qdd = random_motions(description, RANDOM_STATES)
     Y = velocity_regressor(description, q, qd, qd, qdd)[..., list(parameter_grouping(description).columns)]
     rows = (Y / np.sqrt(kd)[:, None]).reshape(-1, Y.shape[-1]) / np.sqrt(len(q))
-    # By QR, with columns of unit length: squaring first would square the condition as well.
+    # By QR with columns of unit length: forming the square first would square the condition number.
     size = np.linalg.norm(rows, axis=0)
     inverse = np.linalg.inv(np.linalg.qr(rows / size, mode="r")) / size[:, None]
     product: Array = inverse @ inverse.T
     return (product + product.T) / 2
 
 
-def _adaptation(value: ArrayLike, m: int) -> Array:
+def _adaptation_gains(value: ArrayLike, m: int) -> Array:
     array = number_array(value, "adaptation", "a number, (m,) or (m, m)")
     if array.shape not in ((), (m,), (m, m)) or not np.isfinite(array).all():
         raise ValueError(f"adaptation has shape {array.shape}; expected a number, ({m},) or ({m}, {m}), finite")
@@ -224,7 +225,7 @@ def _adaptation(value: ArrayLike, m: int) -> Array:
     return matrix.copy()
 
 
-def _estimate(value: ArrayLike, m: int) -> Array:
+def _first_estimate(value: ArrayLike, m: int) -> Array:
     array = number_array(value, "estimate", f"({m},)")
     if array.shape != (m,) or not np.isfinite(array).all():
         raise ValueError(f"estimate has shape {array.shape}; expected ({m},) finite base parameters")

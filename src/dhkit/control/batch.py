@@ -23,8 +23,8 @@ from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
 
 KEEP = ("final", "errors", "all")
-MOST_BYTES = 4_000_000_000
-"""Of all states of a batch that are kept."""
+MAX_STORED_BYTES = 4_000_000_000
+"""Largest size of the states that a batch stores with ``keep="all"``, bytes."""
 
 
 @takes_robot
@@ -63,17 +63,18 @@ def simulate_batch(
     reference
         As for :func:`simulate`, one for all; or joint values (B, n) to hold. None holds ``q0``.
     q0, qd0
-        Where the runs begin, shape (n,) or (B, n).
+        Joint values and rates at the start, shape (n,) or (B, n), rad, m and per second.
     arms
-        What moves: one for all, or one for each run (payloads, parameters); the robot unless given.
+        The arms that move: one for all runs, or one for each run (payloads, parameters); the robot unless given.
     duration, rate, plant_rate, sensors, saturation
         As for :func:`simulate`.
     friction
-        None or False for none; of a width above 0.
+        Friction model of all arms, of a width above 0 (smooth); None or False for none.
     keep
-        ``"final"``: last states; ``"errors"``: and norms of errors; ``"all"``: and all states, at most 4 GB.
+        What is stored. ``"final"``: the last states; ``"errors"``: norms of the errors as well; ``"all"``: all
+        states as well, at most 4 GB.
     threads
-        How many threads share the step of a large batch.
+        Number of threads that share a large batch.
     progress
         Called after every thousand steps; an exception in it ends the run.
 
@@ -105,9 +106,9 @@ def simulate_batch(
             raise ValueError(f"a plant has joints {arm.kinds}; expected {description.kinds}")
     n = description.n
     if isinstance(reference, Trajectory | Reference):
-        wanted = reference_of(description, reference)
-        t = row_times(wanted.duration, duration, rate)
-        asked = sampled_reference(description, wanted, t)
+        followed = reference_of(description, reference)
+        t = row_times(followed.duration, duration, rate)
+        setpoints = sampled_reference(description, followed, t)
     else:
         given, name = (q0, "q0") if reference is None else (reference, "reference")
         array = np.asarray(0.0 if given is None else given)
@@ -115,33 +116,37 @@ def simulate_batch(
             raise ValueError(f"{name} looks like a pose of the tool; a batch holds joint values, ({n},) or (B, {n})")
         held = _states(description, given, np.zeros(n), name)
         t = row_times(None, duration, rate)
-        asked = held[None], np.zeros((1, *held.shape)), np.zeros((1, *held.shape))
-    q, qd = _states(description, q0, asked[0][0], "q0"), _states(description, qd0, asked[1][0], "qd0")
-    size = _size(q, qd, asked[0][0], np.empty((len(moving), n)), np.empty((*getattr(controller, "batch_shape", ()), n)))
-    if keep == "all" and (needed := 4 * 8 * size * len(t) * n) > MOST_BYTES:
-        raise ValueError(f"all states are {needed / 1e9:.3g} GB; expected at most {MOST_BYTES / 1e9:g} GB")
+        setpoints = held[None], np.zeros((1, *held.shape)), np.zeros((1, *held.shape))
+    q, qd = _states(description, q0, setpoints[0][0], "q0"), _states(description, qd0, setpoints[1][0], "qd0")
+    size = _size(
+        q, qd, setpoints[0][0], np.empty((len(moving), n)), np.empty((*getattr(controller, "batch_shape", ()), n))
+    )
+    if keep == "all" and (needed := 4 * 8 * size * len(t) * n) > MAX_STORED_BYTES:
+        raise ValueError(f"all states are {needed / 1e9:.3g} GB; expected at most {MAX_STORED_BYTES / 1e9:g} GB")
     stiffness = max(Plant(arm, friction, None).stiffness for arm in {id(arm): arm for arm in moving}.values())
     steps = substeps(stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
     effort = np.stack([arm.numbers.effort for arm in moving])
-    if len(asked[0]) == 1:
-        asked = _filled(asked[0][0], size)[None], np.zeros((1, size, n)), np.zeros((1, size, n))
-    for array in asked:
+    if len(setpoints[0]) == 1:
+        setpoints = _rows(setpoints[0][0], size)[None], np.zeros((1, size, n)), np.zeros((1, size, n))
+    for array in setpoints:
         array.flags.writeable = False
-    most = effort if saturation else np.full((1, n), np.inf)
+    effort_limits = effort if saturation else np.full((1, n), np.inf)
     law = law_of(controller) if sensors is None else None
     run = BatchRun(
         description=description,
         controller=controller,
         t=t,
-        reference=asked,
+        reference=setpoints,
         open_step=StepKernel.open(moving, friction, 1 / rate / steps),
-        closed_step=None if law is None else closed_step(moving, friction, 1 / rate / steps, law, most, asked),
+        closed_step=None
+        if law is None
+        else closed_step(moving, friction, 1 / rate / steps, law, effort_limits, setpoints),
         substeps=steps,
-        most=most,
-        measuring=None if sensors is None else sensors.started(n, 1 / rate),
+        effort_limits=effort_limits,
+        measuring=None if sensors is None else sensors.start(n, 1 / rate),
         measured=keep != "final",
     )
-    record = Record.empty(_filled(q, size), _filled(qd, size), len(t) if keep == "all" else 0)
+    record = Record.empty(_rows(q, size), _rows(qd, size), len(t) if keep == "all" else 0)
     reset(controller)
     run(record, threads, progress)
     return _result(run, record, moving, friction, keep)
@@ -152,7 +157,7 @@ def _result(
 ) -> BatchResult:
     size, n = record.q.shape
     steps = len(run.t)
-    wanted = [np.broadcast_to(_by_run(x), (size, steps, n)) for x in run.reference[:2]]
+    reference = [np.broadcast_to(_with_batch_axis(x), (size, steps, n)) for x in run.reference[:2]]
     norms = keep != "final"
     lower, upper = (np.stack([getattr(arm.numbers, name) for arm in arms]) for name in ("lower", "upper"))
     return BatchResult(
@@ -166,15 +171,15 @@ def _result(
         final_error=run.reference[0][-1] - record.q,
         peak_error=record.peak if norms else None,
         rms_error=np.sqrt(record.squares / steps) if norms else None,
-        saturated=record.cut / steps if norms else None,
+        saturated=record.saturated_steps / steps if norms else None,
         outside=np.any(~((record.lowest >= lower) & (record.highest <= upper)), axis=1) if norms else None,
         works=record.works,
-        history=History(*record.rows, *wanted) if keep == "all" else None,
+        history=History(*record.rows, *reference) if keep == "all" else None,
     )
 
 
-def _by_run(reference: Array) -> Array:
-    """Return a reference with the batch's axis before the one of time: (1, N, n) or (B, 1, n)."""
+def _with_batch_axis(reference: Array) -> Array:
+    """Return a reference with the axis of the batch before that of time: shape (1, N, n) or (B, 1, n)."""
     return reference[None] if reference.ndim == 2 else reference.transpose(1, 0, 2)
 
 
@@ -189,8 +194,8 @@ def _states(description: Description, given: ArrayLike | None, default: Array, n
     return states
 
 
-def _filled(array: Array, size: int) -> Array:
-    """Return an array (n,) or (B, n) as (B, n): sums of two whole arrays take a fifth of the time of broadcast ones."""
+def _rows(array: Array, size: int) -> Array:
+    """Return an array (n,) or (B, n) as a contiguous (B, n): sums take a fifth of the time of broadcast ones."""
     return np.array(np.broadcast_to(array, (size, array.shape[-1])), order="C")
 
 

@@ -1,4 +1,4 @@
-"""What a batch of simulations found, one row for each arm."""
+"""Results of a batch of simulations, one row for each run."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from dhkit.control.result import EnergyAudit, SimulationResult
 from dhkit.description import Array, Description, write_atomically
-from dhkit.description.joint_words import joint_unit
+from dhkit.description.joint_text import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.dynamics import Friction, forward_dynamics, kinetic_energy, potential_energy
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """All states of a batch: arrays (B, N+1, n), in units of the joints."""
+    """All states of a batch: arrays of shape (B, N+1, n), rad and m, per second, N m and N."""
 
     q: Array
     qd: Array
     tau: Array
     tau_asked: Array
     reference_q: Array
-    """Broadcast over the batch."""
+    """Joint values of the reference, broadcast over the batch, shape (B, N+1, n)."""
     reference_qd: Array
 
     def __repr__(self) -> str:
@@ -37,46 +37,46 @@ class BatchResult:
     """B simulated runs of N steps. Arms whose state became NaN stay NaN; the others do not feel it."""
 
     arms: tuple[Description, ...]
-    """One that moved in all runs, or one for each."""
+    """The arm that moved in all runs, or one arm for each run."""
     friction: Friction | None
     t: Array
     """Times of the states, shape (N+1,), s."""
     q0: Array
-    """Where the runs began, shape (B, n), rad and m."""
+    """Joint values at the start, shape (B, n), rad and m."""
     qd0: Array
     q: Array
-    """The last states, shape (B, n)."""
+    """Joint values at the end, shape (B, n), rad and m."""
     qd: Array
     final_error: Array
-    """The reference less the joint values at the end, shape (B, n)."""
+    """Reference minus joint values at the end, shape (B, n), rad and m."""
     peak_error: Array | None
-    """The largest error of each joint, shape (B, n); None with ``keep="final"``."""
+    """Largest absolute error of each joint, shape (B, n), rad and m; None with ``keep="final"``."""
     rms_error: Array | None
-    """The root of the mean squared error, likewise."""
+    """Root mean square error of each joint, shape (B, n), rad and m; None with ``keep="final"``."""
     saturated: Array | None
-    """Of each joint the share of steps in which its drive could not give what was asked, likewise."""
+    """Share of steps in which a joint's drive was at its limit, shape (B, n), 0 to 1; None with ``keep="final"``."""
     outside: NDArray[np.bool_] | None
-    """Which arms were beyond a joint limit in some state, shape (B,): a batch has no stops; likewise."""
+    """Runs that passed a joint limit in some state, shape (B,): a batch has no stops. None with ``keep="final"``."""
     works: Array
-    """What the drives did, the same counted without its sign, and what friction took, shape (B, 3), J."""
+    """Work of the drives, the integral of its absolute power, and work lost to friction, shape (B, 3), J."""
     history: History | None = None
-    """Only with ``keep="all"``."""
+    """All states; None unless ``keep="all"``."""
 
     def __len__(self) -> int:
         return len(self.q)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """Which runs ended in a state that is not finite, shape (B,)."""
+        """Whether a run ended in a state that is not finite, shape (B,)."""
         failed: NDArray[np.bool_] = np.any(~np.isfinite(self.q) | ~np.isfinite(self.qd), axis=1)
         return failed
 
     def arm(self, index: int) -> Description:
-        """Return the arm that moved in a run."""
+        """Return the arm of one run."""
         return self.arms[0] if len(self.arms) == 1 else self.arms[index]
 
     def audit(self, index: int) -> EnergyAudit:
-        """Return where the energy of a run went."""
+        """Return the energy balance of one run."""
         arm = self.arm(index)
         q, qd = (np.stack([first[index], last[index]]) for first, last in ((self.q0, self.q), (self.qd0, self.qd)))
         kinetic = kinetic_energy(arm, q, qd)
@@ -149,7 +149,7 @@ class BatchResult:
         said, unit = [self._span], joint_unit(self.arms[0].numbers.prismatic)
         if self.peak_error is not None:
             said.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
-        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*said, *self._odd]))
+        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*said, *self._remarks]))
 
     def _repr_html_(self) -> str:
         known = {"peak error": self.peak_error, "RMS": self.rms_error, "at the end": self.final_error}
@@ -163,7 +163,7 @@ class BatchResult:
             for i, joint in enumerate(self.arms[0].joints)
         ]
         headings, align = ("joint", *columns, ""), "l" + "r" * len(columns) + "l"
-        title = f"{len(self)} x {self.arms[0].name}: {', '.join([self._span, *self._odd])}"
+        title = f"{len(self)} x {self.arms[0].name}: {', '.join([self._span, *self._remarks])}"
         return html_block(title, html_table(headings, rows, "Largest of all runs that did not fail", align))
 
     @property
@@ -171,8 +171,8 @@ class BatchResult:
         return f"{self.t[-1]:g} s in {counted(len(self.t) - 1, 'step')}"
 
     @property
-    def _odd(self) -> list[str]:
-        """How many runs failed, or left their limits, where some did."""
+    def _remarks(self) -> list[str]:
+        """Numbers of runs that failed or passed their limits, as texts; those that are 0 are left out."""
         outside = 0 if self.outside is None else int(self.outside.sum())
         counts = {"failed": int(self.failed.sum()), "outside their limits": outside}
         return [f"{count} {what}" for what, count in counts.items() if count]

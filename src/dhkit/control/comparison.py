@@ -1,4 +1,4 @@
-"""All controllers by name, tuned alike, and compared on one motion."""
+"""Controllers by name, tuned alike and compared on one motion."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from dhkit.control.result import SimulationResult
 from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
 from dhkit.description import Array, Description, takes_robot
-from dhkit.description.joint_words import joint_unit
+from dhkit.description.joint_text import joint_unit
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError
 from dhkit.trajectories import Trajectory
 
 STYLES = ("text", "markdown", "latex")
 LARGE = 10.0
-"""mm: from here on the tool's error is printed whole."""
+"""Position error of the tool (mm) from which it is printed without decimals."""
 Tuned = Callable[[Description, float, float, Array], Controller]
 CONTROLLERS: Mapping[str, Tuned] = {
     "pd": lambda arm, w, z, q: PID.tuned(arm, w, z, integral=0.0),
@@ -40,25 +40,25 @@ CONTROLLERS: Mapping[str, Tuned] = {
     "adaptive": lambda arm, w, z, q: Adaptive.tuned(arm, w, max(z, 1.0)),
     "lqr": lambda arm, w, z, q: LQR(arm, q),
 }
-"""By name: of a robot, a bandwidth (rad/s), a damping, and where it is linearized, shape (n,)."""
+"""Constructors by name: functions of a robot, a bandwidth (rad/s), a damping, and joint values (n,) for the LQR."""
 
 
 def make_controller(
     name: str, description: Description, bandwidth: float = 20.0, damping: float = 1.0, q: Array | None = None
 ) -> Controller:
-    """Return a controller by its name, tuned.
+    """Return a tuned controller by its name.
 
     Parameters
     ----------
     name
         One of ``CONTROLLERS``.
     description
-        The robot that it knows.
+        The robot that the controller knows.
     bandwidth, damping
-        rad/s, and a number: as for the controllers' ``tuned``. Of an adaptive controller the damping is 1 at least; an
-        LQR follows from its default weights alone.
+        Bandwidth, rad/s, and damping ratio, as for the controllers' ``tuned``. An adaptive controller has a damping of
+        at least 1; an LQR ignores both and has its default weights.
     q
-        Where an LQR is linearized, shape (n,); zero unless given.
+        Joint values at which an LQR is linearized, shape (n,), rad and m; zero unless given.
 
     Raises
     ------
@@ -76,12 +76,12 @@ def _require_known(name: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What became of several controllers on the same motion; prints as a table."""
+    """Simulations of several controllers on the same motion; prints as a table."""
 
     results: Mapping[str, SimulationResult]
-    """Of those that reached its end."""
+    """Runs by controller's name, of those that reached the end of the motion."""
     failures: Mapping[str, str]
-    """Why the others did not."""
+    """Reasons by controller's name, of those that did not reach the end."""
 
     def rows(self, *, degrees: bool = False) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return the headings and the rows of the table: errors of the joint that errs most, the tool's, torques.
@@ -140,7 +140,7 @@ class Comparison:
 
     @property
     def _unit(self) -> str:
-        """Of the joints' errors."""
+        """Unit of the joints' errors."""
         first = next(iter(self.results.values()), None)
         return joint_unit([] if first is None else first.description.numbers.prismatic)
 
@@ -174,7 +174,7 @@ def compare(
     saturation: bool = True,
     tolerance: float = 1e-13,
 ) -> Comparison:
-    """Return how controllers follow a motion that begins on it.
+    """Simulate several controllers on one motion, each starting on it.
 
     Parameters
     ----------
@@ -183,14 +183,14 @@ def compare(
     reference
         The motion.
     controllers
-        Names, as ``CONTROLLERS`` has them, tuned alike; or controllers by names of one's own, among them such names:
+        Names from ``CONTROLLERS``, tuned alike; or a mapping of names of your own to controllers or such names:
         ``{"mine": my_controller, "pid": "pid"}``.
     bandwidth, damping
-        As for :func:`make_controller`, of those that are given by name.
+        As for :func:`make_controller`, for controllers given by name.
     done
         Called with each controller's name when its run ends.
     plant
-        What moves; the robot unless given.
+        The arm that moves; the robot unless given.
     duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance
         As for :func:`simulate`.
 

@@ -1,4 +1,4 @@
-"""What a controller is: called with a state and a setpoint, it returns torques."""
+"""Interface of a controller: called with a state and a setpoint, it returns torques."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ class Controller(Protocol):
     """
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint, /) -> ArrayLike:
-        """Return the torques to give from now on, N m and N."""
+        """Return the torques from time t (s) on, shape (n,), N m and N; q and qd are (n,), rad, m and per second."""
 
 
 @runtime_checkable
 class ContinuousController(Protocol):
-    """A controller whose internal states, such as integrals, a continuous run integrates with those of the arm."""
+    """A controller with internal states, such as integrals, which a continuous run integrates with those of the arm."""
 
     def initial_state(self, q: Array) -> Array:
-        """Return the internal states at time 0, shape (m,), of an arm that begins at joint values q (n,)."""
+        """Return the internal states at time 0, shape (m,), for joint values q at the start, shape (n,), rad and m."""
 
     def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[ArrayLike, Array]:
-        """Return the torques (n,) and the time derivatives of the internal states (m,)."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of the internal states, shape (m,)."""
 
 
 Law: TypeAlias = Callable[[float, Array, Array, Setpoint, Array], tuple[Any, Array]]
-"""Torques, and derivatives of internal states, as :meth:`ContinuousController.continuous`."""
+"""Function that returns torques and derivatives of internal states, as :meth:`ContinuousController.continuous`."""
 NO_STATE: Array = np.zeros(0)
 
 
 def reset(controller: Any) -> None:
-    """Reset a controller that can be.
+    """Call a controller's ``reset()`` if it has one.
 
     Raises
     ------
     TypeError
-        It is a class, or cannot be called.
+        The controller is a class, or cannot be called.
     """
     if isinstance(controller, type):
         raise TypeError(f"controller is the class {controller.__name__}; expected an object of it")
@@ -62,12 +62,12 @@ def reset(controller: Any) -> None:
 
 
 def require_fits(controller: Any, description: Description) -> None:
-    """Refuse a controller that was made for an arm of other joints.
+    """Require that a controller was made for an arm with the same joints.
 
     Raises
     ------
     ValueError
-        Its arm has other joints.
+        The controller's arm has other joints.
     """
     own = getattr(controller, "description", None)
     if isinstance(own, Description) and own.kinds != description.kinds:
@@ -75,7 +75,7 @@ def require_fits(controller: Any, description: Description) -> None:
 
 
 def name_of(controller: Any) -> str:
-    """Return what a controller is called in figures: its class's name, or its own where it is a function."""
+    """Return a controller's name for figures: that of its class, or of the function."""
     if controller is None:
         return "no controller"
     inner = getattr(controller, "inner", None)
@@ -91,7 +91,7 @@ def continuous_law(controller: Any, q: Array) -> tuple[Array, Law]:
     controller
         The controller.
     q
-        Where the arm begins, shape (n,).
+        Joint values at the start, shape (n,), rad and m.
 
     Raises
     ------
@@ -115,13 +115,13 @@ def continuous_law(controller: Any, q: Array) -> tuple[Array, Law]:
     return NO_STATE, lambda t, q, qd, setpoint, state: (controller(t, q, qd, setpoint), NO_STATE)
 
 
-def called(controller: Callable[..., Any], t: float, *arguments: Any) -> Any:
-    """Return what a controller returns.
+def call_controller(controller: Callable[..., Any], t: float, *arguments: Any) -> Any:
+    """Call a controller and return its result.
 
     Raises
     ------
     SimulationError
-        It raises an exception.
+        The controller raises an exception.
     """
     try:
         return controller(t, *arguments)
@@ -131,7 +131,7 @@ def called(controller: Callable[..., Any], t: float, *arguments: Any) -> Any:
 
 
 def torques(returned: Any, n: int, t: float) -> Array:
-    """Return what a controller returned as an array, shape (n,).
+    """Return a controller's result as an array of torques, shape (n,), N m and N.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Motion from one time to another, split where a joint stops, breaks away or hits its limit."""
+"""Integration from one time to another, split where a joint comes to rest, breaks away or hits its stop."""
 
 from __future__ import annotations
 
@@ -13,55 +13,55 @@ from dhkit.control.integrators import Integrator, State
 from dhkit.control.plant import Contact, Phase, Plant
 from dhkit.errors import SimulationError
 
-MOST_EVENTS = 1_000
-"""In one step: more are a motion that the model does not describe, such as a joint that chatters."""
+MAX_EVENTS_PER_STEP = 1_000
+"""Largest number of events in one step: more are a motion outside the model, such as a chattering joint."""
 SLOWEST_REBOUND = 1e-4
-"""rad/s or m/s: a slower rebound ends at the stop, or bounces would follow each other without end: of one joint that
-gets slower from bounce to bounce, or of two that throw each other against their stops."""
+"""Rebound rate (rad/s or m/s) below which a joint stays at its stop. Otherwise impacts could follow each other without
+end, of one joint that gets slower from bounce to bounce or of two that throw each other against their stops."""
 FRACTIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1)
 """Fractions of a step at which a measure that is 0 at its beginning is looked for above 0. A joint that leaves its stop
 at 1e-4 rad/s has not moved by a unit of rounding after 1e-12 s, and may be back within the step."""
 EXCEEDED = 1e-9
-"""Of a holding torque beyond its bound, over the largest torque: below it is rounding."""
+"""Excess of a holding torque over its bound, relative to the largest torque, below which it counts as rounding."""
 
 
-def advanced(plant: Plant, integrator: Integrator, state: State, end: float, phase: Phase | None = None) -> State:
-    """Return the state at a later time, between which no push begins or ends.
+def advance(plant: Plant, integrator: Integrator, state: State, end: float, phase: Phase | None = None) -> State:
+    """Integrate to a later time, before which no push begins or ends, and return the state there.
 
     Parameters
     ----------
     plant, integrator
-        What moves, and how.
+        The arm, and the integration method.
     state
-        Where it begins.
+        State at the start.
     end
-        s.
+        Time at the end, s.
     phase
-        That of the beginning, if it is known.
+        Phase at the start, if it is known.
 
     Raises
     ------
     SimulationError
         More than a thousand impacts, stops and breakaways in one step.
     """
-    for _ in range(MOST_EVENTS):
+    for _ in range(MAX_EVENTS_PER_STEP):
         if phase is None:
             phase = plant.phase(state.q, state.qd, integrator.torque(state), plant.active_pushes(state.t))
-        later = _stepped(integrator, state, phase, end)
+        later = _checked_step(integrator, state, phase, end)
         event = None if plant.undisturbed else _first_event(plant, integrator, state, later, phase)
         while event is None:
             if later.t >= end:
                 return later
             # An integrator with steps of its own goes on under the same contact.
-            state, later = later, _stepped(integrator, later, phase, end)
+            state, later = later, _checked_step(integrator, later, phase, end)
             event = None if plant.undisturbed else _first_event(plant, integrator, state, later, phase)
         state, phase = event, None
         if state.t >= end:
             return state
-    raise SimulationError(f"more than {MOST_EVENTS} impacts and stops before {end:g} s, from {state.t:g} s on")
+    raise SimulationError(f"more than {MAX_EVENTS_PER_STEP} impacts and stops before {end:g} s, from {state.t:g} s on")
 
 
-def _stepped(integrator: Integrator, state: State, phase: Phase, end: float) -> State:
+def _checked_step(integrator: Integrator, state: State, phase: Phase, end: float) -> State:
     """Return the state after a step.
 
     Raises
@@ -76,16 +76,16 @@ def _stepped(integrator: Integrator, state: State, phase: Phase, end: float) -> 
 
 
 Measure = Callable[[State], float]
-"""Of a state: positive until something happens, negative behind."""
+"""Function of a state that is positive until an event and negative after it."""
 
 
 def _first_event(plant: Plant, integrator: Integrator, state: State, later: State, phase: Phase) -> State | None:
     """Return the state right after the first sudden change before ``later``, or None if there is none."""
-    if not phase.contact.holds.any() and not _anything(plant, later, phase.contact):
+    if not phase.contact.holds.any() and not _may_have_event(plant, later, phase.contact):
         beyond = _beyond_between(plant, state, later)
         if beyond is None:
             return None
-        # A joint passes its stop and comes back within the step: the search ends where it is farthest beyond.
+        # A joint passes its stop and comes back within the step: search only until it is farthest beyond.
         farthest = integrator.step(state, phase, beyond)
         return None if farthest.t < beyond else _first_event(plant, integrator, state, farthest, phase)
 
@@ -101,7 +101,7 @@ def _first_event(plant: Plant, integrator: Integrator, state: State, later: Stat
     for measure, change in _measures(plant, integrator, state, phase):
         if measure(later) >= 0:
             continue
-        # At its beginning a measure may be 0, as of a joint that has just broken away: it is positive right after.
+        # A measure may be 0 at the start, as for a joint that has just broken away: it is positive right after.
         time = state.t if measure(state) < 0 else _crossing(measure, at, state.t, later.t)
         if first is None or time < first[0]:
             first = (time, change)
@@ -111,15 +111,15 @@ def _first_event(plant: Plant, integrator: Integrator, state: State, later: Stat
     return change(at(time) if time > state.t else state)
 
 
-def _anything(plant: Plant, later: State, contact: Contact) -> bool:
-    """Return whether a joint has turned, or passed its stop."""
+def _may_have_event(plant: Plant, later: State, contact: Contact) -> bool:
+    """Return whether a joint has reversed its direction or passed its stop."""
     lower, upper = plant.limits
     turned = plant.dry & (contact.directions * later.qd < 0)
     return bool((turned | (later.q < lower) | (later.q > upper)).any())
 
 
 def _beyond_between(plant: Plant, state: State, later: State) -> float | None:
-    """Return when a joint that turns back within a step is beyond its stop, by the cubic through both states."""
+    """Return a time (s) at which a joint that turns back within a step is beyond its stop, or None, by cubics."""
     lower, upper = plant.limits
     turning = (state.qd * later.qd < 0) & (np.isfinite(lower) | np.isfinite(upper))
     for i in np.flatnonzero(turning):
@@ -133,7 +133,7 @@ def _beyond_between(plant: Plant, state: State, later: State) -> float | None:
 
 
 def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end: float) -> float:
-    """Return a time at which a measure, below 0 at the end, gets there."""
+    """Return the time at which a measure that is negative at ``end`` becomes negative."""
     for fraction in FRACTIONS:
         inside = begin + (end - begin) * fraction
         value = measure(at(inside))
@@ -148,7 +148,7 @@ def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end:
 def _measures(
     plant: Plant, integrator: Integrator, state: State, phase: Phase
 ) -> list[tuple[Measure, Callable[[State], State]]]:
-    """Return what can happen to a contact: a measure that it crosses 0 by, and what then changes."""
+    """Return the possible events of a contact: each a measure that crosses 0, and the change of state it causes."""
     found: list[tuple[Measure, Callable[[State], State]]] = []
     contact = phase.contact
     lower, upper = plant.limits
@@ -156,10 +156,10 @@ def _measures(
         if contact.holds[i]:
             continue
         if plant.dry[i] and contact.directions[i]:
-            found.append((_rate(i, int(contact.directions[i])), partial(_stopped, i)))
+            found.append((_rate(i, int(contact.directions[i])), partial(_with_joint_at_rest, i)))
         for limit, side in ((lower[i], 1.0), (upper[i], -1.0)):
             if np.isfinite(limit):
-                found.append((_room(i, limit, side), partial(_hit, plant, i, limit)))
+                found.append((_room(i, limit, side), partial(_after_impact, plant, i, limit)))
     if contact.holds.any():
         found.append((_margin(plant, integrator, state, phase), lambda s: s))
     return found
@@ -174,39 +174,39 @@ def _room(i: int, limit: float, side: float) -> Measure:
 
 
 def _margin(plant: Plant, integrator: Integrator, state: State, phase: Phase) -> Measure:
-    """Return what is left of the bounds of the torques that hold joints."""
+    """Return the measure of breakaway: the distance of the holding torques from their bounds, N m and N."""
     holds = phase.contact.holds
     least, most = (bound[holds] for bound in plant.holding_bounds(state.q))
 
     def measure(state: State) -> float:
         tau = integrator.torque(state)
-        needed = plant.held(state.q, state.qd, tau, phase.contact, phase.pushes)[holds]
+        needed = plant.holding_torques(state.q, state.qd, tau, phase.contact, phase.pushes)[holds]
         rounding = EXCEEDED * max(1.0, float(np.abs(needed).max()))
         return float(min((most - needed).min(), (needed - least).min())) + rounding
 
     return measure
 
 
-def _stopped(joint: int, state: State) -> State:
-    """Return the state with a joint's rate exactly 0."""
+def _with_joint_at_rest(joint: int, state: State) -> State:
+    """Return the state with one joint's rate set to exactly 0."""
     qd = state.qd.copy()
     qd[joint] = 0.0
     return replace(state, qd=qd)
 
 
-def _hit(plant: Plant, joint: int, limit: float, state: State) -> State:
-    """Return the state after a joint has hit its stop, and others that this throws against theirs."""
+def _after_impact(plant: Plant, joint: int, limit: float, state: State) -> State:
+    """Return the state after a joint has hit its stop, and after the impacts of other joints that this causes."""
     q, qd = state.q.copy(), state.qd
     q[joint] = limit
     lower, upper = plant.limits
     before = plant.kinetic_energy(q, qd)
-    for _ in range(MOST_EVENTS):
+    for _ in range(MAX_EVENTS_PER_STEP):
         into = ((q <= lower) & (qd < 0)) | ((q >= upper) & (qd > 0))
         if not into.any():
             break
         i = int(np.argmax(np.where(into, np.abs(qd), -1.0)))
         qd = plant.after_impact(q, qd, i, rebounds=abs(qd[i]) * (plant.restitution or 0.0) > SLOWEST_REBOUND)
-    # Joints that leave a stop as slowly as that are at rest there: which of them leave it, contact says of all at once.
+    # Joints that leave a stop slower than that are at rest there: the contact decides for all together which leave.
     qd = np.where(((q == lower) | (q == upper)) & (np.abs(qd) < SLOWEST_REBOUND), 0.0, qd)
     loss = before - plant.kinetic_energy(q, qd)
     return replace(state, q=q, qd=qd, impact_loss=state.impact_loss + loss)

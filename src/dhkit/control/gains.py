@@ -12,12 +12,12 @@ from dhkit.description.arrays import number_array
 from dhkit.dynamics import mass_matrix
 from dhkit.verification import random_motions
 
-STATES = 256
-"""Random configurations over which effective inertias are averaged."""
+RANDOM_CONFIGURATIONS = 256
+"""Number of random configurations over which effective inertias are averaged."""
 
 
 def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
-    """Return a gain of all joints, or of each, or of each and each run of a batch: shape (), (n,) or (B, n).
+    """Return a gain, in its own unit, as an array: shape () for all joints, (n,) for each, (B, n) for a batch.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
 
 
 def batch_of(*gains: Array) -> tuple[int, ...]:
-    """Return (B,) of gains for the runs of a batch, () of gains for one.
+    """Return the batch shape of gains: (B,) if they are for B runs, () if for one.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def batch_of(*gains: Array) -> tuple[int, ...]:
 
 
 def positive(value: float, name: str) -> float:
-    """Return a number.
+    """Return a positive, finite number.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def positive(value: float, name: str) -> float:
 
 
 def positive_each(value: ArrayLike, name: str) -> Array:
-    """Return positive numbers: one, shape (), or one for each run of a batch as a column, shape (B, 1).
+    """Return positive numbers of any unit: one, shape (), or one for each run of a batch as a column, shape (B, 1).
 
     Raises
     ------
@@ -82,28 +82,28 @@ def positive_each(value: ArrayLike, name: str) -> Array:
 
 
 def effective_inertia(description: Description, q: ArrayLike | None = None) -> Array:
-    """Return what each joint's drive feels, shape (n,), kg m^2 and kg: the diagonal of the mass matrix.
+    """Return the effective inertia of each joint, shape (n,), kg m^2 and kg: the diagonal of the mass matrix.
 
     Parameters
     ----------
     description
         The robot, with a body on every link.
     q
-        Where, shape (n,); the average over random configurations inside the limits unless given.
+        Joint values, shape (n,), rad and m; the average over random configurations inside the limits unless given.
     """
-    M = mass_matrix(description, random_motions(description, STATES).q if q is None else q)
+    M = mass_matrix(description, random_motions(description, RANDOM_CONFIGURATIONS).q if q is None else q)
     diagonal: Array = np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, description.n).mean(axis=0)
     return diagonal
 
 
 def pd_gains(bandwidth: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
-    """Return k_p = w^2 and k_d = 2 z w, for which an error decays as s^2 + 2 z w s + w^2 says; shape () or (B, 1)."""
+    """Return k_p = w^2 and k_d = 2 z w of the error dynamics s^2 + 2 z w s + w^2, shape () or (B, 1)."""
     w, z = positive_each(bandwidth, "bandwidth"), positive_each(damping, "damping")
     return w * w, 2 * z * w
 
 
 def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tuple[Array, Array, Array]:
-    """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a being ``integral``; () or (B, 1)."""
+    """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a = ``integral``; () or (B, 1)."""
     w, z = positive_each(bandwidth, "bandwidth"), positive_each(damping, "damping")
     a = integral
     if not (np.isfinite(a) and a >= 0):
@@ -111,18 +111,18 @@ def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tupl
     return w * w * (1 + 2 * z * a), a * w**3, w * (2 * z + a)
 
 
-def told(**gains: Array) -> str:
-    """Return gains in words, from the least to the largest of all joints.
+def gains_text(**gains: Array) -> str:
+    """Return gains as text, from the smallest to the largest of all joints.
 
     Examples
     --------
-    >>> told(kp=np.array([400.0, 400.0]), kd=np.array([40.0, 20.0]))
+    >>> gains_text(kp=np.array([400.0, 400.0]), kd=np.array([40.0, 20.0]))
     'kp 400, kd 20 to 40'
     """
-    return ", ".join(f"{name} {_told(values)}" for name, values in gains.items())
+    return ", ".join(f"{name} {_range_text(values)}" for name, values in gains.items())
 
 
-def _told(values: Array) -> str:
+def _range_text(values: Array) -> str:
     if values.ndim > 1:
         return f"of shape {values.shape}"
     least, most = float(np.min(values)), float(np.max(values))

@@ -1,4 +1,4 @@
-"""One step of an integrator: Runge and Kutta's for held torques, Dormand and Prince's for continuous controllers."""
+"""Integrators: a Runge-Kutta step under constant torques, and DOP853 for continuous controllers."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from dhkit.control.plant import Phase, Plant
 from dhkit.description import Array
 from dhkit.errors import SimulationError
 
-MOST_STEPS = 5_000
-"""Of DOP853 on the way to one time."""
+MAX_STEPS = 5_000
+"""Largest number of DOP853's steps to the next requested time."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
-"""Of time, joint values, rates and the controller's states: torques (n,), and the states' derivatives (m,)."""
+"""Function of time (s), joint values and rates (n,) and the controller's internal states (m,), that returns torques
+(n,) and the derivatives of the internal states (m,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where the arm is, how it moves, what the controller remembers, and what work was done so far."""
+    """State of a run: time, joint values and rates, the controller's internal states, and the works so far."""
 
     t: float
     q: Array
@@ -29,50 +30,50 @@ class State:
     memory: Array
     """Internal states of a continuous controller, shape (m,)."""
     drive_work: float = 0.0
-    """Done by the drives' torques, J."""
+    """Work of the drives' torques from the start, J."""
     friction_work: float = 0.0
-    """Taken by friction, J."""
+    """Work lost to friction from the start, J."""
     push_work: float = 0.0
-    """Done by pushes, J."""
+    """Work of pushes from the start, J."""
     impact_loss: float = 0.0
-    """Kinetic energy lost at stops, J."""
+    """Kinetic energy lost in impacts at stops from the start, J."""
 
 
 class Integrator(Protocol):
-    """Advances a state while its contact lasts."""
+    """Advances a state while the contact does not change."""
 
     def torque(self, state: State) -> Array:
-        """Return the drives' torques at a state, shape (n,)."""
+        """Return the drives' torques at a state, shape (n,), N m and N."""
 
     def step(self, state: State, phase: Phase, end: float) -> State:
-        """Return a later state, at ``end`` at the latest."""
+        """Return a later state, not after the time ``end``, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class RungeKutta:
-    """The classical method of order 4 (Kutta 1901), one step to the end, under torques that are held."""
+    """The classical Runge-Kutta method of order 4 (Kutta 1901), one step to the end, under constant torques."""
 
     plant: Plant
     tau: Array
 
     def torque(self, state: State) -> Array:
-        """Return the held torques."""
+        """Return the constant torques, shape (n,), N m and N."""
         return self.tau
 
     def step(self, state: State, phase: Phase, end: float) -> State:
-        """Return the state at the end."""
+        """Return the state at the time ``end``, s."""
         kernel = self.plant.step_kernel
         if kernel is None or phase.pushes or phase.contact.holds.any():
             return self._stages(state, phase, end)
         q, qd = state.q, state.qd
         works = np.array([[state.drive_work, 0.0, state.friction_work]])
         into = (np.empty((1, len(q))), np.empty((1, len(q))), np.empty((1, 3)))
-        kernel.lasting(end - state.t)((q[None], qd[None], works), self.tau[None], into)
+        kernel.with_length(end - state.t)((q[None], qd[None], works), self.tau[None], into)
         drives, _, friction = into[2][0].tolist()
         return State(end, into[0][0], into[1][0], state.memory, drives, friction, state.push_work, state.impact_loss)
 
     def _stages(self, state: State, phase: Phase, end: float) -> State:
-        """Return the state at the end, by the plant's accelerations while the contact lasts."""
+        """Return the state at ``end`` from accelerations of the plant under an unchanged contact."""
         plant, tau, h = self.plant, self.tau, end - state.t
         q, qd, a1 = state.q, state.qd, phase.qdd
         q2, v2 = q + h / 2 * qd, qd + h / 2 * a1
@@ -87,7 +88,7 @@ class RungeKutta:
             powers = [float(v @ plant.resistance(v, phase.contact.directions)) for _, v in stages]
             friction += h * _weighted(powers)
         if phase.pushes:
-            push += h * _weighted([float(v @ plant.pushed(phase.pushes, x)) for x, v in stages])
+            push += h * _weighted([float(v @ plant.push_torques(phase.pushes, x)) for x, v in stages])
         q_next = q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4)
         qd_next = qd + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
         _hold(phase, q, q_next, qd_next)
@@ -98,22 +99,22 @@ class RungeKutta:
 class DormandPrince:
     """SciPy's DOP853, of order 8 with a step size of its own (Hairer, Norsett and Wanner 1993, section II.5).
 
-    The works of drives, friction and pushes are integrated with the state, and so is what the controller remembers.
-    Where nothing sudden can happen, steps go beyond the times that are asked for, and the states there are those of the
-    method's interpolation of order 7; otherwise each step ends at the next of these times.
+    The works of drives, friction and pushes and the controller's internal states are integrated with the arm's state.
+    Where no event can happen, steps go beyond the requested times, and the states there come from the method's
+    interpolation of order 7; otherwise each step ends at the next requested time.
 
     Parameters
     ----------
     plant
-        What moves.
+        The arm that moves.
     torques
-        The drives' torques, and the derivatives of the controller's states.
+        Function of the drives' torques and the derivatives of the controller's states.
     tolerance
-        Of a step's error, relative and absolute in every state.
+        Tolerance of a step's error, relative and absolute in every state.
     edges
         Times that no step crosses, ascending, the end of the run last, s: torques may jump there.
     longest
-        s of a step: a shorter pulse of torque may be passed over.
+        Longest step, s: a shorter pulse of torque may be passed over.
     """
 
     def __init__(
@@ -123,22 +124,22 @@ class DormandPrince:
         self.longest = longest
         self._length: float | None = None
         self._steps = 0
-        """On the way to ``_end``."""
+        """Number of steps so far to ``_end``."""
         self._end = 0.0
         self._solver: DOP853 | None = None
         self._last: State | None = None
 
     def torque(self, state: State) -> Array:
-        """Return the torques at a state."""
+        """Return the torques at a state, shape (n,), N m and N."""
         return self.torques(state.t, state.q, state.qd, state.memory)[0]
 
     def step(self, state: State, phase: Phase, end: float) -> State:
-        """Return a later state, at ``end`` at the latest.
+        """Return a later state, not after the time ``end``, s.
 
         Raises
         ------
         SimulationError
-            No step is short enough.
+            The tolerance cannot be met with any step length.
         """
         if end != self._end:
             self._end, self._steps = end, 0
@@ -163,38 +164,38 @@ class DormandPrince:
 
     def _started(self, state: State, phase: Phase, end: float) -> DOP853:
         plant, n, contact, pushes = self.plant, self.plant.n, phase.contact, phase.pushes
-        # A setpoint that jumps at the end has its value of before until then.
+        # A setpoint that jumps at the end keeps its earlier value until then.
         latest = float(np.nextafter(end, state.t))
 
         def rates(t: float, y: Array) -> Array:
             q, qd = y[:n], y[n : 2 * n]
             tau, memory = self.torques(min(t, latest), q, qd, y[2 * n : -3])
             friction = 0.0 if plant.friction is None else float(qd @ plant.resistance(qd, contact.directions))
-            push = float(qd @ plant.pushed(pushes, q)) if pushes else 0.0
+            push = float(qd @ plant.push_torques(pushes, q)) if pushes else 0.0
             qdd = plant.moving(q, qd, tau, contact, pushes)
             if not np.isfinite(qdd).all():
-                # DOP853 would look for a shorter step for ever.
+                # Without this, DOP853 would reduce its step length without end.
                 raise SimulationError(f"the arm has no finite accelerations at {t:g} s")
             return np.concatenate([qd, qdd, memory, [float(tau @ qd), friction, push]])
 
         works = [state.drive_work, state.friction_work, state.push_work]
         start = np.concatenate([state.q, state.qd, state.memory, works])
-        # After a jump the old length says nothing: SciPy chooses a first one.
+        # After a jump the previous step length does not apply: SciPy chooses a new one.
         jump = any(edge == state.t for edge in self.edges)
         length = None if self._length is None or jump else min(self._length, end - state.t)
         options = {"rtol": self.tolerance, "atol": self.tolerance, "max_step": self.longest}
-        with np.errstate(over="ignore", invalid="ignore"):  # said by _advance
+        with np.errstate(over="ignore", invalid="ignore"):  # _advance raises the error
             return DOP853(rates, state.t, start, end, first_step=length, **options)
 
     def _advance(self, solver: DOP853) -> None:
         begin = solver.t
         self._steps += 1
-        if self._steps > MOST_STEPS:
+        if self._steps > MAX_STEPS:
             raise SimulationError(
-                f"more than {MOST_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s: torques that jump"
+                f"more than {MAX_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s: torques that jump"
                 " with the state, as those of a relay, have no continuous solution; expected a rate in Hz"
             )
-        with np.errstate(over="ignore", invalid="ignore"):  # said here
+        with np.errstate(over="ignore", invalid="ignore"):  # the error is raised below
             message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
             raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
@@ -207,7 +208,7 @@ class DormandPrince:
 
 
 def _hold(phase: Phase, before: Array, q: Array, qd: Array) -> None:
-    """Leave joints that hold exactly where they were."""
+    """Set joints that hold back to exactly their earlier joint values, with rate 0."""
     holds = phase.contact.holds
     if holds.any():
         q[holds], qd[holds] = before[holds], 0.0

@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.control.gains import batch_of, effective_inertia, gain, pid_gains, positive, told
+from dhkit.control.gains import batch_of, effective_inertia, gain, gains_text, pid_gains, positive
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.display import repr_line
 
 BAND = 0.01
-"""Share of the largest torque over which a continuous controller's integral fades out."""
+"""Share of the torque limit over which a continuous controller's integral action fades out."""
 
 
 class PID:
     """Independent joints: tau = kp e + ki int(e) + kd de/dt, e = q_setpoint - q (Siciliano et al. 2009, section 8.3).
 
     The rate of the error is taken from the measured rate, or with ``derivative="measurement"`` the setpoint's rate is
-    left out, so that a step of the setpoint does not kick. The integral stands still in a joint whose drive cannot give
-    more and would be asked for more (conditional integration: Astrom and Hagglund 2006, Advanced PID control, section
-    3.5).
+    left out, so that a step of the setpoint does not kick. The integral of a joint does not change while
+    its drive is at the limit and the error would increase the torque (conditional integration: Astrom and Hagglund
+    2006, Advanced PID control, section 3.5).
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class PID:
     cutoff
         rad/s: the derivative is filtered by 1 / (s / cutoff + 1); None for no filter.
     limit
-        Largest torques, shape (n,) or a number, for the integral's sake; infinite unless given.
+        Torque limits for conditional integration, a number or shape (n,), N m and N; infinite unless given.
 
     Raises
     ------
@@ -86,9 +86,10 @@ class PID:
         damping
             z, likewise.
         integral
-            a: how fast the integral's pole is, over the bandwidth; 0 for PD.
+            a: pole of the integral action over the bandwidth; 0 for PD.
         q
-            Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
+            Joint values at which the effective inertias are computed, shape (n,); their average over random
+            configurations inside the limits unless given.
         derivative, cutoff
             As for the class.
         """
@@ -99,31 +100,31 @@ class PID:
         return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=limit)
 
     def reset(self) -> None:
-        """Forget the integral, the filter and the time."""
+        """Set the integral, the filter and the time back to the start."""
         self._integral: Array | float = 0.0
         self._rate: Array | None = None
         self._time: float | None = None
 
     def initial_state(self, q: Array) -> Array:
-        """Return the integrals of the errors, and with a cutoff the filtered rates: 0, shape (n,) or (2n,)."""
+        """Return zeros for the integrals of the errors, rad s and m s, shape (n,), with filtered rates (2n,)."""
         return np.zeros(len(q) * (1 if self.cutoff is None else 2))
 
     def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
-        """Return the torques (n,), and the derivatives of the integrals and of the filtered rates."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of ``state``, of the same shape."""
         n = len(q)
         error = setpoint.q - q
         rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd
         filtered = rate if self.cutoff is None else state[n:]
         tau = self._torques(error, state[:n], filtered)
-        # The integral fades out over the last hundredth of the torque: switched off at once, as the sampled controller
-        # does it, it would chatter at the limit without end.
+        # The integral action fades out over the last hundredth of the torque limit: switched off at once, as in the
+        # sampled controller, it would chatter at the limit.
         left = (self.limit - np.abs(tau)) / np.where(np.isfinite(self.limit), BAND * self.limit, 1.0)
         growth = np.where(tau * error < 0, error, error * np.clip(left, 0.0, 1.0))
         change = growth if self.cutoff is None else np.concatenate([growth, self.cutoff * (rate - filtered)])
         return tau, change
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,) or (B, n), N m and N."""
         _require_joints(len(q) if q.ndim == 1 else q.shape[1], kp=self.kp, ki=self.ki, kd=self.kd)
         error = setpoint.q - q
         step = 0.0 if self._time is None else t - self._time
@@ -138,14 +139,14 @@ class PID:
         return tau
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, said=told(kp=self.kp, ki=self.ki, kd=self.kd))
+        return repr_line(type(self).__name__, said=gains_text(kp=self.kp, ki=self.ki, kd=self.kd))
 
     def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
         tau: Array = self.kp * error + self.ki * integral + self.kd * rate
         return tau
 
     def _grows(self, tau: Array, error: Array) -> NDArray[np.bool_]:
-        """Return in which joints the integral may change: those whose drives can give more, or are asked for less."""
+        """Return the joints whose integral may change: drive below its limit, or error that reduces the torque."""
         grows: NDArray[np.bool_] = (np.abs(tau) < self.limit) | (tau * error < 0)
         return grows
 

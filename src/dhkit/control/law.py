@@ -1,4 +1,4 @@
-"""Control laws as expressions: a batch then evaluates the law and the step of the arm in one program."""
+"""Control laws as CasADi expressions: a batch evaluates the law and the step of the arm in one program."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ if TYPE_CHECKING:
 
 
 class Symbols(NamedTuple):
-    """What a law is a function of, n x 1 each."""
+    """Arguments of a control law: symbols of shape n x 1 each, rad, m and seconds."""
 
     q: casadi.SX
     qd: casadi.SX
-    wanted_q: casadi.SX
-    """Of the setpoint, as those that follow."""
-    wanted_qd: casadi.SX
-    wanted_qdd: casadi.SX
+    setpoint_q: casadi.SX
+    """Joint values of the setpoint; its rates and accelerations follow."""
+    setpoint_qd: casadi.SX
+    setpoint_qdd: casadi.SX
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A controller without a memory, as an expression."""
+    """Expression of a controller without internal states."""
 
     name: str
-    """Says which expression it is, together with the pattern of the arm."""
+    """Identifies the expression, together with the pattern of the arm, in the cache of programs."""
     description: Description
-    """The arm that the controller knows."""
+    """The robot that the controller knows."""
     gains: Array
-    """Numbers of the law, shape (p,), or (B, p) of the runs of a batch."""
+    """Gains of the law, shape (p,), or (B, p) for the runs of a batch."""
     torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]
-    """Of the arm's table, the state and the setpoint, and the gains p x 1: the torques, n x 1."""
+    """Function of the arm's table, the state and setpoint, and the gains (p x 1), that returns the torques (n x 1)."""
 
 
 def law_of(controller: Any) -> Law | None:
-    """Return a controller's law, or None where it has none.
+    """Return a controller's law, or None if it has none.
 
-    A subclass has none of its own accord: whatever it overrides, the law would be its parent's.
+    A subclass has no law unless it defines one: the inherited law would ignore the methods that it overrides.
     """
     law: Law | None = controller.law() if "law" in vars(type(controller)) else None
     return law

@@ -1,4 +1,4 @@
-"""An arm near a state as a linear system, and the linear-quadratic regulator."""
+"""Linearization of an arm at a state, and the linear-quadratic regulator."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     import casadi
 
 ERROR, RATE, ACCELERATION = 0.1, 1.0, 200.0
-"""Acceptable deviations, rad, rad/s and rad/s^2, or m."""
+"""Acceptable deviations for the default weights: rad, rad/s and rad/s^2, or m, m/s and m/s^2."""
 
 
 @takes_robot
 def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
-    """Return A and B of dx/dt = A x + B u near a state, x = (q, qd) and u = tau less what holds the state.
+    """Return A and B of dx/dt = A x + B u near a state: x = (q, qd) minus the state, u = tau minus C qd + g there.
 
     Exact derivatives of forward dynamics by CasADi, at the torques that keep the rates (tau = C qd + g).
 
@@ -74,7 +74,7 @@ class LQR:
     robot
         The arm, or its description.
     q
-        Where it is linearized, shape (n,), at rest.
+        Joint values at which the arm is linearized, at rest, shape (n,), rad and m.
     Q
         Weights of joint errors and rates, shape (2n,) or (2n, 2n).
     R
@@ -116,7 +116,7 @@ class LQR:
         self._held = gravity_torque(self.description, q)
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,), N m and N."""
         error = np.concatenate([q - setpoint.q, qd - setpoint.qd], axis=-1)
         tau: Array = self._held - error @ self.K.T
         return tau

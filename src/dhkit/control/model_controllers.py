@@ -1,4 +1,4 @@
-"""Controllers that know the arm's equations: gravity, feed-forward, computed torque, friction."""
+"""Model-based controllers: gravity compensation, feed-forward, computed torque, friction compensation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.control.controller import continuous_law, name_of, reset
-from dhkit.control.gains import batch_of, effective_inertia, gain, pd_gains, told
+from dhkit.control.gains import batch_of, effective_inertia, gain, gains_text, pd_gains
 from dhkit.control.law import Law, Symbols
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of, require_bodies
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     import casadi
 
 REST = 1e-4
-"""rad/s or m/s: below it a setpoint's rate is taken as rest rather than as a direction."""
+"""Rate of a setpoint (rad/s or m/s) over which the friction compensation changes its sign smoothly."""
 
 
 class _Proportional:
-    """Gains on the errors of joint values and rates, and the model of an arm."""
+    """Base class: gains kp and kd on the errors of joint values and rates, and the model of an arm."""
 
     def __init__(self, robot: Robot, kp: ArrayLike, kd: ArrayLike) -> None:
         self.description = description_of(robot)
@@ -35,10 +35,10 @@ class _Proportional:
         self.batch_shape = batch_of(self.kp, self.kd)
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, self.description.name, told(kp=self.kp, kd=self.kd))
+        return repr_line(type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd))
 
     def _law(self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]) -> Law:
-        """Return a law whose gains are kp and kd of each joint."""
+        """Return the law with these torques, whose gains are kp and kd of each joint."""
         shape = (*self.batch_shape, self.description.n)
         gains = [np.broadcast_to(gain, shape) for gain in (self.kp, self.kd)]
         return Law(name, self.description, np.concatenate(gains, axis=-1), torques)
@@ -63,19 +63,19 @@ class ComputedTorque(_Proportional):
 
     @classmethod
     def tuned(cls, robot: Robot, bandwidth: ArrayLike = 20.0, damping: ArrayLike = 1.0) -> Self:
-        """Return the controller with kp = w^2 and kd = 2 z w for a bandwidth w, rad/s, and a damping z."""
+        """Return the controller with kp = w^2, kd = 2 z w for bandwidth w, rad/s, and damping z: numbers, or (B,)."""
         return cls(robot, *pd_gains(bandwidth, damping))
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,) or (B, n), N m and N."""
         return inverse_dynamics(self.description, q, qd, setpoint.qdd + self._correction(q, qd, setpoint))
 
     def law(self) -> Law:
-        """Return the same as an expression."""
+        """Return the controller as a CasADi expression."""
         return self._law(
             "computed_torque",
             lambda table, s, gains: recursive_inverse_dynamics(
-                table, s.q, s.qd, s.wanted_qdd + _correction_expression(s, gains)
+                table, s.q, s.qd, s.setpoint_qdd + _correction_expression(s, gains)
             ),
         )
 
@@ -99,40 +99,42 @@ class PDGravity(_Proportional):
         bandwidth, damping
             w, rad/s, and z; or shape (B,) for the runs of a batch.
         q
-            Where the effective inertias are taken, shape (n,); their average over the workspace unless given.
+            Joint values at which the effective inertias are computed, shape (n,); their average over random
+            configurations inside the limits unless given.
         """
         m = effective_inertia(description_of(robot), q)
         kp, kd = pd_gains(bandwidth, damping)
         return cls(robot, m * kp, m * kd)
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,) or (B, n), N m and N."""
         return self._correction(q, qd, setpoint) + gravity_torque(self.description, q)
 
     def law(self) -> Law:
-        """Return the same as an expression."""
+        """Return the controller as a CasADi expression."""
         return self._law(
             "pd_gravity", lambda table, s, gains: _correction_expression(s, gains) + recursive_gravity(table, s.q)
         )
 
 
 class FeedForward(PDGravity):
-    """tau = ID(q_d, qd_d, qdd_d) + kp e + kd de/dt: the setpoint's own torques, and a correction.
+    """tau = ID(q_d, qd_d, qdd_d) + kp e + kd de/dt: inverse dynamics of the setpoint plus PD feedback.
 
-    The torques of a motion can be worked out beforehand; Craig (2005), section 10.5. Gains as of :class:`PDGravity`.
+    The feed-forward torques of a motion can be computed in advance; Craig (2005), section 10.5.
+    Gains as for :class:`PDGravity`.
     """
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,) or (B, n), N m and N."""
         ahead = inverse_dynamics(self.description, setpoint.q, setpoint.qd, setpoint.qdd)
         return ahead + self._correction(q, qd, setpoint)
 
     def law(self) -> Law:
-        """Return the same as an expression."""
+        """Return the controller as a CasADi expression."""
         return self._law(
             "feed_forward",
             lambda table, s, gains: (
-                recursive_inverse_dynamics(table, s.wanted_q, s.wanted_qd, s.wanted_qdd)
+                recursive_inverse_dynamics(table, s.setpoint_q, s.setpoint_qd, s.setpoint_qdd)
                 + _correction_expression(s, gains)
             ),
         )
@@ -140,24 +142,24 @@ class FeedForward(PDGravity):
 
 def _correction_expression(s: Symbols, gains: casadi.SX) -> casadi.SX:
     n = s.q.shape[0]
-    return gains[:n] * (s.wanted_q - s.q) + gains[n:] * (s.wanted_qd - s.qd)
+    return gains[:n] * (s.setpoint_q - s.q) + gains[n:] * (s.setpoint_qd - s.qd)
 
 
 class FrictionCompensation:
-    """Another controller's torques plus those that the arm's friction takes at the setpoint's rates.
+    """Another controller's torques plus the friction torques of the arm at the setpoint's rates.
 
-    At the setpoint's rates and not at the measured ones: dry friction would otherwise be compensated in the wrong
-    direction whenever noise changes the sign of a small rate. For the same reason the compensation changes its
-    direction smoothly, over 1e-4 rad/s or m/s: the rate of a setpoint at rest is 0 only up to rounding.
+    The setpoint's rates are used, not the measured ones: otherwise dry friction would be compensated in the wrong
+    direction whenever noise changes the sign of a small rate. The sign changes smoothly over 1e-4 rad/s or m/s,
+    because the rate of a setpoint at rest is 0 only up to rounding.
 
     Parameters
     ----------
     inner
         The controller.
     robot
-        Whose friction; that of ``inner`` unless given.
+        The arm whose friction is compensated; the arm of ``inner`` unless given.
     friction
-        How dry friction changes with the direction; ``Friction(1e-4)`` unless given.
+        Model of dry friction near rest; ``Friction(1e-4)`` unless given.
     """
 
     def __init__(self, inner: Any, robot: Robot | None = None, friction: Friction | None = None) -> None:
@@ -178,21 +180,21 @@ class FrictionCompensation:
         reset(self.inner)
 
     def initial_state(self, q: Array) -> Array:
-        """Return the inner controller's internal states at time 0."""
+        """Return the inner controller's internal states at time 0, shape (m,)."""
         return continuous_law(self.inner, q)[0]
 
     def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
-        """Return the torques (n,), and the derivatives of the inner controller's states."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of the inner states, shape (m,)."""
         tau, change = continuous_law(self.inner, q)[1](t, q, qd, setpoint, state)
-        return np.asarray(tau, dtype=float) + self._loss(setpoint), change
+        return np.asarray(tau, dtype=float) + self._friction(setpoint), change
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
-        tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._loss(setpoint)
+        """Return the torques, shape (n,) or (B, n), N m and N."""
+        tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._friction(setpoint)
         return tau
 
     def __repr__(self) -> str:
         return repr_line(type(self).__name__, self.description.name, f"{self.friction}, around {name_of(self.inner)}")
 
-    def _loss(self, setpoint: Setpoint) -> Array:
+    def _friction(self, setpoint: Setpoint) -> Array:
         return friction_torque(self.description, setpoint.qd, self.friction)

@@ -1,4 +1,4 @@
-"""Control of the tool's pose, through the Jacobian and the inertia that the tool feels."""
+"""Operational space control: of the tool's pose, by the Jacobian and the operational space inertia."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.control.gains import gain, pd_gains, positive, told
+from dhkit.control.gains import gain, gains_text, pd_gains, positive
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of
 from dhkit.description.arrays import number_array
@@ -17,9 +17,9 @@ from dhkit.kinematics import forward_kinematics, jacobian, jacobian_dot
 from dhkit.verification import random_motions
 
 PROBES = 16
-"""Random configurations that tell in how many directions the tool can be moved."""
+"""Number of random configurations at which the rank of the Jacobian is determined."""
 ZERO = 1e-9
-"""Singular value, over the largest, below which the tool cannot be moved in a direction at all."""
+"""Singular value, relative to the largest, below which the tool cannot move in a direction."""
 
 
 class OperationalSpace:
@@ -27,7 +27,7 @@ class OperationalSpace:
 
     Khatib, A unified approach for motion and force control of robot manipulators: the operational space formulation,
     1987. e is the tool's error: position, then the rotation vector of R_d R^T, in world axes; Lambda = (J M^-1 J^T)^-1
-    is the inertia that the tool feels. Each coordinate's error decays as s^2 + kd s + kp says.
+    is the operational space inertia. Each coordinate's error decays as s^2 + kd s + kp says.
 
     Near a singularity, Lambda is damped. J, lengths over the arm's reach, has the singular values sigma_i with left and
     right vectors u_i and v_i; where sigma_i is below the threshold sigma_0, (sigma_0^2 - sigma_i^2) v_i^T M^-1 v_i is
@@ -67,7 +67,7 @@ class OperationalSpace:
     """
 
     batches = False
-    """It takes the states of one arm, not those of a batch."""
+    """False: the controller takes the state of one arm, not states of a batch."""
 
     def __init__(
         self,
@@ -116,16 +116,16 @@ class OperationalSpace:
         return cls(robot, *pd_gains(bandwidth, damping), directions=directions, threshold=threshold)
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,)."""
+        """Return the torques, shape (n,), N m and N."""
         description, units, rank = self.description, self._joint_scale, self._rank
-        # Prismatic joints are measured in reaches as well, so that singular values have one unit.
+        # Displacements of prismatic joints are divided by the reach as well, so that singular values have no unit.
         J_full = jacobian(description, q)
         J = self._scaled(J_full)
         M = mass_matrix(description, q) * np.outer(units, units)
         e = pose_error(forward_kinematics(description, q), setpoint.T)
         de = setpoint.twist - J_full @ qd
-        wanted = setpoint.acceleration + self.kd * de + self.kp * e - jacobian_dot(description, q, qd) @ qd
-        a = self._row_scale * wanted[self._rows]
+        acceleration = setpoint.acceleration + self.kd * de + self.kp * e - jacobian_dot(description, q, qd) @ qd
+        a = self._row_scale * acceleration[self._rows]
         a_0 = setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
         a_0 = a_0 / units
 
@@ -134,26 +134,26 @@ class OperationalSpace:
         mobility = Vt @ np.linalg.solve(M, Vt.T)
         inverse = sigma[:, None] * mobility * sigma
         inverse[np.diag_indices(rank)] += np.maximum(self.threshold**2 - sigma**2, 0.0) * np.diagonal(mobility)
-        # J^T Lambda (a - J a_0) + M a_0 is J^T Lambda a + N^T M a_0.
+        # J^T Lambda (a - J a_0) + M a_0 equals J^T Lambda a + N^T M a_0.
         force = np.linalg.solve(inverse, U.T @ a - sigma * (Vt @ a_0))
         tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / units + bias(description, q, qd)
         return tau
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, self.description.name, told(kp=self.kp, kd=self.kd))
+        return repr_line(type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd))
 
     def _scaled(self, J: Array) -> Array:
-        """Return the rows of Jacobians (..., 6, n) that are controlled, lengths over the reach."""
+        """Return the controlled rows of Jacobians, shape (..., k, n), with lengths divided by the reach."""
         scaled: Array = self._row_scale[:, None] * J[..., self._rows, :] * self._joint_scale
         return scaled
 
     def _freedoms(self) -> int:
-        """Return in how many of the directions the tool can be moved.
+        """Return the number of controlled directions in which the tool can be moved.
 
         Raises
         ------
         ValueError
-            In none.
+            The tool cannot be moved in any of them.
         """
         q = random_motions(self.description, PROBES).q
         sigma = np.linalg.svd(self._scaled(jacobian(self.description, q)), compute_uv=False)
@@ -165,9 +165,9 @@ class OperationalSpace:
 
 
 def pose_error(T: Array, goal: Array) -> Array:
-    """Return how a pose (4, 4) differs from its goal, shape (6,): position, m, and rotation vector, rad, world axes.
+    """Return the error of a pose (4, 4), shape (6,): position, m, and rotation vector, rad, in world axes.
 
-    The rotation vector of R_goal R^T, at most pi long; where it is pi long, of two opposite ones either.
+    The rotation vector is that of R_goal R^T, of length pi at most; at length pi its sign is not determined.
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""The arm that is simulated: its accelerations under torques, friction, stops and pushes, at single states."""
+"""The simulated arm: accelerations at a state under torques, friction, stops and pushes."""
 
 from __future__ import annotations
 
@@ -29,23 +29,22 @@ from dhkit.verification import random_motions
 
 log = logging.getLogger(__name__)
 
-STATES = 256
-"""Random configurations at which the stiffness of friction is taken."""
+RANDOM_CONFIGURATIONS = 256
+"""Number of random configurations over which the stiffness of friction is maximized."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """An arm as it moves.
+    """The arm that moves in a simulation, with friction, stops and pushes.
 
     Parameters
     ----------
     description
         The robot, with a body on every link.
     friction
-        How the joints' friction acts: None for none; of width 0 dry friction is a step with stiction.
+        Friction model of the joints, None for none; with width 0, dry friction is a step with stiction.
     restitution
-        Of the joint stops: the share of the rate that is left after an impact, 0 to 1; None for joints that pass
-        their limits.
+        Coefficient of restitution of the joint stops, 0 to 1; None for no stops.
     pushes
         Wrenches on the tool or on links, each over a time window.
 
@@ -84,7 +83,7 @@ class Plant:
 
     @cached_property
     def dry(self) -> NDArray[np.bool_]:
-        """Joints with dry friction that is a step, shape (n,)."""
+        """Whether a joint's dry friction is a step with stiction, shape (n,)."""
         none = np.zeros(self.n, dtype=bool)
         if self.friction is None or self.friction.width:
             return none
@@ -93,7 +92,7 @@ class Plant:
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
-        """Where the stops are, shape (n,) each, rad and m; infinite without stops."""
+        """Joint values of the lower and upper stops, shape (n,) each, rad and m; infinite without stops."""
         numbers = self.description.numbers
         free = np.full(self.n, np.inf)
         return (-free, free) if self.restitution is None else (numbers.lower, numbers.upper)
@@ -105,12 +104,12 @@ class Plant:
 
     @cached_property
     def undisturbed(self) -> bool:
-        """Whether no joint has stiction or a stop, so that nothing about the motion is sudden."""
+        """Whether no joint has stiction or a stop, so that no event can happen."""
         return self.smooth and not np.isfinite(self.limits).any()
 
     @cached_property
     def stiffness(self) -> float:
-        """How fast friction slows joints down near rest, 1/s: the largest over random configurations.
+        """Rate at which friction decelerates the joints near rest, 1/s, maximum over random configurations.
 
         It is the largest eigenvalue of M^-1 D, D being the slope of friction over the rate where that is steepest.
         """
@@ -121,48 +120,48 @@ class Plant:
         if self.friction.width:
             slope += np.abs(numbers.coulomb).max(axis=1) / self.friction.width
         root = np.sqrt(slope)
-        q = random_motions(self.description, STATES).q
+        q = random_motions(self.description, RANDOM_CONFIGURATIONS).q
         inverse = np.linalg.pinv(mass_matrix(self.description, q), hermitian=True)
         return float(np.linalg.eigvalsh(root[:, None] * inverse * root).max())
 
     @cached_property
     def step_kernel(self) -> StepKernel | None:
-        """A step while nothing holds and nothing pushes, as one program; None where friction is a step."""
+        """Program of a step without holding joints and pushes; None if friction is a step."""
         if self.friction is not None and not self.friction.width:
             return None
         return StepKernel.open([self.description], self.friction, 0.0)
 
     @cached_property
     def nothing_holds(self) -> Contact:
-        """The contact of joints that nothing holds."""
+        """The contact in which no joint holds."""
         return Contact.free(self.n)
 
     def active_pushes(self, t: float) -> tuple[Push, ...]:
-        """Return the pushes that act at a time."""
+        """Return the pushes that act at a time t, s."""
         return tuple(push for push in self.pushes if push.begin <= t < push.end)
 
     def holding_bounds(self, q: Array) -> tuple[Array, Array]:
-        """Return between which resisting torques joints at rest hold, shape (n,) each; infinite at a stop."""
+        """Return the bounds of the torques that hold joints at rest, shape (n,) each, N m and N; infinite at stops."""
         lower, upper = self.limits
         coulomb = np.where(self.dry[:, None], self.description.numbers.coulomb, 0.0)
         return np.where(q <= lower, -np.inf, coulomb[:, 1]), np.where(q >= upper, np.inf, coulomb[:, 0])
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """Return forward dynamics at one state, shape (n,); ``tau`` holds all torques but the links' own."""
+        """Return the accelerations of a state, shape (n,), rad/s^2 and m/s^2; ``tau`` includes friction and pushes."""
         qdd: Array = np.empty((1, self.n))
         run, parameters = self._single
         run(parameters, [q[None], qd[None], tau[None]], [qdd])
         return qdd.reshape(-1)
 
     def resistance(self, qd: Array, directions: NDArray[np.int8]) -> Array:
-        """Return the torques that friction takes, shape (n,), of the sign of the motion.
+        """Return the friction torques, shape (n,), N m and N, positive for positive rates.
 
         Parameters
         ----------
         qd
-            Joint rates, shape (n,).
+            Joint rates, shape (n,), rad/s and m/s.
         directions
-            Which way joints with dry friction go, or are about to go: 1, -1, or 0 for those that hold.
+            Directions in which joints with stiction move or begin to move, shape (n,): 1, -1, or 0 for holding joints.
         """
         if self.friction is None:
             return np.zeros(self.n)
@@ -173,19 +172,20 @@ class Plant:
         resisting: Array = numbers.viscous * qd + dry
         return resisting
 
-    def pushed(self, pushes: Sequence[Push], q: Array) -> Array:
-        """Return the torques of some pushes, shape (n,)."""
+    def push_torques(self, pushes: Sequence[Push], q: Array) -> Array:
+        """Return the joint torques of some pushes, shape (n,), N m and N."""
         total = np.zeros(self.n)
         for push in pushes:
             total += push.torque(self.description, q)
         return total
 
     def contact(self, q: Array, qd: Array, tau: Array, pushes: Sequence[Push] = ()) -> Contact:
-        """Return which joints hold, by friction or at a stop, and which way the others go.
+        """Return the joints that hold, by friction or at a stop, and the directions of the others.
 
-        Joints whose rate is exactly 0 hold if the torques that this takes are within the bounds of their friction; a
-        stop bears any torque towards it. All of them are decided at once, since each loads the others through the mass
-        matrix.
+        q, qd and tau are of shape (n,), in rad, m, per second, N m and N.
+
+        Joints whose rate is exactly 0 hold if the holding torques are within the bounds of their friction; a stop bears
+        any torque towards it. All joints are decided together, since each loads the others through the mass matrix.
         """
         if self.undisturbed:
             return self.nothing_holds
@@ -195,7 +195,7 @@ class Plant:
         if not at_rest.any():
             return Contact(directions, at_rest)
         least, most = (bound[at_rest] for bound in self.holding_bounds(q))
-        drive = tau + self.pushed(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
+        drive = tau + self.push_torques(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
         inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
         _, side = bounded_forces(inverse[np.ix_(at_rest, at_rest)], (inverse @ drive)[at_rest], least, most)
         holds = at_rest.copy()
@@ -204,10 +204,10 @@ class Plant:
         return Contact(directions, holds)
 
     def moving(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
-        """Return the accelerations while the contact lasts, shape (n,): exactly 0 of joints that hold."""
+        """Return the accelerations under a contact, shape (n,), rad/s^2 and m/s^2: exactly 0 for holding joints."""
         net = tau - self.resistance(qd, contact.directions)
         if pushes:
-            net += self.pushed(pushes, q)
+            net += self.push_torques(pushes, q)
         if not contact.holds.any():
             return self.accelerations(q, qd, net)
         free = ~contact.holds
@@ -218,19 +218,19 @@ class Plant:
         return qdd
 
     def phase(self, q: Array, qd: Array, tau: Array, pushes: tuple[Push, ...] = ()) -> Phase:
-        """Return what holds from a state on, until something sudden happens."""
+        """Return the phase from a state (q, qd and tau of shape (n,), SI units) to the next event."""
         contact = self.contact(q, qd, tau, pushes)
         return Phase(contact, pushes, self.moving(q, qd, tau, contact, pushes))
 
-    def held(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
-        """Return the resisting torques that hold the joints of a contact, shape (n,); 0 for the others."""
+    def holding_torques(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
+        """Return the resisting torques of holding joints, shape (n,), N m and N; 0 for the others."""
         qdd = self.moving(q, qd, tau, contact, pushes)
-        net = tau + self.pushed(pushes, q) - self.resistance(qd, contact.directions)
+        net = tau + self.push_torques(pushes, q) - self.resistance(qd, contact.directions)
         needed = net - mass_matrix(self.description, q) @ qdd - bias(self.description, q, qd)
         return np.where(contact.holds, needed, 0.0)
 
     def after_impact(self, q: Array, qd: Array, joint: int, *, rebounds: bool) -> Array:
-        """Return the rates after a joint has hit its stop: an impulse along it through the inverse mass matrix."""
+        """Return the rates after the impact of a joint at its stop, shape (n,), rad/s and m/s."""
         column = np.linalg.solve(mass_matrix(self.description, q), np.eye(self.n)[joint])
         restitution = (self.restitution or 0.0) if rebounds else 0.0
         after: Array = qd - column * ((1 + restitution) * qd[joint] / column[joint])
@@ -238,11 +238,11 @@ class Plant:
         return after
 
     def kinetic_energy(self, q: Array, qd: Array) -> float:
-        """Return the kinetic energy, drives included, J."""
+        """Return the kinetic energy with the drives' rotors, J; q and qd of shape (n,)."""
         return float(kinetic_energy(self.description, q, qd))
 
     def energy(self, q: Array, qd: Array) -> float:
-        """Return kinetic and potential energy, J."""
+        """Return kinetic plus potential energy, J; q and qd of shape (n,)."""
         return self.kinetic_energy(q, qd) + float(potential_energy(self.description, q))
 
     def __repr__(self) -> str:
@@ -254,27 +254,27 @@ class Plant:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """What joints with stiction and at stops do until something changes."""
+    """Modes of joints with stiction or at stops: holding, or moving in a direction."""
 
     directions: NDArray[np.int8]
-    """Which way each joint goes or is about to go: 1, -1, 0; shape (n,)."""
+    """Direction in which each joint moves or begins to move, 1 or -1, and 0 for none, shape (n,)."""
     holds: NDArray[np.bool_]
-    """Which joints stay where they are, shape (n,)."""
+    """Joints that hold their position, shape (n,)."""
 
     @classmethod
     def free(cls, n: int) -> Contact:
-        """Return that of joints that nothing holds."""
+        """Return the contact of n joints of which none holds."""
         return cls(np.zeros(n, dtype=np.int8), np.zeros(n, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """What stays the same from a state on, until something sudden happens."""
+    """Contact and pushes that do not change until the next event."""
 
     contact: Contact
     pushes: tuple[Push, ...]
     qdd: Array
-    """Accelerations at its beginning, shape (n,)."""
+    """Accelerations at its start, shape (n,), rad/s^2 and m/s^2."""
 
 
 def _require_push(push: object) -> None:
@@ -283,11 +283,11 @@ def _require_push(push: object) -> None:
 
 
 MAX_STALLED_ROUNDS = 10
-"""Rounds without fewer violations after which single indices are exchanged (Murty), which cannot cycle."""
+"""Rounds without fewer violations after which Murty's rule exchanges single indices, which cannot cycle."""
 
 
 def bounded_forces(A: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.int8]]:
-    """Return the resisting torques f of joints at rest, and which of their bounds each is at.
+    """Return the resisting torques f of joints at rest, and the bound that each is at.
 
     The accelerations are w = b - A f. A joint holds (w = 0) while its torque is between the bounds; it breaks away
     forwards (w >= 0) against its upper bound, backwards (w <= 0) against its lower one. With A positive definite there
@@ -317,7 +317,7 @@ def bounded_forces(A: Array, b: Array, lower: Array, upper: Array) -> tuple[Arra
         if held.any():
             f[held] = np.linalg.solve(A[np.ix_(held, held)], b[held] - A[np.ix_(held, ~held)] @ f[~held])
         w = b - A @ f
-        # Where each joint belongs if it is wrong: over a bound, or moving against its direction.
+        # The mode of a joint whose present mode is violated: over a bound, or moving against its direction.
         wanted = np.where(held, (f > upper).astype(np.int8) - (f < lower), np.where(side * w < 0, 0, side))
         wrong = np.flatnonzero(wanted != side)
         if not len(wrong):

@@ -1,4 +1,4 @@
-"""Wrenches from outside: on the tool or on a link, over a time window."""
+"""External wrenches on the tool or on a link, over a time window."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dhkit.kinematics import forward_kinematics, frames
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A force and a moment on the arm, constant in world axes from one time to another.
+    """A force and a moment on the arm, constant in world axes during a time window.
 
     Raises
     ------
@@ -26,17 +26,17 @@ class Push:
     """
 
     force: ArrayLike
-    """N, world axes, shape (3,)."""
+    """Force, world axes, shape (3,), N."""
     moment: ArrayLike = (0.0, 0.0, 0.0)
-    """N m, world axes, shape (3,)."""
+    """Moment, world axes, shape (3,), N m."""
     link: int | None = None
-    """Which link is pushed, from 1; None for the tool."""
+    """Number of the pushed link, from 1; None for the tool."""
     point: ArrayLike = (0.0, 0.0, 0.0)
-    """Where the force acts, m, in the link's DH frame or in the tool's, shape (3,)."""
+    """Point of the force in the link's DH frame or the tool's frame, shape (3,), m."""
     begin: float = 0.0
-    """s."""
+    """Time at which the push begins, s."""
     end: float = inf
-    """s; the push acts until just before."""
+    """Time at which the push ends, s; it does not act at that time."""
 
     def __post_init__(self) -> None:
         for name in ("force", "moment", "point"):
@@ -52,7 +52,7 @@ class Push:
             raise ValueError(f"the push ends at {self.end:g} s, before it begins at {self.begin:g} s")
 
     def torque(self, description: Description, q: Array) -> Array:
-        """Return what the push does to the joints, shape (n,), N m and N."""
+        """Return the joint torques of the push at joint values q (n,), shape (n,), N m and N."""
         n = description.n
         if self.link is not None and self.link > n:
             raise ValueError(f"link is {self.link}; {description.name} has {n}")

@@ -1,4 +1,4 @@
-"""What a controller is to follow: motions, held configurations, steps and sines, sampled in one batch."""
+"""References for controllers: motions, held configurations, steps and sines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Samples: TypeAlias = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Setpoint:
-    """What is asked for at one time: joint values, rates and accelerations, shape (n,), rad, m and seconds."""
+    """Reference at one time: joint values, rates and accelerations, shape (n,), rad, m and seconds."""
 
     description: Description
     q: Array
@@ -51,28 +51,28 @@ class Setpoint:
 
 @runtime_checkable
 class Reference(Protocol):
-    """Anything that has joint values for times; ``duration`` is how long a run lasts unless it is told otherwise.
+    """Joint values as a function of time; ``duration`` is the duration of a run unless another is given.
 
-    Where it has an attribute ``jumps``, times (s) at which it or its derivatives jump, continuous runs pause there.
+    If it has an attribute ``jumps``, times (s) at which it or its derivatives jump, continuous runs end steps there.
     """
 
     @property
     def duration(self) -> float | None:
-        """In s; None where it has no end."""
+        """Duration, s; None if it has no end."""
 
     def sampled(self, t: Array) -> Samples:
-        """Return joint values, rates and accelerations at times (N,)."""
+        """Return joint values, rates and accelerations at times (N,), s: shape (N, n) each, rad, m and seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """One configuration."""
+    """A constant configuration, shape (n,), rad and m."""
 
     q: Array
     duration: float | None = None
 
     def sampled(self, t: Array) -> Samples:
-        """Return the configuration for each time."""
+        """Return the configuration at times (N,), shape (N, n), and zero rates and accelerations."""
         still = np.zeros((len(t), len(self.q)))
         return still + self.q, still, still.copy()
 
@@ -82,12 +82,12 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A configuration, and from a time on another one."""
+    """A step from one configuration to another at a time, shape (n,) each, rad and m."""
 
     before: ArrayLike
     after: ArrayLike
     time: float = 0.0
-    """s."""
+    """Time of the step, s."""
     duration: float | None = None
 
     def __post_init__(self) -> None:
@@ -95,11 +95,11 @@ class Step:
 
     @property
     def jumps(self) -> tuple[float, ...]:
-        """When it jumps, s."""
+        """Times of jumps, s."""
         return (float(self.time),)
 
     def sampled(self, t: Array) -> Samples:
-        """Return one of the configurations for each time."""
+        """Return the configurations at times (N,), shape (N, n), and zero rates and accelerations."""
         q = np.where((t >= self.time)[:, None], np.asarray(self.after), np.asarray(self.before))
         return q, np.zeros_like(q), np.zeros_like(q)
 
@@ -109,21 +109,21 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Sine:
-    """Joint values centre + amplitude sin(2 pi frequency t + phase)."""
+    """Joint values centre + amplitude sin(2 pi frequency t + phase), arrays of shape (n,), rad and m."""
 
     centre: ArrayLike
     amplitude: ArrayLike
     frequency: ArrayLike = 1.0
-    """Hz, for all joints or of each."""
+    """Frequency, a number for all joints or shape (n,), Hz."""
     phase: ArrayLike = 0.0
-    """rad."""
+    """Phase, a number for all joints or shape (n,), rad."""
     duration: float | None = None
 
     def __post_init__(self) -> None:
         _make_finite(self, "centre", "amplitude", "frequency", "phase")
 
     def sampled(self, t: Array) -> Samples:
-        """Return joint values and their derivatives."""
+        """Return joint values, rates and accelerations at times (N,), shape (N, n) each."""
         centre = np.asarray(self.centre)
         rate = 2 * np.pi * np.broadcast_to(np.asarray(self.frequency), centre.shape)
         amplitude = np.broadcast_to(np.asarray(self.amplitude), centre.shape)
@@ -136,14 +136,14 @@ class Sine:
 
 
 def _make_finite(reference: object, *names: str) -> None:
-    """Turn fields into arrays.
+    """Convert fields to arrays.
 
     Raises
     ------
     ValueError
-        One that is not finite.
+        A field that is not finite.
     TypeError
-        One that is no numbers.
+        A field that is not numeric.
     """
     for name in names:
         value = number_array(getattr(reference, name), name, "numbers")
@@ -179,7 +179,7 @@ class _Motion:
 def reference_of(
     description: Description, reference: Reference | Trajectory | ArrayLike, q0: ArrayLike | None = None
 ) -> Reference:
-    """Return a reference, made of a trajectory, or of a configuration or a pose to hold where it is one.
+    """Return a reference: as given, or made from a trajectory, or from a configuration or a pose to hold.
 
     Parameters
     ----------

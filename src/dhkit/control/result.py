@@ -1,4 +1,4 @@
-"""What a simulation found: states, torques, errors, and where the energy went."""
+"""Result of a simulation: states, torques, errors and the energy balance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Description, Robot, description_of
-from dhkit.description.joint_words import joint_unit
+from dhkit.description.joint_text import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.formats import format_function
 from dhkit.kinematics import forward_kinematics
@@ -18,24 +18,24 @@ from dhkit.kinematics import forward_kinematics
 
 @dataclass(frozen=True)
 class EnergyAudit:
-    """Where the energy of a run went, J; ``remains`` would be 0 without rounding and integration errors."""
+    """Energy balance of a run, J; ``remains`` would be 0 without rounding and integration errors."""
 
     change: float
-    """Of kinetic and potential energy, from the first state to the last."""
+    """Change of kinetic plus potential energy from the first state to the last."""
     drives: float
-    """Done by the torques given."""
+    """Work of the applied torques."""
     pushes: float
-    """Done by wrenches from outside."""
+    """Work of external wrenches."""
     friction: float
-    """Taken by friction."""
+    """Work lost to friction."""
     impacts: float
-    """Lost at stops."""
+    """Kinetic energy lost in impacts at stops."""
     turnover: float
-    """What the drives gave and took, counted alike, and the largest kinetic energy: the measure of what remains."""
+    """Integral of the drives' absolute power plus the largest kinetic energy: the scale of ``error``."""
 
     @property
     def remains(self) -> float:
-        """The change of energy that nothing accounts for."""
+        """Change of energy minus all works: the part that integration errors explain."""
         return self.change - (self.drives + self.pushes - self.friction - self.impacts)
 
     def __str__(self) -> str:
@@ -45,7 +45,7 @@ class EnergyAudit:
 
     @property
     def error(self) -> float:
-        """What remains, over the energy that was turned over; NaN of a run that failed, 0 where nothing moved."""
+        """``remains`` divided by ``turnover``; NaN if the run failed, 0 if nothing moved."""
         if not self.remains:
             return 0.0
         return abs(self.remains) / self.turnover if self.turnover != 0 else float("inf")
@@ -60,14 +60,14 @@ class EnergyAudit:
 
 
 class ErrorNorms(NamedTuple):
-    """How large an error over time is, in the error's unit."""
+    """Norms of an error over time, in the error's unit."""
 
     peak: float
-    """Largest."""
+    """Largest value."""
     rms: float
-    """Root of the mean square over all states."""
+    """Root mean square over all states."""
     final: float
-    """That of the last state."""
+    """Value at the last state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,59 +77,59 @@ class SimulationResult:
     description: Description
     """The arm that moved."""
     t: Array
-    """Shape (N+1,), s."""
+    """Times of the states, shape (N+1,), s."""
     q: Array
-    """Shape (N+1, n), rad and m."""
+    """Joint values, shape (N+1, n), rad and m."""
     qd: Array
     qdd: Array
-    """Right after each time, under the torques given from then on."""
+    """Accelerations right after each time, under the torques from then on, shape (N+1, n), rad/s^2 and m/s^2."""
     tau: Array
-    """What the drives gave from each time on, shape (N+1, n), N m and N; the last row was not yet acted on."""
+    """Torques of the drives from each time on, shape (N+1, n), N m and N; those of the last row have not acted."""
     tau_asked: Array
-    """What the controller asked for."""
+    """Torques that the controller commanded, shape (N+1, n), N m and N."""
     reference_q: Array
-    """What was to be followed, shape (N+1, n)."""
+    """Joint values of the reference, shape (N+1, n), rad and m."""
     reference_qd: Array
     audit: EnergyAudit
     reference_poses: Array = field(default_factory=lambda: np.zeros((0, 12)), kw_only=True)
-    """The tool's poses that the reference asks for, their upper three rows, shape (N+1, 12), where the arm that the
-    reference and the controller know has another geometry than the one that moved; shape (0, 12) where not."""
+    """Poses of the tool in the reference, upper three rows, shape (N+1, 12), if the robot that the reference and the
+    controller know has another geometry than the arm that moved; otherwise shape (0, 12)."""
     controller: str = field(default="", kw_only=True)
     """The controller's name, for figures; files do not keep it."""
     saturated: Array = field(default_factory=lambda: np.zeros(0))
-    """Of each joint the share of steps in which its drive could not give what was asked, shape (n,)."""
+    """Share of steps in which each joint's drive was at its limit, shape (n,), 0 to 1."""
 
     @property
     def error(self) -> Array:
-        """The reference less the joint values, shape (N+1, n), rad and m."""
+        """Reference minus joint values, shape (N+1, n), rad and m."""
         return self.reference_q - self.q
 
     @property
     def peak_error(self) -> Array:
-        """The largest error of each joint, shape (n,), rad and m."""
+        """Largest absolute error of each joint, shape (n,), rad and m."""
         peak: Array = np.abs(self.error).max(axis=0)
         return peak
 
     @property
     def rms_error(self) -> Array:
-        """The root of the mean squared error of each joint, shape (n,), rad and m."""
+        """Root mean square error of each joint, shape (n,), rad and m."""
         rms: Array = np.sqrt(np.mean(self.error**2, axis=0))
         return rms
 
     @property
     def final_error(self) -> Array:
-        """The error of each joint at the end, shape (n,), rad and m."""
+        """Error of each joint at the end, shape (n,), rad and m."""
         final: Array = self.error[-1]
         return final
 
     @cached_property
     def T(self) -> Array:
-        """The tool's poses in the world, shape (N+1, 4, 4)."""
+        """Poses of the tool in the world, shape (N+1, 4, 4)."""
         return forward_kinematics(self.description, self.q)
 
     @cached_property
     def reference_T(self) -> Array:
-        """The tool's poses in the world that the reference asks for, shape (N+1, 4, 4)."""
+        """Poses of the tool in the reference, in the world, shape (N+1, 4, 4)."""
         if not len(self.reference_poses):
             return forward_kinematics(self.description, self.reference_q)
         T = np.tile(np.eye(4), (len(self.reference_poses), 1, 1))
@@ -138,7 +138,7 @@ class SimulationResult:
 
     @cached_property
     def tool_error(self) -> Array:
-        """Distance of the tool from where the reference has it, shape (N+1,), m."""
+        """Distance of the tool's origin from that of the reference, shape (N+1,), m."""
         distance: Array = np.linalg.norm(self.T[:, :3, 3] - self.reference_T[:, :3, 3], axis=1)
         return distance
 
@@ -146,7 +146,7 @@ class SimulationResult:
     def tool_rotation_error(self) -> Array:
         """Angle of the rotation from the tool's orientation to that of the reference, shape (N+1,), rad, 0 to pi.
 
-        From both the sine and the cosine of the angle, so that small angles keep their digits.
+        Computed from both the sine and the cosine of the angle, which is accurate for small angles.
         """
         R = np.swapaxes(self.T[:, :3, :3], 1, 2) @ self.reference_T[:, :3, :3]
         skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
@@ -155,12 +155,12 @@ class SimulationResult:
 
     @property
     def tool_norms(self) -> ErrorNorms:
-        """Of :attr:`tool_error`, m."""
+        """Norms of :attr:`tool_error`, m."""
         return _norms(self.tool_error)
 
     @property
     def tool_rotation_norms(self) -> ErrorNorms:
-        """Of :attr:`tool_rotation_error`, rad."""
+        """Norms of :attr:`tool_rotation_error`, rad."""
         return _norms(self.tool_rotation_error)
 
     def save(self, path: str | Path) -> Path:

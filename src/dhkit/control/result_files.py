@@ -1,4 +1,4 @@
-"""Files of simulations by their suffix: .npz and .mat hold every number and the robot, .csv a line for each state."""
+"""Files of simulations: .npz and .mat hold all arrays and the robot, .csv one line for each state."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from dhkit.trajectories.tables import read_table, table_text
 
 SUFFIXES = (*ARCHIVES, ".csv")
 ROWS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
-"""Arrays of shape (N+1, n), in the order of a table's columns."""
+"""Names of the arrays of shape (N+1, n), in the order of a table's columns."""
 POSES = "reference_poses"
-"""Name of the reference's poses, where they are not those of the arm that moved."""
+"""Name of the array of the reference's poses, stored if they are not those of the arm that moved."""
 ENERGIES = tuple(field.name for field in fields(EnergyAudit))
 AUDIT, SATURATED = "audit_", "saturated"
-"""What the names of the audit's numbers begin with, and the name of the shares of saturation."""
+"""Prefix of the names of the energy balance's numbers, and name of the shares of saturation."""
 COMMENTS_LENGTH = 10_000
-"""Characters in which a table's comments are searched: 40 numbers of 25 characters, and their names."""
+"""Number of characters of a table that are searched for comments: enough for 40 named numbers of 25 characters."""
 SIMULATION = FileKind(
     "simulation",
     arrays=("t", *ROWS, SATURATED, POSES, *(f"{AUDIT}{name}" for name in ENERGIES)),
@@ -35,7 +35,7 @@ SIMULATION = FileKind(
 
 
 def save_result(result: SimulationResult, path: str | Path) -> Path:
-    """Write a simulation and return its path; the file is there whole, or not at all.
+    """Write a simulation to a file, whole or not at all, and return its path.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def save_result(result: SimulationResult, path: str | Path) -> Path:
     suffix = checked_suffix(path, SUFFIXES)
     values = {name: getattr(result, name) for name in ("t", *ROWS, SATURATED, POSES)}
     values |= {f"{AUDIT}{name}": np.float64(value) for name, value in asdict(result.audit).items()}
-    _checked(values, result.description.n)
+    _checked_arrays(values, result.description.n)
     if suffix == ".csv":
         if len(result.reference_poses):
             raise ValueError(
@@ -82,12 +82,12 @@ def load_result(path: str | Path, description: Description | None = None) -> Sim
     path
         The file. It may come from anywhere: nothing in it is executed, and at most 500 MB are read.
     description
-        The robot. If not given, that of the file: the library's, or for an archive the one it holds.
+        The robot. If not given, the one named in the file: from the library, or for an archive the one that it holds.
 
     Raises
     ------
     DescriptionError
-        One line: the file cannot be read, is damaged, is no simulation, or is one of another robot.
+        In one line: the file cannot be read, is damaged, is not a simulation, or is one of another robot.
     """
     path = Path(path)
     suffix, content = SIMULATION.read(path, SUFFIXES)
@@ -95,12 +95,12 @@ def load_result(path: str | Path, description: Description | None = None) -> Sim
         if suffix == ".csv":
             text = decoded(content)
             robot = SIMULATION.robot_of_table(text, description)
-            checked = _checked(_csv_values(text, robot.n), robot.n)
+            checked = _checked_arrays(_csv_values(text, robot.n), robot.n)
             SIMULATION.require_unchanged(text)
         else:
             values = read_archive(suffix, content, SIMULATION)
             robot = SIMULATION.robot_of_archive(values, description)
-            checked = _checked(values, robot.n)
+            checked = _checked_arrays(values, robot.n)
             SIMULATION.require_whole(values)
         return _result(robot, checked)
     except (DescriptionError, ValueError) as error:
@@ -113,7 +113,7 @@ def _result(robot: Description, values: Mapping[str, Array]) -> SimulationResult
     return SimulationResult(robot, audit=audit, **arrays)
 
 
-def _checked(values: Mapping[str, Any], n: int) -> dict[str, Array]:
+def _checked_arrays(values: Mapping[str, Any], n: int) -> dict[str, Array]:
     """Return a simulation's arrays by name, in their shapes.
 
     Raises
@@ -174,11 +174,11 @@ def _csv_values(text: str, n: int) -> dict[str, Any]:
         raise DescriptionError(f"columns {', '.join(names)[:80]}; expected {', '.join(expected)[:200]}")
     values = dict(zip(ROWS, np.split(table[:, 1:], len(ROWS), axis=1), strict=True)) | {"t": table[:, 0]}
     values[POSES] = np.zeros((0, 12))
-    return values | _commented(text)
+    return values | _comment_values(text)
 
 
-def _commented(text: str) -> dict[str, Array]:
-    """Return the numbers that a table's first comments name."""
+def _comment_values(text: str) -> dict[str, Array]:
+    """Return the named numbers in the comments at the head of a table."""
     lines = takewhile(lambda line: line.startswith("#"), text[:COMMENTS_LENGTH].splitlines())
     said = {name: numbers for name, _, numbers in (line.removeprefix("# ").partition(":") for line in lines)}
     values = {}

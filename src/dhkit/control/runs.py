@@ -1,4 +1,4 @@
-"""One run of a controller on a plant: sampled, its torques held in between, or continuous."""
+"""One run of a controller on a plant: sampled, with torques held between samples, or continuous."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dhkit.control.controller import Controller, called, continuous_law, name_of, reset, torques
-from dhkit.control.events import advanced
+from dhkit.control.controller import Controller, call_controller, continuous_law, name_of, reset, torques
+from dhkit.control.events import advance
 from dhkit.control.integrators import DormandPrince, Integrator, RungeKutta, State
 from dhkit.control.plant import Plant
 from dhkit.control.references import Reference, Setpoint
@@ -23,31 +23,32 @@ from dhkit.errors import SimulationError
 from dhkit.kinematics import forward_kinematics
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with how many steps are done and how many there are."""
+"""Callback with the number of steps done and the number of all steps."""
 LONGEST_STEP = 2e-3
-"""s of an integration step where a controller, friction or stops may do something sudden that it would pass over."""
+"""Longest integration step (s) where a controller, friction or a stop may change the torques suddenly: a longer step
+could pass over the change."""
 PAIR = ("torques", "derivatives of the states")
 PROGRESS_EVERY = 1000
-"""Steps."""
+"""Steps between two calls of the progress callback."""
 
 
 class Run(ABC):
-    """A run at the times of its rows, and what has been recorded so far.
+    """A simulation run, with the rows recorded so far.
 
     Parameters
     ----------
     description
         The robot that the controller and the reference know.
     plant
-        What moves.
+        The arm that moves.
     controller
-        None for no torques.
+        The controller; None for no torques.
     t
         Times of the rows, shape (N+1,), s.
     reference
         Joint values, rates and accelerations at these times, shape (N+1, n) each.
-    most
-        Largest torques of the drives, shape (n,).
+    effort_limits
+        Largest torques of the drives, shape (n,), N m and N.
     """
 
     def __init__(
@@ -57,20 +58,20 @@ class Run(ABC):
         controller: Controller | None,
         t: Array,
         reference: tuple[Array, Array, Array],
-        most: Array,
+        effort_limits: Array,
     ) -> None:
         self.description, self.plant, self.controller = description, plant, controller
-        self.t, self.reference, self.most = t, reference, most
+        self.t, self.reference, self.effort_limits = t, reference, effort_limits
         shape = (len(t), plant.n)
         self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros(shape) for _ in range(5))
         self.turnover = 0.0
 
     @abstractmethod
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
-        """Return the torques that are asked for in row k, shape (n,), and what advances the arm to the next row."""
+        """Return the commanded torques in row k, shape (n,), N m and N, and the integrator to the next row."""
 
     def __call__(self, state: State, progress: Progress | None = None) -> SimulationResult:
-        """Return the run from a state on.
+        """Run from a state to the last row and return the result.
 
         Raises
         ------
@@ -82,18 +83,18 @@ class Run(ABC):
         first, kept = state, -1
         try:
             for k in range(steps + 1):
-                asked, integrator = self.integrator(k, state)
+                commanded, integrator = self.integrator(k, state)
                 tau = integrator.torque(state)
                 phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
                 self.q[k], self.qd[k], self.qdd[k] = state.q, state.qd, phase.qdd
-                self.tau[k], self.tau_asked[k] = tau, asked
+                self.tau[k], self.tau_asked[k] = tau, commanded
                 kept, last = k, state
                 if k == steps:
                     break
                 stops = self.stops(k, edges)
-                state = advanced(plant, integrator, state, stops[0], phase)
+                state = advance(plant, integrator, state, stops[0], phase)
                 for until in stops[1:]:
-                    state = advanced(plant, integrator, state, until)
+                    state = advance(plant, integrator, state, until)
                 self.turnover += float(np.abs(tau * (state.q - last.q)).sum())
                 if progress is not None and k % PROGRESS_EVERY == PROGRESS_EVERY - 1:
                     progress(k + 1, steps)
@@ -103,7 +104,7 @@ class Run(ABC):
         return self.result(steps, first, state)
 
     def edges(self) -> Sequence[float]:
-        """Return times at which torques jump, beside those of the rows."""
+        """Return the times (s) at which torques jump, apart from those of the rows."""
         return ()
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
@@ -112,11 +113,11 @@ class Run(ABC):
         return [edge for edge in edges if begin < edge < end] + [float(end)]
 
     def setpoint(self, k: int) -> Setpoint:
-        """Return what is asked for in row k."""
+        """Return the setpoint of row k."""
         return Setpoint(self.description, *(array[k] for array in self.reference))
 
     def result(self, k: int, first: State, last: State) -> SimulationResult:
-        """Return the rows up to k."""
+        """Return the result of the rows up to k."""
         rows = slice(0, k + 1)
         recorded = {name: getattr(self, name)[rows] for name in ("t", "q", "qd", "qdd", "tau", "tau_asked")}
         recorded |= {"reference_q": self.reference[0][rows], "reference_qd": self.reference[1][rows]}
@@ -131,7 +132,7 @@ class SampledRun(Run):
     substeps
         Steps of Runge and Kutta's method from one row to the next.
     measuring
-        What the controller sees; the true state unless given.
+        The sensors whose values the controller gets; the true state unless given.
     others
         As for :class:`Run`.
     """
@@ -142,14 +143,14 @@ class SampledRun(Run):
         reset(self.controller)
 
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
-        """Return the controller's torques, and an integrator that holds them."""
+        """Return the controller's torques, shape (n,), N m and N, and an integrator that holds them."""
         n, t = self.plant.n, float(self.t[k])
         if self.controller is None:
             none = np.zeros(n)
             return none, RungeKutta(self.plant, none)
         q, qd = (state.q.copy(), state.qd.copy()) if self.measuring is None else self.measuring(state.q, state.qd)
-        asked = torques(called(self.controller, t, q, qd, self.setpoint(k)), n, t)
-        return asked, RungeKutta(self.plant, np.clip(asked, -self.most, self.most))
+        commanded = torques(call_controller(self.controller, t, q, qd, self.setpoint(k)), n, t)
+        return commanded, RungeKutta(self.plant, np.clip(commanded, -self.effort_limits, self.effort_limits))
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the ends of all steps to the next row."""
@@ -163,19 +164,19 @@ class ContinuousRun(Run):
 
     Parameters
     ----------
-    wanted
-        The reference at any time.
+    continuous_reference
+        The reference, sampled at the times of the integrator.
     q0
-        Where the arm begins, shape (n,).
+        Joint values at the start, shape (n,), rad and m.
     tolerance
-        Of a step's error.
+        Tolerance of a step's error, relative and absolute.
     others
         As for :class:`Run`.
     """
 
-    def __init__(self, *others: Any, wanted: Reference, q0: Array, tolerance: float) -> None:
+    def __init__(self, *others: Any, continuous_reference: Reference, q0: Array, tolerance: float) -> None:
         super().__init__(*others)
-        self.wanted = wanted
+        self.continuous_reference = continuous_reference
         self.memory = np.zeros(0)
         if self.controller is not None:
             reset(self.controller)
@@ -188,27 +189,27 @@ class ContinuousRun(Run):
         self._integrator = DormandPrince(self.plant, self._torques, tolerance, [*inside, end], longest)
 
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
-        """Return the torques at a row, and the integrator of the whole run."""
-        return self._asked(state.t, state.q, state.qd, state.memory)[0], self._integrator
+        """Return the torques at a row, shape (n,), N m and N, and the integrator of the whole run."""
+        return self._commanded(state.t, state.q, state.qd, state.memory)[0], self._integrator
 
     def edges(self) -> Sequence[float]:
         """Return the times at which the reference jumps."""
-        return [float(x) for x in getattr(self.wanted, "jumps", ())]
+        return [float(x) for x in getattr(self.continuous_reference, "jumps", ())]
 
     def _torques(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
-        asked, derivative = self._asked(t, q, qd, memory)
-        return np.clip(asked, -self.most, self.most), derivative
+        commanded, derivative = self._commanded(t, q, qd, memory)
+        return np.clip(commanded, -self.effort_limits, self.effort_limits), derivative
 
-    def _asked(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
+    def _commanded(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
         n = self.plant.n
         if self.controller is None:
             return np.zeros(n), self.memory
-        wanted = sampled_reference(self.description, self.wanted, np.array([t]))
-        setpoint = Setpoint(self.description, *(array[0] for array in wanted))
-        returned = called(self._law, t, q.copy(), qd.copy(), setpoint, memory.copy())
+        samples = sampled_reference(self.description, self.continuous_reference, np.array([t]))
+        setpoint = Setpoint(self.description, *(array[0] for array in samples))
+        returned = call_controller(self._law, t, q.copy(), qd.copy(), setpoint, memory.copy())
         if not isinstance(returned, tuple) or len(returned) != len(PAIR):
             raise SimulationError(f"the controller returned {type(returned).__name__} at {t:g} s; expected {PAIR}")
-        asked = torques(returned[0], n, t)
+        commanded = torques(returned[0], n, t)
         derivative = number_array(returned[1], "derivatives of the controller's states", "(m,)").reshape(-1)
         if not np.isfinite(derivative).all():
             raise SimulationError(f"the controller's states have derivatives that are not finite at {t:g} s")
@@ -216,7 +217,7 @@ class ContinuousRun(Run):
             raise SimulationError(
                 f"the controller's states have {derivative.size} derivatives at {t:g} s; expected {self.memory.size}"
             )
-        return asked, derivative
+        return commanded, derivative
 
 
 def result_of(
@@ -235,15 +236,15 @@ def result_of(
     description
         The robot that the controller and the reference know.
     plant
-        What moved.
+        The arm that moved.
     recorded
-        Its rows by the names of :class:`SimulationResult`.
+        Recorded arrays by the names of :class:`SimulationResult`.
     first, last
         The states of the first row and of the last.
     turnover
-        What the drives gave and took, counted alike, J.
+        Integral of the drives' absolute power, J.
     controller
-        Whose torques they were.
+        The controller, for its name; None for none.
     """
     q = recorded["q"]
     moving = float(kinetic_energy(plant.description, q, recorded["qd"]).max())
@@ -267,7 +268,7 @@ def result_of(
 
 
 def _reference_poses(description: Description, plant: Plant, q: Array) -> Array:
-    """Return a reference's poses where those of the arm that moves are others, shape (N+1, 12) or (0, 12)."""
+    """Return the poses of the reference if the moving arm has another geometry, shape (N+1, 12); else shape (0, 12)."""
     known = forward_kinematics(description, q)
     if np.array_equal(known, forward_kinematics(plant.description, q)):
         return np.zeros((0, 12))

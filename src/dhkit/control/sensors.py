@@ -1,4 +1,4 @@
-"""What a controller sees of a state: encoders of finite resolution, and noise."""
+"""Sensors of joint values and rates: encoders of finite resolution, and noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Sensors:
 
     A joint value gets normal noise and is then rounded to the encoder's resolution. A rate is the true one with noise,
     as from a tachometer, or with ``differences=True`` the difference of two measured joint values over a period, as
-    most drives work it out: then one count of the encoder is resolution x rate of noise.
+    most drives compute it: one count of the encoder is then an error of the rate of resolution x sampling rate.
 
     Parameters
     ----------
@@ -27,11 +27,12 @@ class Sensors:
     rate_noise
         Standard deviation of rates, rad/s and m/s, likewise.
     resolution
-        What one count of an encoder is on the joint's side, rad and m (2 pi / counts / gear), likewise; 0 for none.
+        Change of the joint value for one count of the encoder, rad and m (2 pi / counts / gear), likewise; 0 for exact
+        values.
     differences
         Whether rates are differences of measured joint values.
     seed
-        Of the noise: the same in every run.
+        Seed of the noise, which is the same in every run.
 
     Raises
     ------
@@ -56,13 +57,13 @@ class Sensors:
         if type(self.seed) is not int or self.seed < 0:
             raise ValueError(f"seed is {self.seed!r}; expected a whole number, 0 or more")
 
-    def started(self, n: int, period: float) -> Measuring:
-        """Return the measurement of one run of an arm of n joints, at samples a period (s) apart.
+    def start(self, n: int, period: float) -> Measuring:
+        """Start the measurement of one run of an arm with n joints, at samples ``period`` (s) apart.
 
         Raises
         ------
         ValueError
-            Numbers of another arm.
+            Arrays whose length is not n.
         """
         for name in ("noise", "rate_noise", "resolution"):
             shape = np.shape(getattr(self, name))
@@ -75,7 +76,7 @@ class Sensors:
 
 
 class Measuring:
-    """The sensors during one run."""
+    """Sensors during one run, with the state of their noise."""
 
     def __init__(self, sensors: Sensors, period: float) -> None:
         self._sensors, self._period = sensors, period
@@ -83,7 +84,7 @@ class Measuring:
         self._before: Array | None = None
 
     def __call__(self, q: Array, qd: Array) -> tuple[Array, Array]:
-        """Return measured joint values and rates, shape (..., n) each, of the next sample."""
+        """Return the measured joint values and rates of the next sample, shape (..., n) each, rad, m and per second."""
         sensors = self._sensors
         noise = np.asarray(sensors.noise)
         measured = q + noise * self._random.standard_normal(q.shape) if noise.any() else q.copy()

@@ -1,4 +1,4 @@
-"""A step of Runge and Kutta's method as one program, alone or with a control law before it, for one arm or many."""
+"""A Runge-Kutta step as one compiled program, alone or after a control law, for one arm or a batch."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     import casadi
 
 WORKS = ("drives", "turnover", "friction")
-"""What is added up for each arm, J: done by the drives' torques, the same without its sign, and taken by friction."""
+"""Works that a step adds up, J: by the drives' torques, the integral of their absolute power, and lost to friction."""
 NO_LIMIT = 1e300
-"""N m: in place of infinity, which programs answer with NaN."""
+"""Torque (N m or N) that stands for no limit: with infinity, the programs would return NaN."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,13 @@ class StepKernel:
     kernel
         The program.
     shared
-        Numbers that all runs share; the setpoint's 3 n come first where ``setpoint_shared``.
+        Inputs that all runs share, shape (p,); the setpoint's 3n come first if ``setpoint_shared``.
     own
-        Numbers of each run, shape (B, p); the setpoint's 3 n come first where it is not shared. None for none.
+        Inputs of each run, shape (B, p); the setpoint's 3n come first unless it is shared. None for none.
     closed
-        Whether the program has a control law: it is then given a setpoint in place of torques.
+        Whether the program includes a control law: it then takes a setpoint in place of torques.
     setpoint_shared
-        Whether one setpoint is for all runs.
+        Whether all runs have the same setpoint.
     """
 
     kernel: Kernel
@@ -57,15 +57,21 @@ class StepKernel:
 
     @classmethod
     def open(cls, arms: Sequence[Description], friction: Friction | None, h: float) -> StepKernel:
-        """Return a step of length h (s) under torques that are given, of one arm for all states, or of one for each."""
+        """Return a step of length h (s) under constant torques, for one arm of all states or for one arm of each."""
         pattern, numbers = _plant(arms, friction, h)
         return cls._of(pattern, numbers, arms, None)
 
     @classmethod
     def closed_loop(
-        cls, arms: Sequence[Description], friction: Friction | None, h: float, law: Law, most: Array, setpoint: Array
+        cls,
+        arms: Sequence[Description],
+        friction: Friction | None,
+        h: float,
+        law: Law,
+        effort_limits: Array,
+        setpoint: Array,
     ) -> StepKernel:
-        """Return a step under the torques of a law at its beginning.
+        """Return a step under the torques that a control law commands at its beginning.
 
         Parameters
         ----------
@@ -73,14 +79,16 @@ class StepKernel:
             As for :meth:`open`.
         law
             The controller.
-        most
-            Largest torques, shape (n,) or (B, n).
+        effort_limits
+            Largest torques of the drives, shape (n,) or (B, n), N m and N.
         setpoint
             Joint values, rates and accelerations in a row, shape (3n,) for all runs or (B, 3n) of each.
         """
         pattern, plant = _plant(arms, friction, h)
-        model_pattern, model = ("", None) if _same(arms, law) else inertial_pattern(law.description)
-        numbers = {"setpoint": setpoint} | plant | {"gains": law.gains, "most": np.minimum(most, NO_LIMIT)}
+        model_pattern, model = ("", None) if _shares_symbols(arms, law) else inertial_pattern(law.description)
+        numbers = (
+            {"setpoint": setpoint} | plant | {"gains": law.gains, "effort_limits": np.minimum(effort_limits, NO_LIMIT)}
+        )
         if model is not None:
             numbers["model"] = model
         return cls._of(f"{pattern} {law.name} {model_pattern}", numbers, arms, law)
@@ -89,7 +97,7 @@ class StepKernel:
     def _of(
         cls, pattern: str, numbers: Mapping[str, Array], arms: Sequence[Description], law: Law | None
     ) -> StepKernel:
-        """Return the step whose program has these numbers, shape (p,) of all runs or (B, p) of each."""
+        """Return the step whose program has these inputs: shape (p,) for all runs, or (B, p)."""
         shared = {name: values for name, values in numbers.items() if values.ndim == 1}
         own = {name: values for name, values in numbers.items() if values.ndim == 2}
         sizes = {name: values.shape[-1] for name, values in numbers.items()}
@@ -107,29 +115,29 @@ class StepKernel:
             "setpoint" in shared,
         )
 
-    def lasting(self, h: float) -> StepKernel:
-        """Return the step under given torques with another length, s."""
+    def with_length(self, h: float) -> StepKernel:
+        """Return the step under constant torques with another length h, s."""
         shared = self.shared.copy()
         shared[0] = h
         return replace(self, shared=shared)
 
     def rows(self, rows: slice) -> StepKernel:
-        """Return the step of some of the runs, with numbers of its own."""
+        """Return the step of some of the runs."""
         return replace(self, shared=self.shared.copy(), own=None if self.own is None else self.own[rows])
 
     def __call__(self, states: Sequence[Array], drive: Array, into: Sequence[Array], threads: int = 1) -> None:
-        """Fill joint values (B, n), rates (B, n) and works (B, 3) of after a step, and with a law its torques (B, n).
+        """Write the joint values (B, n), rates (B, n) and works (B, 3) after a step, and with a law its torques (B, n).
 
         Parameters
         ----------
         states
-            Joint values, rates and works before.
+            Joint values, rates and works at the beginning of the step.
         drive
-            Torques (B, n); or with a law the setpoint, (3n,) where it is shared, and otherwise ignored.
+            Torques, shape (B, n), N m and N; with a law the setpoint, shape (3n,), ignored unless it is shared.
         into
-            Arrays to fill.
+            Arrays that the results are written to.
         threads
-            How many threads share it.
+            Number of threads that share the step.
         """
         own = () if self.own is None else (self.own,)
         if not self.closed:
@@ -140,13 +148,13 @@ class StepKernel:
         self.kernel(self.shared, [*states, *own], list(into), threads)
 
 
-def _same(arms: Sequence[Description], law: Law) -> bool:
-    """Return whether the controller knows the arm that moves, so that they share symbols and what they work out."""
+def _shares_symbols(arms: Sequence[Description], law: Law) -> bool:
+    """Return whether the controller's model is the arm that moves, so that both use the same symbols."""
     return len(arms) == 1 and arms[0] == law.description
 
 
 def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> tuple[str, dict[str, Array]]:
-    """Return the pattern of a plant's program, and its numbers."""
+    """Return the pattern of a plant's program, and its inputs by name."""
     pattern, values = inertial_pattern(*arms)
     numbers = {"step": np.array([h]), "arm": values}
     if friction is None:
@@ -156,7 +164,7 @@ def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> 
 
 
 def _graph(arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int], own: Sequence[str]) -> Graph:
-    """Return the program; ``sizes`` are the counts of its numbers by name, and ``own`` names those of each run."""
+    """Return the program; ``sizes`` are lengths of inputs by name, ``own`` the names of each run's own inputs."""
     import casadi
 
     n = arms[0].n
@@ -169,11 +177,13 @@ def _graph(arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int
         known = table
         if "model" in sizes:
             known, symbols["model"] = InertialTable.parametric(law.description)
-        wanted, most = symbols["setpoint"], symbols["most"]
-        torques = law.torques(known, Symbols(q, qd, wanted[:n], wanted[n : 2 * n], wanted[2 * n :]), symbols["gains"])
-        given = casadi.fmin(casadi.fmax(torques, -most), most)
+        setpoint, effort_limits = symbols["setpoint"], symbols["effort_limits"]
+        torques = law.torques(
+            known, Symbols(q, qd, setpoint[:n], setpoint[n : 2 * n], setpoint[2 * n :]), symbols["gains"]
+        )
+        given = casadi.fmin(casadi.fmax(torques, -effort_limits), effort_limits)
         asked = {"asked": torques}
-    later = _advanced(table, q, qd, given, symbols["step"], symbols.get("friction"))
+    later = _runge_kutta_step(table, q, qd, given, symbols["step"], symbols.get("friction"))
     shared = [symbol for name, symbol in symbols.items() if name not in own]
     inputs = {"shared": casadi.vertcat(*shared), "q": q, "qd": qd, "works": works}
     if law is None:
@@ -184,15 +194,15 @@ def _graph(arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int
     return Graph.of("runge_kutta_step", inputs, outputs)
 
 
-def _advanced(
+def _runge_kutta_step(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX, h: casadi.SX, friction: casadi.SX | None
 ) -> tuple[casadi.SX, casadi.SX, casadi.SX]:
-    """Return joint values and rates after a step under torques, and the works of ``WORKS``."""
+    """Return joint values and rates after a step under constant torques, and the works of ``WORKS`` in it."""
     import casadi
 
     n = table.n
 
-    def loss(v: casadi.SX) -> casadi.SX:
+    def resistance(v: casadi.SX) -> casadi.SX:
         if friction is None:
             return casadi.SX.zeros(n)
         viscous = [friction[1 + i] for i in range(n)]
@@ -200,7 +210,7 @@ def _advanced(
         return friction_torque(v, viscous, coulomb, [smooth_direction(v[i], friction[0]) for i in range(n)])
 
     def rate(x: casadi.SX, v: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
-        lost = loss(v)
+        lost = resistance(v)
         return recursive_forward_dynamics(table, x, v, tau - lost), casadi.dot(v, lost)
 
     a1, p1 = rate(q, qd)

@@ -1,4 +1,4 @@
-"""When a run's rows are, how many integration steps lie between them, and what is asked for at each."""
+"""Time grid of a run: the rows' times, the integration steps between them, and the setpoint at each."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from dhkit.control.references import Reference, Samples
 from dhkit.description import Array, Description
 
 NAMES = ("q", "qd", "qdd")
-MOST_STEPS = 10_000_000
-"""Of one run: what is kept of them is about 5 kB a step for each joint."""
+MAX_STEPS = 10_000_000
+"""Largest number of rows or steps of a run. A row takes about 60 bytes for each joint."""
 STEPS_OF_STIFFNESS = 0.5
-"""Largest step times the stiffness of friction: Runge and Kutta's method is stable up to 2.785; at 0.5 the energy
-audit of a PUMA closes to 1e-9."""
-MOST_SUBSTEPS = 1_000
-"""In a control period."""
+"""Largest product of step length (s) and stiffness of friction (1/s). The Runge-Kutta method is stable up to 2.785;
+at 0.5 the energy balance of a PUMA closes to 1e-9."""
+MAX_SUBSTEPS = 1_000
+"""Largest number of integration steps in a control period."""
 
 
 def require_positive(**values: float | None) -> None:
-    """Refuse what is given and not a positive, finite number.
+    """Require positive, finite numbers; None is accepted.
 
     Raises
     ------
@@ -39,9 +39,9 @@ def row_times(reference: float | None, duration: float | None, rate: float) -> A
     Parameters
     ----------
     reference, duration
-        s: how long the reference lasts, and what was asked for in its place; None for neither.
+        Duration of the reference, s, and the one given in its place, which has precedence; None if not given.
     rate
-        Rows a second.
+        Rows per second, Hz.
 
     Raises
     ------
@@ -56,13 +56,13 @@ def row_times(reference: float | None, duration: float | None, rate: float) -> A
     steps = round(span * rate)
     if not steps:
         raise ValueError(f"{span:g} s are less than half a period at {rate:g} Hz; expected a period at least")
-    if steps > MOST_STEPS:
-        raise ValueError(f"{span:g} s at {rate:g} Hz are {span * rate:.3g} steps; expected at most {MOST_STEPS:,}")
+    if steps > MAX_STEPS:
+        raise ValueError(f"{span:g} s at {rate:g} Hz are {span * rate:.3g} steps; expected at most {MAX_STEPS:,}")
     return np.arange(steps + 1) / rate
 
 
 def steps_a_period(rate: float, plant_rate: float | None, periods: int = 1) -> int:
-    """Return how many integration steps a control period has.
+    """Return the number of integration steps in a control period that ``plant_rate`` (Hz) asks for.
 
     Raises
     ------
@@ -72,35 +72,33 @@ def steps_a_period(rate: float, plant_rate: float | None, periods: int = 1) -> i
     steps = 1 if plant_rate is None else plant_rate / rate
     if abs(steps - round(steps)) > 1e-9 or steps < 1 - 1e-9:
         raise ValueError(f"plant_rate is {plant_rate:g}; expected a multiple of rate, {rate:g}")
-    if steps * periods > MOST_STEPS:
-        raise ValueError(
-            f"plant_rate {plant_rate:g} makes {steps * periods:.3g} steps; expected at most {MOST_STEPS:,}"
-        )
+    if steps * periods > MAX_STEPS:
+        raise ValueError(f"plant_rate {plant_rate:g} makes {steps * periods:.3g} steps; expected at most {MAX_STEPS:,}")
     return round(steps)
 
 
 def substeps(stiffness: float, period: float, asked: int = 1) -> int:
-    """Return how many integration steps a control period takes, so that friction does not become unstable.
+    """Return the number of integration steps in a control period that keeps stiff friction stable.
 
     Parameters
     ----------
     stiffness
-        Of friction, 1/s: see :attr:`Plant.stiffness`.
+        Stiffness of friction, 1/s: see :attr:`Plant.stiffness`.
     period
-        s.
+        Control period, s.
     asked
-        At least so many.
+        Smallest number of steps.
 
     Raises
     ------
     ValueError
-        More than a thousand, and more than were asked for.
+        More than ``MAX_SUBSTEPS`` and more than ``asked``.
     """
     needed = max(asked, ceil(min(stiffness * period / STEPS_OF_STIFFNESS, 1e9)))
-    if needed > max(asked, MOST_SUBSTEPS):
+    if needed > max(asked, MAX_SUBSTEPS):
         raise ValueError(
             f"friction is too stiff: its rate of {stiffness:.3g} 1/s takes {needed:,} steps in {period:g} s;"
-            f" expected at most {MOST_SUBSTEPS:,}: a wider Friction(width), friction that is a step, or shorter periods"
+            f" expected at most {MAX_SUBSTEPS:,}: a wider Friction(width), friction that is a step, or shorter periods"
         )
     return needed
 

@@ -1,4 +1,4 @@
-"""References given in the tool's space: a pose, and poses reached at times."""
+"""References given by poses of the tool: one pose, or poses reached at given times."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dhkit.trajectories import Trajectory, straight_line
 
 @dataclass(frozen=True, eq=False)
 class ToolPoses:
-    """Poses of the tool reached at times; in between it moves straight, and comes to rest at each.
+    """Poses of the tool reached at given times, with straight motions in between that come to rest at each pose.
 
     On the way from one pose to the next the tool's origin stays on a line and the tool turns evenly about one axis, at
     s(t) = 10 t^3 - 15 t^4 + 6 t^5 (:func:`dhkit.trajectories.straight_line`). The first pose is held before its time,
@@ -34,10 +34,10 @@ class ToolPoses:
         keeps the orientation that it has at ``q0``. Arms that turn their tool only as its position asks for, such as
         planar2r, follow the positions alone on the way.
     times
-        When each is reached, shape (k,), s, from 0 on, ascending.
+        Times at which the poses are reached, shape (k,), s, ascending, the first not below 0.
     q0
-        Joint values, shape (n,), rad and m, to which those at the first pose are nearest; the middle of the joint
-        limits unless given.
+        Joint values, shape (n,), rad and m, for choosing the nearest solution at the first pose; the middle of the
+        joint limits unless given.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class ToolPoses:
     UnreachableError
         The arm does not reach the first pose inside its limits.
     PlanningError
-        It cannot follow one of the lines, or not in this time: says which, and where.
+        The arm cannot follow one of the lines, or not in the given time: names the line and the place.
 
     Examples
     --------
@@ -87,12 +87,12 @@ class ToolPoses:
 
     @property
     def duration(self) -> float:
-        """When the last pose is reached, s."""
+        """Time at which the last pose is reached, s."""
         return float(self._knots[-1])
 
     @property
     def jumps(self) -> Array:
-        """When accelerations' derivatives jump, s: at the poses, and where pieces of the joints' motion meet."""
+        """Times at which the jerk jumps, shape (jumps,), s: at the poses, and between pieces of the joints' motion."""
         return np.concatenate([self._knots, *(self._knots[k] + m.breaks for k, m in enumerate(self._motions))])
 
     def __repr__(self) -> str:
@@ -119,15 +119,15 @@ class ToolPoses:
 def joints_at_pose(description: Description, T: ArrayLike, near: Array | None, name: str) -> Array:
     """Return joint values that put the tool at a pose, shape (n,), inside the limits.
 
-    In closed form the solution nearest to ``near`` (the middle of the limits where None); for arms without, what an
-    iteration finds from there.
+    The closed-form solution nearest to ``near`` (n,), rad and m, by default the middle of the limits; for arms without
+    one, the solution that an iteration from ``near`` converges to.
 
     Raises
     ------
     ValueError
-        T is no pose, (4, 4).
+        T is not a pose of shape (4, 4).
     UnreachableError
-        The arm does not reach it: says why.
+        The arm does not reach the pose: says why.
     """
     pose = number_array(T, name, "(4, 4)")
     if pose.shape != (4, 4) or not np.isfinite(pose).all():

@@ -1,4 +1,4 @@
-"""Numbers that people give, as arrays: complex values, texts and other things are refused, never cast."""
+"""Array arguments of the public functions: converted to float64, or refused with the argument's name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 def number_array(value: ArrayLike, name: str, shape: str) -> Array:
-    """Return numbers as a float64 array, itself where it is one.
+    """Return an argument as a float64 array; a float64 array is returned as it is, not copied.
+
+    Complex numbers, texts and masked arrays are refused and never cast.
+
+    Parameters
+    ----------
+    value
+        Numbers of any shape and unit, unchecked: the caller compares the shape.
+    name, shape
+        The argument's name and expected shape, for the message.
 
     Raises
     ------
@@ -28,7 +37,7 @@ def number_array(value: ArrayLike, name: str, shape: str) -> Array:
         array = np.empty(1, dtype=object)
     if array.dtype.kind in "fiu" or not array.size:
         return array.astype(float, copy=False)
-    found = repr(value)[:60] if isinstance(value, str) else f"{type(value).__name__} of other things"
-    if array.dtype.kind == "c":
-        found = "complex numbers"
-    raise TypeError(f"{name}: found {found}; expected numbers, shape {shape}")
+    kind = repr(value)[:60] if isinstance(value, str) else f"{type(value).__name__} of other things"
+    raise TypeError(
+        f"{name}: found {'complex numbers' if array.dtype.kind == 'c' else kind}; expected numbers, shape {shape}"
+    )

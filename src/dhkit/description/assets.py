@@ -1,4 +1,4 @@
-"""Where the package's own files lie, installed or in a checkout, and what a mesh path may reach."""
+"""Paths of files: the package's own assets, and relative paths that must stay inside a folder."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from pathlib import Path, PurePosixPath
 from dhkit.errors import DescriptionError
 
 MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
-
-MAX_PATH = 500
-"""Characters of a mesh's path."""
-MAX_NAME = 120
-"""Characters of a file or folder in it: names of 255 bytes are the longest that a file can have."""
+MAX_PATH_LENGTH = 500
+"""Longest relative path, in characters."""
+MAX_NAME_LENGTH = 120
+"""Longest name of a file or folder in a path, in characters: 255 bytes is the limit of common file systems."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
 CHECKOUT = PACKAGE.parents[1]
-"""The repository root when the package is used from its sources; elsewhere a folder without our assets."""
+"""Root of the repository when dhkit runs from its sources; otherwise a folder without assets of dhkit."""
 
 
 def asset(name: str) -> Path:
@@ -24,7 +23,7 @@ def asset(name: str) -> Path:
     Raises
     ------
     DescriptionError
-        There is no such file in the package.
+        The package has no such file.
     """
     if name.split("/")[0] in ("urdf", "meshes") and ".." not in PurePosixPath(name).parts:
         for root in (PACKAGE, CHECKOUT):
@@ -33,32 +32,41 @@ def asset(name: str) -> Path:
     raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")
 
 
-def inside(folder: Path | None, path: str, where: str) -> Path | None:
-    """Return the file that a relative path names, None where its folder is unknown.
+def inside(folder: Path | None, path: str, subject: str, root: str = "the robot's folder") -> Path | None:
+    """Return the file that a relative path names inside a folder, None for an unknown folder.
+
+    Parameters
+    ----------
+    folder
+        The folder that the path is relative to; None checks the path's text alone.
+    path
+        The relative path, with slashes or backslashes.
+    subject, root
+        What the path stands for and what the folder is, for messages.
 
     Raises
     ------
     DescriptionError
-        The path is absolute, a URL, or leaves the folder.
+        The path is absolute, a URL or too long, or leaves the folder, also by a symbolic link.
     """
     parts = PurePosixPath(path.replace("\\", "/"))
     if (
         not path
-        or len(path) > MAX_PATH
-        or max(map(len, parts.parts), default=0) > MAX_NAME
+        or len(path) > MAX_PATH_LENGTH
+        or max(map(len, parts.parts), default=0) > MAX_NAME_LENGTH
         or not path.isprintable()
         or ":" in path
         or parts.is_absolute()
         or ".." in parts.parts
     ):
-        raise DescriptionError(f"{where}.mesh is {path[:80]!r}; expected a relative path inside the robot's folder")
+        raise DescriptionError(f"{subject} is {path[:80]!r}; expected a relative path inside {root}")
     if folder is None:
         return None
     file = folder / parts
     try:
-        leaves = not file.resolve().is_relative_to(folder.resolve())
+        leaves_folder = not file.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError):  # a loop of links, or a name that no file can have
-        raise DescriptionError(f"{where}.mesh is {path[:80]!r}, which cannot be found") from None
-    if leaves:
-        raise DescriptionError(f"{where}.mesh is {path[:80]!r}, a link that leaves the robot's folder")
+        raise DescriptionError(f"{subject} is {path[:80]!r}, which cannot be found") from None
+    if leaves_folder:
+        raise DescriptionError(f"{subject} is {path[:80]!r}, a link that leaves {root}")
     return file

@@ -1,4 +1,4 @@
-"""New descriptions from old: another tool, base, payload, parameter values, uniform links."""
+"""New descriptions from old ones: another tool, base, payload, limits, parameter values, or uniform links."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description.arrays import number_array
-from dhkit.description.bodies import INERTIA_PLACES, ORIGIN, Body, ExactPose, Inertia, Vector, moved_body, rod
+from dhkit.description.arrays import Array, number_array
+from dhkit.description.bodies import ORIGIN, Body, ExactPose, Inertia, Vector, moved_body, rod
 from dhkit.description.exact_poses import fixed_row, inverse, pose_of
 from dhkit.description.frames import one_each
 from dhkit.description.named import Named
@@ -25,19 +25,19 @@ from dhkit.description.values import Base, Convention, Placement, Tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 
-SYMMETRIC = 1e-12
-"""How unequal the products of an inertia may be, of its largest entry: what R I R^T leaves."""
+ASYMMETRY_TOLERANCE = 1e-12
+"""Largest difference of two symmetric entries of an inertia, relative to its largest entry: rounding of R I R^T."""
 
 
 @takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), in place of the one it has."""
+    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, in place of its own."""
     return replace(description, tool=Tool(_placement(T, "tool"), description.tool.shapes))
 
 
 @takes_robot
 def with_base(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with frame 0 at T in the world, shape (4, 4), in place of where it stood."""
+    """Return the arm with frame 0 at T in the world, shape (4, 4), m, in place of its own base."""
     base = description.base
     return replace(description, base=Base(_placement(T, "base"), base.shapes, base.body))
 
@@ -49,7 +49,7 @@ def with_parameters(description: Description, /, **values: Quantity) -> Descript
     Raises
     ------
     DescriptionError
-        It has no such parameter, or the robot with this value is none.
+        It has no such parameter, or the values make no robot.
     """
     known = description.parameters
     for name in values:
@@ -87,26 +87,22 @@ def with_limits(
     """
     numbers, n = description.numbers, description.n
     own = {"lower": numbers.lower, "upper": numbers.upper, "velocity": numbers.velocity, "torque": numbers.effort}
-    given = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
-    arrays = {name: own[name] if value is None else one_each(value, name, n) for name, value in given.items()}
+    new = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
+    arrays = {name: own[name] if value is None else one_each(value, name, n) for name, value in new.items()}
     joints = []
     for i, joint in enumerate(description.joints):
-        row = {name: float(array[i]) for name, array in arrays.items()}
-        where = f"joint {i + 1} ({joint.name})"
-        if np.isnan(list(row.values())).any() or np.isinf(row["lower"]) != np.isinf(row["upper"]):
+        low, high, speed, effort = (float(array[i]) for array in arrays.values())
+        if np.isnan([low, high, speed, effort]).any() or np.isinf(low) != np.isinf(high):
             raise DescriptionError(
-                f"{where}: limits [{row['lower']:g}, {row['upper']:g}]; expected two numbers, or both inf"
+                f"joint {i + 1} ({joint.name}): limits [{low:g}, {high:g}]; expected two numbers, or both inf"
             )
-        changed = joint
         if lower is not None or upper is not None:
-            changed = replace(
-                changed, limits=None if np.isinf(row["lower"]) else (exact(row["lower"]), exact(row["upper"]))
-            )
+            joint = replace(joint, limits=None if np.isinf(low) else (exact(low), exact(high)))
         if velocity is not None:
-            changed = replace(changed, velocity=None if np.isinf(row["velocity"]) else exact(row["velocity"]))
+            joint = replace(joint, velocity=None if np.isinf(speed) else exact(speed))
         if torque is not None:
-            changed = replace(changed, effort=None if np.isinf(row["torque"]) else exact(row["torque"]))
-        joints.append(changed)
+            joint = replace(joint, effort=None if np.isinf(effort) else exact(effort))
+        joints.append(joint)
     return replace(description, joints=tuple(joints))
 
 
@@ -131,28 +127,26 @@ def with_payload(
     Raises
     ------
     DescriptionError
-        The last link has no body to join it to, or the load is no body.
+        The last link has no body to join it to, or the load is an impossible body.
     """
     last = description.joints[-1]
     if not last.bodies:
         raise DescriptionError(
             f"joint {description.n} ({last.name}) has no body to join a payload to; see with_uniform_links"
         )
-    names = description.parameters
+    parameters = description.parameters
     if len(com) != 3:
         raise DescriptionError(f"payload: com has {len(com)} numbers; expected 3")
-    x, y, z = (quantity(f"payload: com[{i}]", entry, names) for i, entry in enumerate(com))
-    load = Body(quantity("payload: mass", mass, names), (x, y, z), _tensor(inertia), name=_payload_name(last.bodies))
-    check_body(load, "payload", resolved(names))
+    x, y, z = (quantity(f"payload: com[{i}]", entry, parameters) for i, entry in enumerate(com))
+    weight = quantity("payload: mass", mass, parameters)
+    taken = {body.name for body in last.bodies}
+    numbered_names = (f"payload {k}" for k in itertools.count(2))
+    name = next(name for name in itertools.chain(["payload"], numbered_names) if name not in taken)
+    tensor = Inertia() if inertia is None else Inertia.of_tensor(_inertia_tensor(inertia))
+    load = Body(weight, (x, y, z), tensor, name=name)
+    check_body(load, "payload", resolved(parameters))
     bodies = (*last.bodies, moved_body(load, pose_of(description.tool.placement)))
     return replace(description, joints=(*description.joints[:-1], replace(last, bodies=bodies)))
-
-
-def _payload_name(bodies: Sequence[Body]) -> str:
-    """Return a name for one more payload beside these bodies."""
-    taken = {body.name for body in bodies}
-    names = itertools.chain(["payload"], (f"payload {k}" for k in itertools.count(2)))
-    return next(name for name in names if name not in taken)
 
 
 @takes_robot
@@ -160,7 +154,7 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     """Return the arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
 
     In the standard convention link i lies from frame i-1's origin to frame i's, in the modified one from frame i's to
-    frame i+1's; the last ends at the tool. A prismatic joint stands at zero.
+    frame i+1's; the last ends at the tool. A prismatic joint is at zero.
 
     Parameters
     ----------
@@ -180,27 +174,26 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     if taken := names_in(bare) & set(symbols):
         raise DescriptionError(f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass")
     values = [exact(1)] * n if masses is None else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
-    ends = _link_ends(description)
     joints = tuple(
         replace(
             joint,
-            bodies=(rod(Expression.symbol(symbol), *end),),
+            bodies=(rod(Expression.symbol(symbol), *ends),),
             assumed=tuple(dict.fromkeys((*joint.assumed, "body"))),
         )
-        for joint, symbol, end in zip(description.joints, symbols, ends, strict=True)
+        for joint, symbol, ends in zip(description.joints, symbols, _link_ends(description), strict=True)
     )
     parameters = Named(dict(description.parameters) | dict(zip(symbols, values, strict=True)))
     return replace(description, joints=joints, parameters=parameters)
 
 
 def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
-    """Return where each link's rod begins and ends, in its own frame."""
+    """Return where each link's rod begins and ends, in the link's own frame, m."""
     rows = [fixed_row(joint, description.convention) for joint in description.joints]
     tool = _origin(pose_of(description.tool.placement))
     if description.convention is Convention.MODIFIED:
         return [(ORIGIN, _origin(row)) for row in rows[1:]] + [(ORIGIN, tool)]
-    ends = [(_origin(inverse(row)), ORIGIN) for row in rows]
-    return [*ends[:-1], (ends[-1][0], tool)]
+    starts = [_origin(inverse(row)) for row in rows]
+    return [*((start, ORIGIN) for start in starts[:-1]), (starts[-1], tool)]
 
 
 def _origin(T: ExactPose) -> Vector:
@@ -214,23 +207,25 @@ def _placement(T: ArrayLike, name: str) -> Placement:
         raise ValueError(f"{name}: found shape {matrix.shape}; expected a finite (4, 4) pose")
     xyz, (yaw, pitch, roll) = pose_parts(check_pose(matrix, name), order="ZYX")
     x, y, z = (exact(float(entry)) for entry in xyz)
-    angles = (exact_angle(exact(_rounded(angle))) for angle in (roll, pitch, yaw))
-    r, p, w = angles
+    r, p, w = (exact_angle(exact(_without_rounding(angle))) for angle in (roll, pitch, yaw))
     return Placement((x, y, z), (r, p, w))
 
 
-def _rounded(angle: float) -> float:
-    """Return an angle, with one within rounding of a multiple of 15 degrees put onto it."""
-    step = round(float(angle) * 12 / math.pi) * math.pi / 12
-    return step if math.isclose(angle, step, rel_tol=4e-16, abs_tol=4e-16) else float(angle)
+def _without_rounding(angle: float) -> float:
+    """Return an angle, rad; one within rounding of a multiple of 15 degrees becomes that multiple."""
+    multiple = round(float(angle) * 12 / math.pi) * math.pi / 12
+    return multiple if math.isclose(angle, multiple, rel_tol=4e-16, abs_tol=4e-16) else float(angle)
 
 
-def _tensor(inertia: ArrayLike | None) -> Inertia:
-    if inertia is None:
-        return Inertia()
-    I = number_array(inertia, "payload: inertia", "(3, 3)")  # noqa: E741 - the field's letter
-    if I.shape != (3, 3) or np.abs(I - I.T).max() > SYMMETRIC * np.abs(I).max():
-        raise DescriptionError(f"payload: inertia has shape {I.shape}; expected a symmetric (3, 3) matrix")
-    if not np.all(np.isfinite(I)):
+def _inertia_tensor(inertia: ArrayLike) -> Array:
+    tensor = number_array(inertia, "payload: inertia", "(3, 3)")
+    if tensor.shape != (3, 3) or is_asymmetric(tensor):
+        raise DescriptionError(f"payload: inertia has shape {tensor.shape}; expected a symmetric (3, 3) matrix")
+    if not np.all(np.isfinite(tensor)):
         raise DescriptionError("payload: inertia is not finite")
-    return Inertia(**{key: exact(float(I[place])) for key, place in INERTIA_PLACES.items()})
+    return tensor
+
+
+def is_asymmetric(tensor: Array) -> bool:
+    """Return whether symmetric entries of an inertia, shape (3, 3), kg m^2, differ by more than rounding."""
+    return bool(np.abs(tensor - tensor.T).max() > ASYMMETRY_TOLERANCE * np.abs(tensor).max())

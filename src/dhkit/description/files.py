@@ -1,4 +1,4 @@
-"""Reading at most so much, and writing all or nothing."""
+"""Files read up to a largest size, and written whole or not at all."""
 
 from __future__ import annotations
 
@@ -9,61 +9,72 @@ import tempfile
 from pathlib import Path
 from typing import BinaryIO
 
-from dhkit.errors import DescriptionError
+from dhkit.errors import DescriptionError, DhkitError
 
 STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
-"""Names of what this process has open; other files below /dev, such as those of /dev/shm, are files."""
+"""Names of streams that this process has open; other paths below /dev, such as /dev/shm, name files."""
 
 
-def read_bounded(path: str | Path, most: int, expected: str = "a robot file") -> bytes:
-    """Return a regular file's bytes; ``expected`` says in a message what it should be.
+def error_reason(error: Exception) -> str:
+    """Return the operating system's message of a failed file operation, or the error's own text."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def read_bounded(
+    path: str | Path,
+    max_bytes: int,
+    expected: str = "a robot file",
+    error_type: type[DhkitError] = DescriptionError,
+) -> bytes:
+    """Return a regular file's bytes; ``expected`` says in a message what the file should be.
 
     Raises
     ------
     DescriptionError
-        No such file, not a regular file, unreadable, or longer than ``most`` bytes.
+        Or another ``error_type``: no such file, not a regular file, unreadable, or longer than ``max_bytes``.
     """
     path = Path(path)
     try:
         if not path.is_file():
-            raise DescriptionError(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
+            raise error_type(f"{path}: {'not a regular file' if path.exists() else 'no such file'}")
         with path.open("rb") as file:
-            content = file.read(most + 1)
+            content = file.read(max_bytes + 1)
     except (OSError, ValueError) as error:
-        raise DescriptionError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > most:
-        raise DescriptionError(f"{path}: more than {most / 1e6:g} MB; expected {expected}")
+        raise error_type(f"{path}: {error_reason(error)}") from None
+    if len(content) > max_bytes:
+        raise error_type(f"{path}: more than {max_bytes / 1e6:g} MB; expected {expected}")
     return content
 
 
 def check_place(path: Path) -> None:
-    """Refuse a path that no file can be written to, before long work is done for it.
+    """Refuse a path that no file can be written to, before long work is done for the file.
 
     Raises
     ------
     DescriptionError
-        A folder of the path is a file, or the nearest one that exists cannot be written to.
+        A folder of the path is a file, or the nearest existing folder cannot be written to.
     """
     if path.is_dir():
         raise DescriptionError(f"{path}: is a folder; expected a file's name")
-    above = path.absolute().parent
+    folder = path.absolute().parent
     try:
-        while not above.exists():
-            above = above.parent
-        usable = above.is_dir()
+        while not folder.exists():
+            folder = folder.parent
+        is_folder = folder.is_dir()
     except OSError as error:
         raise DescriptionError(f"{path}: {error.strerror}") from None
-    if not usable:
-        raise DescriptionError(f"{above}: a file; expected a folder")
-    if not os.access(above, os.W_OK | os.X_OK) and not path.exists():
-        raise DescriptionError(f"{above}: cannot be written to")
+    if not is_folder:
+        raise DescriptionError(f"{folder}: a file; expected a folder")
+    if not os.access(folder, os.W_OK | os.X_OK) and not path.exists():
+        raise DescriptionError(f"{folder}: cannot be written to")
 
 
 def write_atomically(path: str | Path, content: str | bytes, *, private: bool = False) -> None:
-    """Write a file under a temporary name and rename it: it is there whole, or not at all; folders are created.
+    """Write a file under a temporary name and rename it, so that no reader sees half a file; folders are created.
 
-    With ``private`` nobody else may read or write it, whatever the umask. A link is followed, and what is no file, such
-    as ``/dev/stdout`` or a named pipe, is written to as it is: a file in its place would be another thing.
+    With ``private`` nobody else may read or write the file, whatever the umask. A symbolic link is followed. A path
+    that is no regular file, such as ``/dev/stdout`` or a named pipe, is written to directly, since a renamed file
+    would replace it.
 
     Raises
     ------
@@ -78,7 +89,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     if not private:
         if STREAM.fullmatch(str(path.absolute())) or (path.exists() and not path.is_file()):
             try:
-                with _opened(path) as stream:
+                with _open_stream(path) as stream:
                     stream.write(data)
             except OSError as error:
                 error.filename = str(path)
@@ -89,7 +100,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-        if not private:  # as which the temporary file was made
+        if not private:  # mkstemp has made the temporary file private
             umask = os.umask(0)
             os.umask(umask)
             Path(temporary).chmod(0o666 & ~umask)
@@ -99,11 +110,11 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
         raise
 
 
-def _opened(path: Path) -> BinaryIO:
-    """Return a pipe, a device or an open stream to write to as it is, never a file in its place."""
-    found = STREAM.fullmatch(str(path.absolute()))
-    if found is None:
+def _open_stream(path: Path) -> BinaryIO:
+    """Open a pipe, a device or a stream of this process for writing, without replacing it."""
+    stream = STREAM.fullmatch(str(path.absolute()))
+    if stream is None:
         return path.open("ab")
-    # A second opening of a stream that goes into a file would have a place of its own there, and be written over.
-    number = {"stdout": 1, "stderr": 2}.get(found[1]) or int(found[2] or found[3])
+    # Opening a redirected stream a second time would write from the file's beginning; a duplicate shares its position.
+    number = {"stdout": 1, "stderr": 2}.get(stream[1]) or int(stream[2] or stream[3])
     return os.fdopen(os.dup(number), "wb")

@@ -1,8 +1,8 @@
-"""Frames of a description by a plain product of its table's matrices, for one state or a batch."""
+"""DH frames by a plain product of the table's matrices, for one state or a batch; checks of joint arguments."""
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +11,33 @@ from dhkit.description.arrays import Array, number_array
 from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
 
-RATES = ("qd", "tau", "start_velocity", "goal_velocity")
-"""Beginnings of the names of arguments that are speeds, accelerations or torques."""
-Frames = TypeVar("Frames", Array, list[Any])
-"""An array (n+1, ...), or a list of n+1 expressions."""
+RATE_NAMES = ("qd", "tau", "start_velocity", "goal_velocity")
+"""Beginnings of the names of arguments that hold speeds, accelerations or torques: no configuration has a value."""
+
+S = TypeVar("S", bound="Sliceable")
+
+
+class Sliceable(Protocol):
+    """An array or a list: a slice of it has its own type."""
+
+    def __getitem__(self: S, index: slice, /) -> S:
+        """Return some of the entries."""
 
 
 def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Array:
-    """Return an array of joint values, shape (..., n); positions may be given by names of configurations, or in a list.
+    """Return an array of joint values; positions may be given by configurations' names, alone or in a list.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m, or names.
+    name
+        The argument's name, for messages.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), rad and m.
 
     Raises
     ------
@@ -27,7 +46,7 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
     TypeError
         Not numbers.
     """
-    if isinstance(q, str) and not name.startswith(RATES):
+    if isinstance(q, str) and not name.startswith(RATE_NAMES):
         return configuration(description, q, name)
     if isinstance(q, (list, tuple)) and any(isinstance(row, str) for row in q):
         rows = [joint_array(description, row, name) for row in q]
@@ -58,7 +77,7 @@ def configuration(description: Description, name: str, argument: str = "q") -> A
 
 
 def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Array:
-    """Return the joint values of one state, shape (n,), finite.
+    """Return the joint values of one state, shape (n,), rad and m, all finite.
 
     Raises
     ------
@@ -76,7 +95,7 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
 
 
 def one_each(value: ArrayLike, name: str, n: int) -> Array:
-    """Return a number for each joint, shape (n,): those given, or one number n times.
+    """Return a number for each joint, shape (n,), in the unit of ``value``: n numbers, or one repeated n times.
 
     Raises
     ------
@@ -93,7 +112,10 @@ def one_each(value: ArrayLike, name: str, n: int) -> Array:
 
 @takes_robot
 def link_transforms(description: Description, q: ArrayLike) -> Array:
-    """Return the table's matrices A_1 ... A_n.
+    """Return the table's matrices A_1 ... A_n, in closed form: the plain path that kernels are checked against.
+
+    Derived independently of :func:`dhkit.description.exact_poses.fixed_row`, the product of elementary exact
+    transforms, and of the origins of :mod:`dhkit.model.urdf`.
 
     Parameters
     ----------
@@ -103,7 +125,7 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     Returns
     -------
     Array
-        Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1. NaN rows where q is not finite.
+        Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1, m. NaN rows where q is not finite.
     """
     numbers = description.numbers
     q = joint_array(description, q)
@@ -111,7 +133,7 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     q = np.where(missing[..., None], np.nan, q)
     angle, offset = np.where(numbers.prismatic, 0.0, q), np.where(numbers.prismatic, q, 0.0)
     cos_q, sin_q = np.cos(angle), np.sin(angle)
-    # The table's own angle enters by the sum's formula, so that an offset of 90 degrees is exact.
+    # The table's own theta enters by the addition theorem, so that an offset of 90 degrees is exact.
     cos_theta = cos_q * numbers.cos_theta - sin_q * numbers.sin_theta
     sin_theta = sin_q * numbers.cos_theta + cos_q * numbers.sin_theta
     cos_alpha, sin_alpha, a, d = numbers.cos_alpha, numbers.sin_alpha, numbers.a, numbers.d + offset
@@ -134,18 +156,27 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     return A
 
 
-def carrying(convention: Convention, frames: Frames) -> Frames:
-    """Return those of frames 0 ... n whose z axes joints move about: all but the last, or (modified) but the first."""
+def carrying(convention: Convention, frames: S) -> S:
+    """Return the n of frames 0 ... n along whose z axes the joints move.
+
+    Joint i moves about or along z_(i-1) in the standard convention, z_i in the modified one.
+    """
     return frames[:-1] if convention is Convention.STANDARD else frames[1:]
 
 
 @takes_robot
 def world_to_frames(description: Description, q: ArrayLike) -> Array:
-    """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), for joint values of shape (..., n)."""
+    """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), m.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+    """
     A = link_transforms(description, q)
     frames = np.empty((*A.shape[:-3], description.n + 1, 4, 4))
     frames[..., 0, :, :] = description.numbers.T_world_base
-    frames[..., 0, :, :] += 0.0 * A[..., 0, :, :]  # NaN where the state is
+    frames[..., 0, :, :] += 0.0 * A[..., 0, :, :]  # frame 0 is NaN too in a state that is NaN
     for i in range(description.n):
         np.matmul(frames[..., i, :, :], A[..., i, :, :], out=frames[..., i + 1, :, :])
     return frames
@@ -153,7 +184,13 @@ def world_to_frames(description: Description, q: ArrayLike) -> Array:
 
 @takes_robot
 def world_to_tool(description: Description, q: ArrayLike) -> Array:
-    """Return the tool's frame in the world, shape (..., 4, 4): base A_1 ... A_n tool."""
+    """Return the tool's frame in the world, shape (..., 4, 4), m: base A_1 ... A_n tool.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (..., n), rad and m.
+    """
     A = link_transforms(description, q)
     T = np.broadcast_to(description.numbers.T_world_base, (*A.shape[:-3], 4, 4))
     for i in range(description.n):

@@ -11,6 +11,8 @@ from dhkit.description.robot import Description
 from dhkit.description.robot_file import from_toml
 from dhkit.errors import DescriptionError
 
+FOLDER = resources.files("dhkit.description") / "library"
+
 
 @cache
 def robots() -> tuple[str, ...]:
@@ -21,8 +23,8 @@ def robots() -> tuple[str, ...]:
     >>> "puma560" in robots()
     True
     """
-    files = (resources.files("dhkit.description") / "library").iterdir()
-    return tuple(sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml")))
+    names = (file.name for file in FOLDER.iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 @cache
@@ -38,5 +40,4 @@ def library_robot(name: str) -> Description:
         close = difflib.get_close_matches(name.lower(), robots(), n=1, cutoff=0.5)
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(robots())}"
         raise DescriptionError(f"no robot {name[:80]!r} in the library; {hint}")
-    text = (resources.files("dhkit.description") / "library" / f"{name}.toml").read_text("utf-8")
-    return from_toml(text, file=f"{name}.toml", mesh_folder=asset("meshes"))
+    return from_toml((FOLDER / f"{name}.toml").read_text("utf-8"), file=f"{name}.toml", mesh_folder=asset("meshes"))

@@ -1,11 +1,11 @@
-"""Joints frozen in place: a shorter arm with a table of its own, the same motion and the same masses.
+"""Joints locked in place: a shorter arm with a table of its own, the same motion and the same masses.
 
-Between two moving joints the frozen row is a fixed transform Y. Written as
+Between two moving joints the locked row is a fixed transform Y. Written as
 
     Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta)
 
-it is again a row: turns and shifts about a joint's own axis commute with the joint and go into its theta and d. This is
-the common normal of the two axes, found from Y's entries (Denavit & Hartenberg 1955).
+it is again a row: rotations about and shifts along a joint's own axis commute with the joint and go into its theta and
+d. This is the common normal of the two axes, computed from Y's entries (Denavit & Hartenberg 1955).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -54,27 +54,30 @@ from dhkit.expressions import (
 
 log = logging.getLogger(__name__)
 
-WORK = 300_000
-"""Of exact arithmetic, about a second: beyond it an arm of symbols is locked as numbers."""
-READABLE = 80_000
-"""Of a robot file's budget: what a locked arm of symbols may take to be read back."""
-PARALLEL = 1e-10
-"""Sine of the angle between two axes below which they count as parallel: a row of the table cannot say it better."""
+LOCKING_BUDGET = 300_000
+"""Steps of exact arithmetic, about a second, after which an arm with symbols is locked with numbers instead."""
+READING_BUDGET = 80_000
+"""Steps that reading a locked arm's symbols back may take: a share of a robot file's budget."""
+PARALLEL_SINE = 1e-10
+"""Two axes count as parallel if the sine of the angle between them is below this number."""
+
+LinkBodies: TypeAlias = tuple[Body | None, ...]
+"""Bodies of one link, in its frame; None stands for a joined link without a body."""
 
 
 class _Chain(NamedTuple):
-    """What freezing a joint changes."""
+    """The parts of an arm that locking a joint changes."""
 
     base: Base
     joints: tuple[Joint, ...]
-    """Their bodies are not theirs any more: see ``bodies``."""
+    """The joints; their own bodies are out of date, ``bodies`` counts."""
     tool: Tool
-    bodies: tuple[tuple[Body | None, ...], ...]
-    """What each link carries, the base first, in its frame; joined at the end, all at once."""
+    bodies: tuple[LinkBodies, ...]
+    """The bodies of each link, the base first; they are joined in one step at the end."""
 
 
 class _Row(NamedTuple):
-    """Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta)."""
+    """Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta); rad and m."""
 
     beta: Expression
     epsilon: Expression
@@ -86,125 +89,58 @@ class _Row(NamedTuple):
 
 @takes_robot
 def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Description:
-    """Return the arm with some joints frozen, their links joined to the link before, or to the base.
+    """Return the arm with some joints locked, their links joined to the link before, or to the base.
 
-    Every remaining joint keeps its zero, limits and drive; configurations lose the frozen entries. The drives of
-    frozen joints go: their rotors stand still. A link without a body makes the joined link one without.
+    Every remaining joint keeps its zero, limits and drive; configurations lose the locked entries. The drives of
+    locked joints are removed: their rotors stand still. If a link has no body, the joined link has none either.
 
-    Lengths and masses that are parameters stay parameters. Those that decide angles of the frozen rows become the
-    numbers that they are, everywhere in the arm, since the new row's form depends on them; so do all, where the new
-    expressions would be longer than a robot file carries.
+    Lengths and masses that are parameters stay parameters. Parameters that determine angles of the locked rows are
+    replaced by their numbers, everywhere in the arm, since the new row's form depends on them; all parameters are,
+    if the new expressions would be longer than a robot file may hold.
 
     Parameters
     ----------
     joints
-        Where each is frozen, rad or m; by place from 0, or by name.
+        The value at which each joint is locked, rad or m, by the joint's place from 0 or by its name.
 
     Raises
     ------
     DescriptionError
         No such joint, one named twice, or none left to move.
     """
-    held = _places(description, joints)
-    if len(held) == description.n:
+    locked = _locked_places(description, joints)
+    if len(locked) == description.n:
         raise DescriptionError(f"all {description.n} joints locked; expected one left to move")
-    description, held = _decided(description, held)
+    description, locked = _with_numbers(description, locked, _angle_names(description, locked))
     try:
-        with Budget(WORK):
-            locked = _locked(description, held)
-        with Budget(READABLE):
-            _read_again(locked)
-        return locked
+        with Budget(LOCKING_BUDGET):
+            shorter = _lock_all(description, locked)
+        with Budget(READING_BUDGET):
+            # What reading the arm's file would do, to see whether the arm fits into a file's budget.
+            for expression in expressions_in(shorter):
+                if expression.symbols:
+                    parse(expression.text, shorter.parameters)
+            replace(shorter)
+        return shorter
     except ExpressionError:
         pass
     except DescriptionError as error:
-        # The check of the new description ran out of the same budget; a fault of its own shows again below.
+        # The check of the new description may have exhausted the same budget; a real fault is raised again below.
         log.debug("%s: %s", description.name, error)
-    names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(held.values()))
+    names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(locked.values()))
     log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
     try:
-        return _locked(*_settled(description, held, names))
+        return _lock_all(*_with_numbers(description, locked, names))
     except ExpressionError as error:
         raise DescriptionError(f"{description.name} cannot be locked: {error}") from None
 
 
-def _read_again(locked: Description) -> None:
-    """Do what reading the arm's file would, to see whether it fits into a file's budget."""
-    for expression in expressions_in(locked):
-        if expression.symbols:
-            parse(expression.text, locked.parameters)
-    replace(locked)
-
-
-def _decided(description: Description, held: dict[int, Expression]) -> tuple[Description, dict[int, Expression]]:
-    """Put numbers for the parameters that the frozen rows' and their neighbours' angles depend on."""
-    names = names_in((description.base.placement.rpy, description.tool.placement.rpy))
-    for place, q in held.items():
-        around = description.joints[max(place - 1, 0) : place + 2]
-        names |= names_in(tuple(joint.alpha for joint in around)) | description.joints[place].theta.symbols
-        names |= q.symbols if description.joints[place].is_revolute else frozenset()
-    return _settled(description, held, names)
-
-
-def _settled(
-    description: Description, held: dict[int, Expression], names: frozenset[str]
-) -> tuple[Description, dict[int, Expression]]:
-    """Put numbers for some parameters, and for those that depend on each other with them, everywhere."""
-    values = resolved(description.parameters)
-    # Neither what a settled parameter is made of nor what is made of it may change on its own any more.
-    grown, before = names, frozenset[str]()
-    while grown != before:
-        before = grown
-        grown |= {name for name in values if needs(name, description.parameters) & grown}
-        grown |= {other for name in grown for other in needs(name, description.parameters)}
-    known = {name: values[name] for name in grown}
-    rest = Named({name: value for name, value in description.parameters.items() if name not in known})
-    fixed = with_values(replace(description, parameters=Named(values)), known)
-    return replace(fixed, parameters=rest), {place: substitute(q, known) for place, q in held.items()}
-
-
-def _locked(description: Description, held: dict[int, Expression]) -> Description:
-    """Freeze joints one by one: those at the base from there on, the others from the tip on.
-
-    So no common normal is taken of two axes of which one goes into the base: nearly parallel ones would cost digits.
-    """
-    bodies = tuple(joint.bodies or (None,) for joint in description.joints)
-    base: tuple[Body | None, ...] = (description.base.body,) if description.base.body is not None else ()
-    chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
-    values = resolved(description.parameters)
-    first = next(place for place in range(description.n + 1) if place not in held)
-    for place in range(first):
-        chain = _without(chain, description.convention, 0, held[place], values)
-    for place in sorted((place for place in held if place > first), reverse=True):
-        chain = _without(chain, description.convention, place - first, held[place], values)
-    kept = [i for i in range(description.n) if i not in held]
-    configurations = Named({name: tuple(q[i] for i in kept) for name, q in description.configurations.items()})
-    on_base = [body for body in chain.bodies[0] if body is not None]
-    joints = tuple(
-        replace(joint, bodies=_link_bodies(joint, parts))
-        for joint, parts in zip(chain.joints, chain.bodies[1:], strict=True)
-    )
-    return replace(
-        description,
-        base=replace(chain.base, body=joined(on_base) if on_base else None),
-        joints=joints,
-        tool=chain.tool,
-        configurations=configurations,
-    )
-
-
-def _link_bodies(joint: Joint, parts: tuple[Body | None, ...]) -> tuple[Body, ...]:
-    """Return the bodies of a link: its own where no other link was joined to it, otherwise all as one."""
-    if parts == joint.bodies:
-        return joint.bodies
-    return () if None in parts else (joined([part for part in parts if part is not None]),)
-
-
-def _places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
+def _locked_places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
+    """Return the value of each locked joint, rad or m, by its place from 0."""
     if not isinstance(joints, Mapping):
         raise DescriptionError(f"lock: found {type(joints).__name__}; expected joints with where, such as {{3: 0.0}}")
     names = [joint.name for joint in description.joints]
-    places: dict[int, Expression] = {}
+    locked: dict[int, Expression] = {}
     for key, value in joints.items():
         if isinstance(key, str) and key in names:
             place = names.index(key)
@@ -214,86 +150,137 @@ def _places(description: Description, joints: Mapping[int | str, Quantity]) -> d
             raise DescriptionError(
                 f"lock: no joint {key!r}; expected 0 to {description.n - 1} or one of {', '.join(names)}"
             )
-        if place in places:
+        if place in locked:
             raise DescriptionError(f"lock: joint {place} ({names[place]}) given twice")
         q = quantity(f"lock: joint {place} ({names[place]})", value, description.parameters)
-        places[place] = exact_angle(q) if description.joints[place].is_revolute else q
-    return places
+        locked[place] = exact_angle(q) if description.joints[place].is_revolute else q
+    return locked
 
 
-def _without(
+def _angle_names(description: Description, locked: Mapping[int, Expression]) -> frozenset[str]:
+    """Return the parameters that determine angles of base, tool, locked rows and their neighbours."""
+    names = names_in((description.base.placement.rpy, description.tool.placement.rpy))
+    for place, q in locked.items():
+        joint, neighbours = description.joints[place], description.joints[max(place - 1, 0) : place + 2]
+        names |= names_in(tuple(neighbour.alpha for neighbour in neighbours)) | joint.theta.symbols
+        names |= q.symbols if joint.is_revolute else frozenset()
+    return names
+
+
+def _with_numbers(
+    description: Description, locked: Mapping[int, Expression], names: frozenset[str]
+) -> tuple[Description, dict[int, Expression]]:
+    """Replace parameters, and those that depend on each other with them, by their numbers everywhere."""
+    parameters, values = description.parameters, resolved(description.parameters)
+    # Neither what a replaced parameter is made of nor what is made of it may change on its own any more.
+    previous = frozenset[str]()
+    while names != previous:
+        previous = names
+        names |= {name for name in values if needs(name, parameters) & names}
+        names |= {other for name in names for other in needs(name, parameters)}
+    known = {name: values[name] for name in names}
+    remaining = Named({name: value for name, value in parameters.items() if name not in known})
+    fixed = with_values(replace(description, parameters=Named(values)), known)
+    return replace(fixed, parameters=remaining), {place: substitute(q, known) for place, q in locked.items()}
+
+
+def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Description:
+    """Lock joints one by one: those next to the base outwards, the others from the tip inwards.
+
+    So no common normal is taken of two axes of which one is joined to the base: nearly parallel ones would cost digits.
+    """
+    bodies = tuple(joint.bodies or (None,) for joint in description.joints)
+    base: LinkBodies = (description.base.body,) if description.base.body is not None else ()
+    chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
+    values = resolved(description.parameters)
+    first = next(place for place in range(description.n + 1) if place not in locked)
+    inwards = sorted((place for place in locked if place > first), reverse=True)
+    for place, shift in (*((place, place) for place in range(first)), *((place, first) for place in inwards)):
+        chain = _lock_one(chain, description.convention, place - shift, locked[place], values)
+    moving = [i for i in range(description.n) if i not in locked]
+    on_base = [body for body in chain.bodies[0] if body is not None]
+    return replace(
+        description,
+        base=replace(chain.base, body=joined(on_base) if on_base else None),
+        joints=tuple(
+            replace(joint, bodies=_link_bodies(joint, parts))
+            for joint, parts in zip(chain.joints, chain.bodies[1:], strict=True)
+        ),
+        tool=chain.tool,
+        configurations=Named({name: tuple(q[i] for i in moving) for name, q in description.configurations.items()}),
+    )
+
+
+def _link_bodies(joint: Joint, parts: LinkBodies) -> tuple[Body, ...]:
+    """Return the bodies of a link: its own if no other link was joined to it, otherwise all joined to one."""
+    if parts == joint.bodies:
+        return joint.bodies
+    return () if None in parts else (joined([part for part in parts if part is not None]),)
+
+
+def _lock_one(
     chain: _Chain, convention: Convention, place: int, q: Expression, values: Mapping[str, Expression]
 ) -> _Chain:
-    """Freeze the joint at one place."""
+    """Lock the joint at a place: the first joins the base, the last the tool, others the link before."""
     row = fixed_row(chain.joints[place], convention, q)
     if place == 0:
-        return _onto_base(chain, row)
+        return _join_base(chain, row)
     if place == len(chain.joints) - 1:
-        return _onto_tool(chain, row)
-    return _between(chain, convention, place, row, values)
+        return _join_tool(chain, row)
+    return _join_link_before(chain, convention, place, row, values)
 
 
-def _onto_base(chain: _Chain, row: ExactPose) -> _Chain:
+def _join_base(chain: _Chain, row: ExactPose) -> _Chain:
     """Make frame 1 the new frame 0."""
-    base, first = chain.base, chain.joints[0]
-    back = inverse(row)
-    placement = placement_of(pose_of(base.placement) @ row)
-    held = _moved_bodies(chain.bodies[0], back) + chain.bodies[1]
-    return _Chain(
-        Base(placement, _moved_shapes(base.shapes, back) + first.shapes),
-        chain.joints[1:],
-        chain.tool,
-        (held, *chain.bodies[2:]),
-    )
+    T_new_old = inverse(row)
+    placement = placement_of(pose_of(chain.base.placement) @ row)
+    shapes = _moved_shapes(chain.base.shapes, T_new_old) + chain.joints[0].shapes
+    on_base = _moved_bodies(chain.bodies[0], T_new_old) + chain.bodies[1]
+    return _Chain(Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:]))
 
 
-def _onto_tool(chain: _Chain, row: ExactPose) -> _Chain:
+def _join_tool(chain: _Chain, row: ExactPose) -> _Chain:
     """Make the last link part of the one before, and its row part of the tool's placement."""
     *others, before, last = chain.joints
-    placement = placement_of(row @ pose_of(chain.tool.placement))
-    carrying = _carrying(before, last, identity(), row)
-    *bodies, held, own = chain.bodies
-    return _Chain(
-        chain.base,
-        (*others, carrying),
-        Tool(placement, chain.tool.shapes),
-        (*bodies, held + _moved_bodies(own, row)),
-    )
+    *other_bodies, own_bodies, last_bodies = chain.bodies
+    tool = Tool(placement_of(row @ pose_of(chain.tool.placement)), chain.tool.shapes)
+    joints = (*others, _with_shapes_of(before, last, identity(), row))
+    return _Chain(chain.base, joints, tool, (*other_bodies, own_bodies + _moved_bodies(last_bodies, row)))
 
 
-def _between(
+def _join_link_before(
     chain: _Chain, convention: Convention, place: int, row: ExactPose, values: Mapping[str, Expression]
 ) -> _Chain:
-    before, frozen, after = chain.joints[place - 1 : place + 2]
+    """Make the locked link part of the one before, and the locked row part of the two neighbouring rows."""
+    before, locked, after = chain.joints[place - 1 : place + 2]
     if convention is Convention.STANDARD:
-        own = translation(x=before.a) @ rotation_x(before.alpha)
-        new = _common_normal(own @ row, values)
-        # What is right of the new row's a and alpha in Y: the shortest way from the frozen frame to the new one.
-        to_new = rotation_z(new.gamma) @ translation(z=new.delta) @ inverse(row)
-        before = replace(before, a=new.a, alpha=new.alpha)
+        normal = _common_normal(translation(x=before.a) @ rotation_x(before.alpha) @ row, values)
+        # From the locked frame to the new one: what is right of a and alpha in Y, the shortest expression of it.
+        to_new = rotation_z(normal.gamma) @ translation(z=normal.delta) @ inverse(row)
+        before = replace(before, a=normal.a, alpha=normal.alpha)
     else:
-        new = _common_normal(row @ translation(x=after.a) @ rotation_x(after.alpha), values)
-        to_new = inverse(rotation_z(new.beta) @ translation(z=new.epsilon))
-        after = replace(after, a=new.a, alpha=new.alpha)
-    before = _turned(_carrying(before, frozen, to_new, to_new @ row), new.beta, new.epsilon)
-    after = _turned(after, new.gamma, new.delta)
-    held = _moved_bodies(chain.bodies[place], to_new) + _moved_bodies(chain.bodies[place + 1], to_new @ row)
+        normal = _common_normal(row @ translation(x=after.a) @ rotation_x(after.alpha), values)
+        to_new = inverse(rotation_z(normal.beta) @ translation(z=normal.epsilon))
+        after = replace(after, a=normal.a, alpha=normal.alpha)
+    before = _screw_about_axis(_with_shapes_of(before, locked, to_new, to_new @ row), normal.beta, normal.epsilon)
+    after = _screw_about_axis(after, normal.gamma, normal.delta)
+    bodies = _moved_bodies(chain.bodies[place], to_new) + _moved_bodies(chain.bodies[place + 1], to_new @ row)
     return _Chain(
         chain.base,
         (*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]),
         chain.tool,
-        (*chain.bodies[:place], held, *chain.bodies[place + 2 :]),
+        (*chain.bodies[:place], bodies, *chain.bodies[place + 2 :]),
     )
 
 
-def _carrying(before: Joint, frozen: Joint, T_new_before: ExactPose, T_new_frozen: ExactPose) -> Joint:
-    """Give the link before the frozen link's shapes, both put into the new frame."""
-    shapes = _moved_shapes(before.shapes, T_new_before) + _moved_shapes(frozen.shapes, T_new_frozen)
-    assumed = tuple(dict.fromkeys(before.assumed + ("body",) * ("body" in frozen.assumed)))
+def _with_shapes_of(before: Joint, locked: Joint, T_new_before: ExactPose, T_new_locked: ExactPose) -> Joint:
+    """Return the link before with the locked link's shapes, both moved into the new frame."""
+    shapes = _moved_shapes(before.shapes, T_new_before) + _moved_shapes(locked.shapes, T_new_locked)
+    assumed = tuple(dict.fromkeys(before.assumed + ("body",) * ("body" in locked.assumed)))
     return replace(before, shapes=shapes, assumed=assumed)
 
 
-def _moved_bodies(bodies: tuple[Body | None, ...], T: ExactPose) -> tuple[Body | None, ...]:
+def _moved_bodies(bodies: LinkBodies, T: ExactPose) -> LinkBodies:
     return tuple(None if body is None else moved_body(body, T) for body in bodies)
 
 
@@ -301,34 +288,27 @@ def _moved_shapes(shapes: tuple[Shape, ...], T: ExactPose) -> tuple[Shape, ...]:
     return tuple(replace(shape, placement=moved(shape.placement, T)) for shape in shapes)
 
 
-def _turned(joint: Joint, angle: Expression, shift: Expression) -> Joint:
-    """Turn and shift a row about its own joint's axis."""
+def _screw_about_axis(joint: Joint, angle: Expression, shift: Expression) -> Joint:
+    """Return a row rotated about its own joint's axis by an angle, rad, and shifted along it, m."""
     return replace(joint, theta=exact_angle(settled(joint.theta + angle, angle=True)), d=settled(joint.d + shift))
 
 
 def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
     """Write a fixed transform as a row; see the module's docstring."""
 
-    def size(x: Expression) -> float:
+    def number(x: Expression) -> float:
         return float(substitute(x, values))
 
-    if math.hypot(size(Y[0, 2]), size(Y[1, 2])) < PARALLEL:
-        row = _parallel(Y, opposite=size(Y[2, 2]) < 0)
+    if math.hypot(number(Y[0, 2]), number(Y[1, 2])) < PARALLEL_SINE:
+        row = _parallel_axes_row(Y, is_opposite=number(Y[2, 2]) < 0)
     else:
-        row = _skew(Y, size)
-    beta, epsilon, a, alpha, gamma, delta = row
-    return _Row(
-        settled(beta, angle=True),
-        settled(epsilon),
-        settled(a),
-        settled(alpha, angle=True),
-        settled(gamma, angle=True),
-        settled(delta),
-    )
+        row = _skew_axes_row(Y, number)
+    angles = ("beta", "alpha", "gamma")
+    return _Row(*(settled(value, angle=name in angles) for name, value in row._asdict().items()))
 
 
-def _parallel(Y: ExactPose, opposite: bool) -> _Row:
-    """Axes that point along each other: the normal is taken through the first joint's frame."""
+def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
+    """Return the row of axes that point in equal or opposite directions: a normal through the first joint's frame."""
     x, y, z = Y[:3, 3]
     turn = arc_tangent(Y[1, 0], Y[0, 0])
     if y.is_zero:
@@ -337,11 +317,11 @@ def _parallel(Y: ExactPose, opposite: bool) -> _Row:
         beta, a = PI / 2, y
     else:
         beta, a = arc_tangent(y, x), sqrt(x * x + y * y)
-    return _Row(beta, z, a, PI if opposite else ZERO, beta - turn if opposite else turn - beta, ZERO)
+    return _Row(beta, z, a, PI if is_opposite else ZERO, beta - turn if is_opposite else turn - beta, ZERO)
 
 
-def _skew(Y: ExactPose, size: Callable[[Expression], float]) -> _Row:
-    """Axes that do not: beta from the second axis' direction, the rest from where it passes."""
+def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
+    """Return the row of other axes: beta from the second axis' direction, the rest from its position."""
     (x, y, z), (u, v, w) = Y[:3, 3], Y[:3, 2]
     if u.is_zero:
         beta, sine = ZERO, -v
@@ -351,6 +331,6 @@ def _skew(Y: ExactPose, size: Callable[[Expression], float]) -> _Row:
         beta, sine = arc_tangent(u, -v), sqrt(u * u + v * v)
     c, s = (cos(beta), sin(beta)) if u.is_zero or v.is_zero else (-v / sine, u / sine)
     delta = (x * s - y * c) / sine
-    sign = -1 if size(sine) < 0 else 1
+    sign = -1 if number(sine) < 0 else 1
     gamma = arc_tangent(Y[2, 0] * sign, Y[2, 1] * sign)
     return _Row(beta, z - delta * w, x * c + y * s, arc_tangent(sine, w), gamma, delta)

@@ -1,6 +1,6 @@
 """Reader of MATLAB's files of format 5: full real matrices, texts, and structs of them.
 
-SciPy's reader is not used, because it takes the file's lengths and types for true: with SciPy 1.17, files with one to
+SciPy's reader is not used, because it does not check the file's lengths and types: with SciPy 1.17, files with one to
 four changed bytes crashed the process after 17 to 173 attempts. Element types and class numbers are those of MathWorks,
 MAT-File Format, tables 1-1 and 1-3.
 """
@@ -34,10 +34,11 @@ FULL_MATRICES = range(6, 16)
 COMPLEX_FLAG = 0x0800
 MAX_AXES, MAX_NAME_LENGTH = 8, 63
 MAX_DEPTH = 6
-"""Structs inside one another."""
+"""Largest nesting depth of structs."""
 MAX_VARIABLES = 20_000
-"""Variables of a file, fields of structs included."""
+"""Largest number of variables of a file, fields of structs included."""
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+DAMAGE = "ends within an element, or has one of another kind; the .mat file is damaged"
 USER_BLOCK_LENGTH = 512
 """Bytes before the HDF5 signature of a file of format 7.3."""
 
@@ -52,7 +53,7 @@ class _Element:
 
 @dataclass(frozen=True)
 class MatVariable:
-    """A variable of a file, or a field of a struct; its content is read when asked for."""
+    """A variable of a file, or a field of a struct; ``value`` reads its content."""
 
     name: str
     kind: str
@@ -68,7 +69,7 @@ class MatVariable:
 
     @property
     def value(self) -> Value:
-        """A text, a float64 array of two axes or more, or one dictionary of fields for each struct, in MATLAB's order.
+        """A text, a float64 array of two axes or more, or for each struct its fields by name, in MATLAB's order.
 
         Raises
         ------
@@ -80,17 +81,17 @@ class MatVariable:
         return self.reader.value(self)
 
 
-def read_mat(content: bytes, most: int, *, advice: str) -> dict[str, MatVariable]:
+def read_mat(content: bytes, max_bytes: int, *, advice: str) -> dict[str, MatVariable]:
     """Return a file's variables by name, in the file's order.
 
     Parameters
     ----------
     content
         A file of format 5, compressed or not.
-    most
+    max_bytes
         Largest size of all unpacked variables together, bytes.
     advice
-        How to save a file that can be read; ends the message for files of another format.
+        How to save a readable file; ends the message for files of another format.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def read_mat(content: bytes, most: int, *, advice: str) -> dict[str, MatVariable
     order = {b"IM": "<", b"MI": ">"}.get(content[HEADER_LENGTH - 2 : HEADER_LENGTH])
     if order is None:
         raise DescriptionError(f"no .mat file of format 5; {advice}")
-    reader = _Reader(order, most)
+    reader = _Reader(order, max_bytes)
     variables: dict[str, MatVariable] = {}
     for variable in reader.variables(content[HEADER_LENGTH:]):
         if variable.name in variables:
@@ -115,11 +116,11 @@ def read_mat(content: bytes, most: int, *, advice: str) -> dict[str, MatVariable
 
 @dataclass
 class _Reader:
-    """Reads elements in one byte order, within bounds on size, count and depth."""
+    """Reads elements in one byte order, with limits on size, number and depth."""
 
     order: str
     """``<`` or ``>``."""
-    most: int
+    max_bytes: int
     """Largest size of all unpacked variables together, bytes."""
     unpacked: int = 0
     count: int = 0
@@ -130,35 +131,31 @@ class _Reader:
             yield from (self._variable(matrix.data) for matrix in inner if matrix.kind == MATRIX)
 
     def elements(self, data: bytes) -> Iterator[_Element]:
-        """Yield elements that follow one another."""
-        at = 0
-        while at < len(data):
-            if len(data) - at < TAG_LENGTH:
-                raise _damaged()
-            kind, length = struct.unpack_from(f"{self.order}II", data, at)
+        """Yield the elements that data consist of, in their order."""
+        offset = 0
+        while offset < len(data):
+            _require(len(data) - offset >= TAG_LENGTH)
+            kind, length = struct.unpack_from(f"{self.order}II", data, offset)
             if kind >> 16:  # a small element: length and type share the first word, its data is the second
-                kind, length, start, step = kind & 0xFFFF, kind >> 16, at + TAG_LENGTH // 2, TAG_LENGTH
-                if length > TAG_LENGTH // 2:
-                    raise _damaged()
+                kind, length, start, step = kind & 0xFFFF, kind >> 16, offset + TAG_LENGTH // 2, TAG_LENGTH
+                _require(length <= TAG_LENGTH // 2)
             else:
-                start = at + TAG_LENGTH
+                start = offset + TAG_LENGTH
                 step = TAG_LENGTH + length + (0 if kind == COMPRESSED else -length % TAG_LENGTH)
-            if length > len(data) - start:
-                raise _damaged()
+            _require(length <= len(data) - start)
             yield _Element(kind, data[start : start + length])
-            at += step
+            offset += step
 
     def _unpack(self, data: bytes) -> bytes:
-        remaining = self.most - self.unpacked
+        remaining = self.max_bytes - self.unpacked
         unpacker = zlib.decompressobj()
         try:
             unpacked = unpacker.decompress(data, max(remaining, 1))
         except zlib.error as error:
             raise DescriptionError(f"damaged: {error}") from None
         if len(unpacked) >= remaining:
-            raise DescriptionError(f"unpacks to more than the {self.most / 1e6:g} MB that are read")
-        if not unpacker.eof:
-            raise _damaged()
+            raise DescriptionError(f"unpacks to more than the {self.max_bytes / 1e6:g} MB that are read")
+        _require(unpacker.eof)
         self.unpacked += len(unpacked)
         return unpacked
 
@@ -169,15 +166,14 @@ class _Reader:
             raise DescriptionError("variables nested too deep, or too many")
         parts = self.elements(data)
         flags = _next(parts).data
-        if len(flags) < 4:
-            raise _damaged()
+        _require(len(flags) >= 4)
         word = struct.unpack(f"{self.order}I", flags[:4])[0]
         code = word & 0xFF
         if code == OPAQUE:
-            own, _, kind = (_name(_next(parts)) for _ in range(3))
-            return MatVariable(name or own, kind, (), self)
-        dimensions, own = _next(parts), _name(_next(parts))
-        name = name or own
+            own_name, _, kind = (_name(_next(parts)) for _ in range(3))
+            return MatVariable(name or own_name, kind, (), self)
+        dimensions, own_name = _next(parts), _name(_next(parts))
+        name = name or own_name
         if code == OBJECT:
             return MatVariable(name, _name(_next(parts)), (), self)
         if code == STRUCT:
@@ -191,11 +187,9 @@ class _Reader:
     def value(self, variable: MatVariable) -> Value:
         dimensions, *content = variable.parts
         count = len(dimensions.data) // 4
-        if not 0 < count <= MAX_AXES or len(dimensions.data) % 4:
-            raise _damaged()
+        _require(0 < count <= MAX_AXES and len(dimensions.data) % 4 == 0)
         shape = struct.unpack(f"{self.order}{count}i", dimensions.data)
-        if min(shape) < 0:
-            raise _damaged()
+        _require(min(shape) >= 0)
         if variable.kind == CLASSES[STRUCT]:
             return self._records(variable.name, content, shape)
         if variable.kind == CLASSES[CHARACTERS]:
@@ -203,8 +197,7 @@ class _Reader:
         return self._array(variable.name, content[0], shape)
 
     def _array(self, name: str, body: _Element, shape: tuple[int, ...]) -> Array:
-        if body.kind not in NUMBER_TYPES:
-            raise _damaged()
+        _require(body.kind in NUMBER_TYPES)
         dtype = np.dtype(f"{self.order}{NUMBER_TYPES[body.kind]}")
         if int(np.prod(shape, dtype=object)) * dtype.itemsize != len(body.data):
             raise DescriptionError(f"{name}: {len(body.data)} bytes for shape {shape}; the file is damaged")
@@ -221,16 +214,13 @@ class _Reader:
 
     def _records(self, name: str, parts: list[_Element], shape: tuple[int, ...]) -> tuple[dict[str, MatVariable], ...]:
         """Return the fields of each struct of an array; in the file the names precede the fields of all structs."""
-        if len(parts) < 2 or len(parts[0].data) != 4:
-            raise _damaged()
+        _require(len(parts) >= 2 and len(parts[0].data) == 4)
         (length,) = struct.unpack(f"{self.order}i", parts[0].data)
-        if not 0 < length <= MAX_NAME_LENGTH + 1 or len(parts[1].data) % length:
-            raise _damaged()
+        _require(0 < length <= MAX_NAME_LENGTH + 1 and len(parts[1].data) % length == 0)
         text = parts[1].data
         names = [_name(_Element(1, text[at : at + length].split(b"\0")[0])) for at in range(0, len(text), length)]
         fields = [part for part in parts[2:] if part.kind == MATRIX]
-        if len(fields) != len(names) * int(np.prod(shape, dtype=object)) or len(set(names)) < len(names):
-            raise _damaged()
+        _require(len(fields) == len(names) * int(np.prod(shape, dtype=object)) and len(set(names)) == len(names))
         depth = name.count(".") + 2
         variables = [
             self._variable(field.data, f"{name}.{names[k % len(names)]}", depth) for k, field in enumerate(fields)
@@ -247,9 +237,11 @@ def _name(element: _Element) -> str:
 def _next(parts: Iterator[_Element]) -> _Element:
     part = next(parts, None)
     if part is None:
-        raise _damaged()
+        raise DescriptionError(DAMAGE)
     return part
 
 
-def _damaged() -> DescriptionError:
-    return DescriptionError("ends within an element, or has one of another kind; the .mat file is damaged")
+def _require(is_intact: bool) -> None:
+    """Refuse a damaged file."""
+    if not is_intact:
+        raise DescriptionError(DAMAGE)

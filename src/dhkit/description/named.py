@@ -11,7 +11,7 @@ V = TypeVar("V")
 
 
 class Named(Mapping[str, V]):
-    """Values by name, in the order given; hashable and picklable, as frozen values need it.
+    """Values by name, in the order given; hashable and picklable, so that frozen values can hold it.
 
     Examples
     --------
@@ -41,8 +41,8 @@ class Named(Mapping[str, V]):
         return Named, (self._items,)
 
     def __repr__(self) -> str:
-        whole = f"Named({self._items!r})"
-        # Those of arrays are long, and of many lines.
-        if len(whole) <= LONGEST_LINE and whole.isprintable() and "array(" not in whole:
-            return whole
+        text = f"Named({self._items!r})"
+        # Mappings of arrays print many long lines, so they are summarized.
+        if len(text) <= LONGEST_LINE and text.isprintable() and "array(" not in text:
+            return text
         return repr_line("Named", counted(len(self), "value"), ", ".join(self._items))

@@ -1,21 +1,21 @@
-"""The float view of a description: what array code reads."""
+"""The float view of a description: read-only arrays of its exact numbers, for array code."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description.arrays import Array
-from dhkit.description.bodies import INERTIA_PLACES, Body, Vector, joined
+from dhkit.description.bodies import INERTIA_PLACES, Body, joined
 from dhkit.description.exact_poses import pose_of
 from dhkit.description.parameters import resolved
 from dhkit.description.robot_data import RobotData
 from dhkit.description.traversal import with_values
-from dhkit.description.values import Joint, Placement
+from dhkit.description.values import Placement
 from dhkit.display import counted, repr_line
 from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
 
@@ -38,6 +38,7 @@ class Numbers:
     theta: Array
     """Shape (n,), rad."""
     cos_alpha: Array
+    """Shape (n,); so are the next three."""
     sin_alpha: Array
     cos_theta: Array
     sin_theta: Array
@@ -77,7 +78,7 @@ class Numbers:
 
     @property
     def inertial_parameters(self) -> Array:
-        """What torques are linear in, shape (n, 10), in the axes of DH frame i and about its origin.
+        """The inertial parameters that torques are linear in, shape (n, 10), in DH frame i, about its origin.
 
         Mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz, kg m^2; NaN where a link has no
         body.
@@ -90,20 +91,17 @@ class Numbers:
 
     @classmethod
     def of(cls, description: RobotData) -> Numbers:
-        """Round a description's exact numbers."""
+        """Round a description's exact numbers to doubles."""
         values = resolved(description.parameters)
         joints = description.joints
-        bodies = [_as_one(joint.bodies, values) for joint in joints]
         drives = [joint.drive for joint in joints]
 
-        def known(expression: Expression) -> Expression:
-            return substitute(expression, values)
-
         def array(column: Iterable[Expression | float]) -> Array:
-            return np.array([float(known(x)) if isinstance(x, Expression) else x for x in column], dtype=float)
+            exact = (substitute(x, values) if isinstance(x, Expression) else x for x in column)
+            return np.array([float(x) for x in exact], dtype=float)
 
         def angles(column: Iterable[Expression]) -> list[Expression]:
-            return [exact_angle(known(x)) for x in column]
+            return [exact_angle(substitute(x, values)) for x in column]
 
         alpha, theta = angles(j.alpha for j in joints), angles(j.theta for j in joints)
         lower = array(j.limits[0] if j.limits else -np.inf for j in joints)
@@ -111,6 +109,9 @@ class Numbers:
         a, d = array(j.a for j in joints), array(j.d for j in joints)
         gear = array(drive.gear if drive else 1.0 for drive in drives)
         prismatic = np.array([not j.is_revolute for j in joints])
+        # How far each prismatic joint can move away from zero, m; one without limits adds nothing to the reach.
+        strokes = [float(stroke) for stroke in np.maximum(abs(lower), abs(upper))[prismatic] if np.isfinite(stroke)]
+        mass, com, inertia = zip(*(_body_arrays(_as_one(j.bodies, values), array, np.nan) for j in joints), strict=True)
         numbers = cls(
             values={name: float(value) for name, value in values.items()},
             a=a,
@@ -126,21 +127,20 @@ class Numbers:
             upper=upper,
             velocity=array(np.inf if j.velocity is None else j.velocity for j in joints),
             effort=array(np.inf if j.effort is None else j.effort for j in joints),
-            mass=array(body.mass if body else np.nan for body in bodies),
-            com=np.array([array(body.com) if body else np.full(3, np.nan) for body in bodies]),
-            inertia=np.array([_tensor(body, array) for body in bodies]),
+            mass=np.array(mass),
+            com=np.array(com),
+            inertia=np.array(inertia),
             armature=array(drive.armature if drive else 0.0 for drive in drives),
             viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
             coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
-            base_body=_base_body(description.base.body, array),
+            base_body=_body_arrays(description.base.body, array, 0.0),
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
             T_last_tool=matrix(description.tool.placement, values),
             configurations={name: array(q) for name, q in description.configurations.items()},
-            reach=float(np.sum(np.abs(a) + np.abs(d)) + _stroke(joints, lower, upper)),
+            reach=float(np.sum(np.abs(a) + np.abs(d)) + float(sum(strokes))),
         )
-        own = [getattr(numbers, item.name) for item in fields(numbers)]
-        for value in [*own, *numbers.configurations.values()]:
+        for value in [*vars(numbers).values(), *numbers.configurations.values()]:
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
         return numbers
@@ -150,36 +150,29 @@ class Numbers:
 
 
 def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
-    """Return a placement's (4, 4) matrix; right angles have exact cosines."""
-    needed = {name for entry in (*placement.xyz, *placement.rpy) for name in entry.symbols}
-    return _matrix(placement, tuple((name, value) for name, value in values.items() if name in needed)).copy()
+    """Return a placement's transform, shape (4, 4), m; cosines of right angles are exactly 0."""
+    names = {name for entry in (*placement.xyz, *placement.rpy) for name in entry.symbols}
+    return _cached_matrix(placement, tuple((name, value) for name, value in values.items() if name in names)).copy()
 
 
 @lru_cache(maxsize=1024)
-def _matrix(placement: Placement, values: tuple[tuple[str, Expression], ...]) -> Array:
-    """Remember matrices: an exact pose costs 1 ms, and base, tool and shapes stay while a person edits the table."""
+def _cached_matrix(placement: Placement, values: tuple[tuple[str, Expression], ...]) -> Array:
+    """Return :func:`matrix`; an exact pose costs 1 ms, and most placements stay while a user edits the table."""
     pose = pose_of(placement, dict(values))
     return np.array([[float(substitute(entry, dict(values))) for entry in row] for row in pose], dtype=float)
 
 
 def _as_one(bodies: tuple[Body, ...], values: dict[str, Expression]) -> Body | None:
-    """Return a link's bodies as one, several joined as numbers: a parameter that is zero divides nothing then."""
+    """Return a link's bodies as one body; several are joined with numbers for parameters: a divisor may be zero."""
     if len(bodies) < 2:
         return bodies[0] if bodies else None
     return joined(with_values(bodies, values))
 
 
-def _tensor(body: Body | None, array: Callable[[Vector], Array]) -> Array:
-    return np.full((3, 3), np.nan) if body is None else np.array([array(row) for row in body.inertia.rows])
-
-
-def _base_body(body: Body | None, array: Callable[[Iterable[Expression]], Array]) -> tuple[float, Array, Array]:
+def _body_arrays(
+    body: Body | None, array: Callable[[Iterable[Expression]], Array], missing: float
+) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass and inertia of a body, all ``missing`` where there is none."""
     if body is None:
-        return 0.0, np.zeros(3), np.zeros((3, 3))
+        return missing, np.full(3, missing), np.full((3, 3), missing)
     return float(array([body.mass])[0]), array(body.com), np.array([array(row) for row in body.inertia.rows])
-
-
-def _stroke(joints: Sequence[Joint], lower: Array, upper: Array) -> float:
-    """Return how far the prismatic joints with limits can move away from zero, m."""
-    strokes = [max(abs(lo), abs(up)) for j, lo, up in zip(joints, lower, upper, strict=True) if not j.is_revolute]
-    return float(sum(stroke for stroke in strokes if np.isfinite(stroke)))

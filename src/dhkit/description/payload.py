@@ -1,4 +1,4 @@
-"""A load in the tool, as a value: what a motion is planned with and what its torques carry."""
+"""A load that the tool carries, as a value, for planned motions and joint torques."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from dhkit.description.arrays import Array, number_array
 from dhkit.description.bodies import INERTIA_PLACES
-from dhkit.description.changes import SYMMETRIC, with_payload
+from dhkit.description.changes import is_asymmetric, with_payload
 from dhkit.description.robot import Description
 from dhkit.display import value_line
 from dhkit.errors import DescriptionError
@@ -46,11 +46,11 @@ class Payload:
                 raise DescriptionError(f"payload: {name} has shape {array.shape}; expected {shape}")
             if not np.isfinite(array).all():
                 raise DescriptionError(f"payload: {name} is {value!r}; expected finite numbers")
-            if shape == (3, 3) and np.abs(array - array.T).max() > SYMMETRIC * np.abs(array).max():
+            if shape == (3, 3) and is_asymmetric(array):
                 raise DescriptionError("payload: inertia is not symmetric")
-            listed = array.tolist()
-            kept = tuple(map(tuple, listed)) if array.ndim == 2 else tuple(listed) if array.ndim else listed
-            object.__setattr__(self, name, None if name == "inertia" and not array.any() else kept)
+            entries = array.tolist()
+            value = tuple(map(tuple, entries)) if array.ndim == 2 else tuple(entries) if array.ndim else entries
+            object.__setattr__(self, name, None if name == "inertia" and not array.any() else value)
         if self.mass < 0:
             raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
 
@@ -60,19 +60,19 @@ class Payload:
         Raises
         ------
         DescriptionError
-            A load that is none: an impossible inertia; or a last link without a body.
+            The load's inertia is impossible, or the last link has no body.
         """
         return with_payload(description, self.mass, self.com, self.inertia)
 
     @property
     def numbers(self) -> Array:
-        """Mass, centre of mass, and xx, yy, zz, xy, yz, xz, shape (10,)."""
+        """Mass, kg, centre of mass, m, and xx, yy, zz, xy, yz, xz, kg m^2, shape (10,)."""
         tensor = np.zeros((3, 3)) if self.inertia is None else np.array(self.inertia)
         return np.array([self.mass, *self.com, *(tensor[place] for place in INERTIA_PLACES.values())], dtype=float)
 
     @classmethod
     def of_numbers(cls, numbers: Array) -> Payload:
-        """Return the payload of :attr:`numbers`."""
+        """Return the payload of ten :attr:`numbers`."""
         if numbers.shape != (10,):
             raise DescriptionError(f"payload has shape {numbers.shape}; expected (10,)")
         tensor = np.zeros((3, 3))

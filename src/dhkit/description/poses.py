@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from dhkit.description.arrays import Array, number_array
 
 ORTHONORMAL = 1e-6
-"""Largest entry of R^T R - 1 that still counts as a rotation: six digits typed by hand."""
-AXES = {"X": 0, "Y": 1, "Z": 2}
+"""Largest entry of R^T R - 1 of a matrix that is accepted as a rotation: users type six digits."""
 
 
 def pose(
@@ -27,7 +26,7 @@ def pose(
     xyz
         Position, shape (..., 3), m.
     euler
-        Three angles, shape (..., 3), in the order's sequence.
+        Three angles, shape (..., 3), rad or degrees, in the order's sequence.
     order
         Three axes, neighbours different. Capitals turn about the moving axes, as in SciPy: ``"XYZ"`` is Rx Ry Rz;
         small letters about the fixed ones: ``"xyz"`` is Rz Ry Rx, a URDF's rpy.
@@ -39,7 +38,7 @@ def pose(
     Returns
     -------
     Array
-        Shape (..., 4, 4), batch axes broadcast.
+        Shape (..., 4, 4), m, batch axes broadcast.
 
     Raises
     ------
@@ -75,7 +74,7 @@ def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tu
     Parameters
     ----------
     T
-        Shape (..., 4, 4).
+        Shape (..., 4, 4), m.
     order, degrees
         As for :func:`pose`.
 
@@ -88,7 +87,7 @@ def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tu
     Raises
     ------
     ValueError
-        Another shape or order, or a matrix that is no pose.
+        Another shape or order, or a matrix that is not a rigid transform.
 
     Examples
     --------
@@ -102,7 +101,7 @@ def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tu
 
 
 def pose_quaternion(T: ArrayLike) -> Array:
-    """Return a pose's unit quaternion (x, y, z, w) with w >= 0, shape (..., 4)."""
+    """Return the unit quaternions (x, y, z, w) with w >= 0, shape (..., 4), of poses, shape (..., 4, 4), m."""
     from scipy.spatial.transform import Rotation
 
     R = check_pose(T)[..., :3, :3]
@@ -111,12 +110,12 @@ def pose_quaternion(T: ArrayLike) -> Array:
 
 
 def check_pose(T: ArrayLike, name: str = "T") -> Array:
-    """Return T as an array of poses; NaN rows pass.
+    """Return T as an array of poses, shape (..., 4, 4), m; poses with NaN pass.
 
     Raises
     ------
     ValueError
-        Not of shape (..., 4, 4), or some matrix is no rigid transform to 1e-6.
+        Not of shape (..., 4, 4), or some matrix is no rigid transform within 1e-6.
     """
     array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):
@@ -138,25 +137,25 @@ def _array(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
-    """Return the axes' indices in the sequence of intrinsic turns, and whether the order was extrinsic."""
+    """Return the axes' indices in the sequence of intrinsic rotations, and whether the order is extrinsic."""
     upper = order.upper()
     intrinsic, extrinsic = order == upper, order == order.lower()
     if len(order) != 3 or set(upper) - set("XYZ") or not (intrinsic or extrinsic) or upper[1] in (upper[0], upper[2]):
         raise ValueError(f"order is {order!r}; expected three of XYZ (moving) or xyz (fixed), neighbours different")
-    first, second, third = (AXES[letter] for letter in (upper if intrinsic else upper[::-1]))
+    first, second, third = ("XYZ".index(letter) for letter in (upper if intrinsic else upper[::-1]))
     return (first, second, third), extrinsic
 
 
 def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
     if not degrees:
         return np.cos(angles), np.sin(angles)
-    # Reduce in degrees, where it is exact, so that 90 degrees have the cosine 0.
+    # Multiples of 90 degrees are split off in degrees, which is exact, so that 90 degrees have the cosine 0.
     quarter = np.round(angles / 90.0)
-    rest = np.radians(angles - 90.0 * quarter)
-    c, s = np.cos(rest), np.sin(rest)
-    turn = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
-    cosine = np.select([turn == 0, turn == 1, turn == 2], [c, -s, -c], s)
-    sine = np.select([turn == 0, turn == 1, turn == 2], [s, c, -s], -c)
+    remainder = np.radians(angles - 90.0 * quarter)
+    c, s = np.cos(remainder), np.sin(remainder)
+    quadrant = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
+    cosine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [c, -s, -c], s)
+    sine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [s, c, -s], -c)
     return cosine + 0.0, sine + 0.0
 
 
@@ -165,12 +164,12 @@ def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
     cosines, sines = _cos_sin(angles[..., ::-1] if extrinsic else angles, degrees)
     rotation = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(axes):
-        turn = np.zeros((*angles.shape[:-1], 3, 3))
+        factor = np.zeros((*angles.shape[:-1], 3, 3))
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn[..., axis, axis] = 1.0
-        turn[..., i, i] = turn[..., j, j] = cosines[..., k]
-        turn[..., i, j], turn[..., j, i] = -sines[..., k], sines[..., k]
-        rotation = rotation @ turn
+        factor[..., axis, axis] = 1.0
+        factor[..., i, i] = factor[..., j, j] = cosines[..., k]
+        factor[..., i, j], factor[..., j, i] = -sines[..., k], sines[..., k]
+        rotation = rotation @ factor
     return rotation
 
 
@@ -179,8 +178,8 @@ def _to_euler(R: Array, order: str) -> Array:
     (i, j, k), extrinsic = _axes(order)
     o = 3 - i - j
     parity = 1.0 if (j - i) % 3 == 1 else -1.0
-    proper = i == k
-    if proper:
+    ends_as_it_begins = i == k
+    if ends_as_it_begins:
         level = np.hypot(R[..., j, i], R[..., o, i])
         first, middle = np.arctan2(R[..., j, i], -parity * R[..., o, i]), np.arctan2(level, R[..., i, i])
     else:
@@ -188,10 +187,10 @@ def _to_euler(R: Array, order: str) -> Array:
         first, middle = np.arctan2(-parity * R[..., j, k], R[..., k, k]), np.arctan2(parity * R[..., i, k], level)
     locked = level == 0.0
     first = np.where(locked, np.arctan2(parity * R[..., o, j], R[..., j, j]), first)
-    # With the first turn taken off, row j of what is left depends on the third alone, however near the lock is.
+    # Row j of R_i(-p) R depends on the third angle alone, however near gimbal lock is.
     c, s = np.cos(first), np.sin(first)
     row = c[..., None] * R[..., j, :] + parity * s[..., None] * R[..., o, :]
-    sine = -row[..., o] if proper else row[..., i]
+    sine = -row[..., o] if ends_as_it_begins else row[..., i]
     third = np.where(locked, 0.0, np.arctan2(parity * sine, row[..., j]))
     angles = np.stack([first, middle, third], axis=-1) + 0.0
     return angles[..., ::-1] if extrinsic else angles

@@ -1,4 +1,4 @@
-"""A robot as plain data: everything in its robot file, checked when it is made."""
+"""A robot as plain data: everything in its robot file, checked by the constructor."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Description(RobotData):
 
     @cached_property
     def digest(self) -> str:
-        """What two descriptions of one robot have in common, in twelve characters: of its file's text.
+        """First twelve hexadecimal digits of the SHA-256 of its robot file's text; equal robots have equal digests.
 
         Examples
         --------
@@ -64,7 +64,7 @@ class Description(RobotData):
         """
         return hashlib.sha256(toml_text(self).encode()).hexdigest()[:12]
 
-    # Whatever is made once for a robot is found by its hash, on every call: it is worked out once.
+    # Caches are looked up by a description's hash on every call, so it is computed once.
     def __hash__(self) -> int:
         return self._hash
 
@@ -73,41 +73,39 @@ class Description(RobotData):
         return hash(tuple(getattr(self, item.name) for item in fields(self) if item.compare))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields alone, without cached values: a hash of text differs from process to process."""
+        """Return the fields alone, without cached values: hashes of texts differ from process to process."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def __repr__(self) -> str:
         bodies = sum(bool(joint.bodies) for joint in self.joints)
-        return repr_line(
-            f"Description {self.name}",
-            said=f"{self.kinds}, {self.convention.value} DH, bodies on {bodies} of {self.n} links",
-        )
+        text = f"{self.kinds}, {self.convention.value} DH, bodies on {bodies} of {self.n} links"
+        return repr_line(f"Description {self.name}", "", text)
 
     def _repr_html_(self) -> str:
         values = [f"{name} = {value:.6g}" for name, value in self.numbers.values.items()]
-        lines = [*self.carried_words, *([f"parameters (SI): {', '.join(values)}"] if values else [])]
+        lines = [*self.tool_texts, *([f"parameters (SI): {', '.join(values)}"] if values else [])]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return html_block(self.name, DHTable.of(self)._repr_html_(), html_lines(lines))
 
     @property
-    def carried_words(self) -> list[str]:
-        """Where the tool is in the last frame, unless there, and the mass of payloads, in words."""
-        found = []
+    def tool_texts(self) -> list[str]:
+        """Texts about the tool: its position in frame n, unless at the origin, and the payloads' mass, if any."""
+        texts = []
         x, y, z = (float(entry) + 0.0 for entry in self.numbers.T_last_tool[:3, 3])
         if (x, y, z) != (0.0, 0.0, 0.0):
-            found.append(f"tool at ({x:.4g}, {y:.4g}, {z:.4g}) m")
+            texts.append(f"tool at ({x:.4g}, {y:.4g}, {z:.4g}) m")
         values = resolved(self.parameters)
         masses = [body.mass for body in self.joints[-1].bodies if body.name.startswith("payload")]
         if masses:
-            found.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
-        return found
+            texts.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
+        return texts
 
 
 def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:
-    """Let a function that takes a description take an arm as well: its first argument, or ``description=``."""
+    """Return a function of a description that takes an arm as well, as first argument or as ``description=``."""
 
     @wraps(function)
-    def taking(*arguments: Any, **options: Any) -> R:
+    def wrapper(*arguments: Any, **options: Any) -> R:
         if arguments:
             if not isinstance(arguments[0], Description):
                 arguments = (description_of(arguments[0]), *arguments[1:])
@@ -115,8 +113,8 @@ def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[
             options["description"] = description_of(options["description"])
         return function(*arguments, **options)
 
-    taking.takes_robot = True  # type: ignore[attr-defined]  # for the test that finds functions without
-    return cast("Callable[Concatenate[Robot, P], R]", taking)
+    wrapper.takes_robot = True  # type: ignore[attr-defined]  # for the test that finds functions without
+    return cast("Callable[Concatenate[Robot, P], R]", wrapper)
 
 
 def description_of(robot: Robot) -> Description:
@@ -141,9 +139,9 @@ def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
     """
     bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if not joint.bodies]
     if bare:
+        plural, verb = ("s", "have") if len(bare) > 1 else ("", "has")
         raise DescriptionError(
-            f"{description.name}: the link{'s' * (len(bare) > 1)} of joint{'s' * (len(bare) > 1)} {', '.join(bare)} "
-            f"{'have' if len(bare) > 1 else 'has'} no body, so the dynamics are unknown; add [joint.body], "
-            "or use with_uniform_links (--uniform-links in the command)"
+            f"{description.name}: the link{plural} of joint{plural} {', '.join(bare)} {verb} no body, so the dynamics "
+            "are unknown; add [joint.body], or use with_uniform_links (--uniform-links in the command)"
         )
     return tuple(joint.bodies for joint in description.joints)

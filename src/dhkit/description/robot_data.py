@@ -1,4 +1,4 @@
-"""A robot's fields as its file holds them, not checked: what the checks, the float view and the printers read."""
+"""A robot's fields as its file holds them, not checked; checks, float view and printers take this class."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class RobotData:
     source: str = ""
     notes: str = ""
     drawn: bool = True
-    """Whether links and tools without shapes are drawn from the table, where other links have shapes."""
+    """Whether links and tool without shapes are drawn from the table although other links have shapes."""
     units: Units = field(default=Units(), compare=False)
-    """What :func:`dhkit.description.to_toml` writes numbers in."""
+    """Units in which :func:`dhkit.description.to_toml` writes numbers."""
     mesh_folder: Path | None = field(default=None, compare=False)
     """The folder that mesh paths are relative to."""
     warnings: tuple[str, ...] = field(default=(), init=False, compare=False)
-    """What is odd about the values, but carried on with."""
+    """Unusual values that make no error, one line each."""
 
     @property
     def n(self) -> int:
@@ -68,7 +68,7 @@ def data_of(robot: Robot) -> RobotData:
     TypeError
         Neither.
     """
-    found = getattr(robot, "description", robot)
-    if not isinstance(found, RobotData):
+    data = getattr(robot, "description", robot)
+    if not isinstance(data, RobotData):
         raise TypeError(f"found {type(robot).__name__}; expected an arm or its description")
-    return found
+    return data

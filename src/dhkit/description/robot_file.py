@@ -6,19 +6,21 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dhkit.description.bodies import Body, Inertia, Vector
+from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia, Vector
 from dhkit.description.files import read_bounded, write_atomically
 from dhkit.description.named import Named
 from dhkit.description.robot import Description, takes_robot
 from dhkit.description.toml_text import toml_document
 from dhkit.description.toml_writer import toml_text
 from dhkit.description.values import (
+    ONE,
     Base,
     Box,
     Capsule,
     Convention,
     Cylinder,
     Drive,
+    Geometry,
     Joint,
     JointType,
     Mesh,
@@ -32,10 +34,10 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
 
 if TYPE_CHECKING:
-    from dhkit.description.schema import BodyForm, DriveForm, Entry, JointForm, RobotForm, ShapeForm
+    from dhkit.description.schema import BodyForm, DriveForm, Entry, JointForm, RobotForm, ShapeForm, ToolForm
 
 MAX_BYTES = 1_000_000
-ONE = exact(1)
+"""Largest robot file, in bytes."""
 
 
 def read_robot(path: str | Path) -> Description:
@@ -69,7 +71,7 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
         if len(text) > MAX_BYTES:
             raise DescriptionError(f"more than {MAX_BYTES / 1e6:g} MB; expected a robot file")
         with Budget():
-            return _Reader(validated(toml_document(text)), mesh_folder).description()
+            return _FormReader(validated(toml_document(text)), mesh_folder).description()
     except DescriptionError as error:
         raise DescriptionError(f"{file}: {error}") from None
 
@@ -85,12 +87,12 @@ def to_toml(description: Description) -> str:
 
 @takes_robot
 def write_robot(description: Description, path: str | Path) -> None:
-    """Write a robot file; it is there whole or not at all."""
+    """Write a robot file, whole or not at all."""
     write_atomically(Path(path), toml_text(description))
 
 
-class _Reader:
-    """A validated form, turned into exact values in SI units."""
+class _FormReader:
+    """Converts a validated form to a description, with exact values in SI units."""
 
     def __init__(self, form: RobotForm, mesh_folder: Path | None) -> None:
         self.form = form
@@ -107,11 +109,11 @@ class _Reader:
             joints=tuple(self.joint(i, joint) for i, joint in enumerate(form.joint, start=1)),
             gravity=self.vector("gravity", form.gravity),
             base=Base(
-                self.placement("base", form.base.xyz, form.base.rpy),
+                self.placement("base", form.base),
                 self.shapes("base", form.base.shape),
                 None if form.base.body is None else self.body("base", form.base.body),
             ),
-            tool=Tool(self.placement("tool", form.tool.xyz, form.tool.rpy), self.shapes("tool", form.tool.shape)),
+            tool=Tool(self.placement("tool", form.tool), self.shapes("tool", form.tool.shape)),
             configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
             source=form.source,
             notes=form.notes,
@@ -121,11 +123,9 @@ class _Reader:
         )
 
     def number(self, where: str, entry: Entry, unit: Expression = ONE) -> Expression:
-        """Read an entry: a bare number in this unit, or text in SI."""
+        """Return the value of an entry: a bare number in this unit, or text in SI."""
         try:
-            if isinstance(entry, str):
-                return parse(entry, self.names)
-            return exact(entry) * unit
+            return parse(entry, self.names) if isinstance(entry, str) else exact(entry) * unit
         except ExpressionError as error:
             raise DescriptionError(f"{where}: {error}") from None
 
@@ -139,12 +139,12 @@ class _Reader:
         x, y, z = (self.number(f"{where}[{i}]", entry, unit) for i, entry in enumerate(entries))
         return x, y, z
 
-    def placement(self, where: str, xyz: Sequence[Entry], rpy: Sequence[Entry]) -> Placement:
-        roll, pitch, yaw = (self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(rpy))
-        return Placement(self.vector(f"{where}: xyz", xyz, self.units.metres), (roll, pitch, yaw))
+    def placement(self, where: str, form: ToolForm | ShapeForm) -> Placement:
+        roll, pitch, yaw = (self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(form.rpy))
+        return Placement(self.vector(f"{where}: xyz", form.xyz, self.units.metres), (roll, pitch, yaw))
 
     def motion(self, where: str, type: JointType, entry: Entry) -> Expression:
-        """Read a value of the joint variable, or its rate."""
+        """Return a value of the joint variable, or of its rate."""
         return self.angle(where, entry) if type is JointType.REVOLUTE else self.length(where, entry)
 
     def joint(self, number: int, form: JointForm) -> Joint:
@@ -165,7 +165,7 @@ class _Reader:
             velocity=None if form.velocity is None else self.motion(f"{where}: velocity", kind, form.velocity),
             effort=None if form.effort is None else self.number(f"{where}: effort", form.effort),
             bodies=self.bodies(where, form),
-            drive=self.drive(where, form.drive),
+            drive=None if form.drive is None else self.drive(f"{where}: drive", form.drive),
             shapes=self.shapes(where, form.shape),
             assumed=tuple(form.assumed),
         )
@@ -174,48 +174,42 @@ class _Reader:
         if form.bodies is None:
             return () if form.body is None else (self.body(where, form.body),)
         return tuple(
-            self.body(f"{where}, {one.name[:40] or f'body {k}'}", one) for k, one in enumerate(form.bodies, start=1)
+            self.body(f"{where}, {body.name[:40] or f'body {k}'}", body) for k, body in enumerate(form.bodies, start=1)
         )
 
     def body(self, where: str, form: BodyForm) -> Body:
-        tensor = {
-            key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key))
-            for key in ("xx", "yy", "zz", "xy", "yz", "xz")
+        moments = {
+            key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key)) for key in INERTIA_PLACES
         }
-        return Body(
-            self.number(f"{where}: body.mass", form.mass),
-            self.vector(f"{where}: body.com", form.com, self.units.metres),
-            Inertia(**tensor),
-            form.unphysical,
-            form.name,
-        )
+        mass = self.number(f"{where}: body.mass", form.mass)
+        com = self.vector(f"{where}: body.com", form.com, self.units.metres)
+        return Body(mass, com, Inertia(**moments), form.unphysical, form.name)
 
-    def drive(self, where: str, form: DriveForm | None) -> Drive | None:
-        if form is None:
-            return None
-        coulomb = [self.number(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)]
-        return Drive(
-            gear=self.number(f"{where}: drive.gear", form.gear),
-            rotor_inertia=self.number(f"{where}: drive.rotor_inertia", form.rotor_inertia),
-            viscous=self.number(f"{where}: drive.viscous", form.viscous),
-            coulomb=(coulomb[0], coulomb[1] if len(coulomb) == 2 else -coulomb[0]),
+    def drive(self, where: str, form: DriveForm) -> Drive:
+        coulomb = [self.number(f"{where}.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)]
+        positive, negative = coulomb if len(coulomb) == 2 else (coulomb[0], -coulomb[0])
+        gear, rotor_inertia, viscous = (
+            self.number(f"{where}.{key}", getattr(form, key)) for key in ("gear", "rotor_inertia", "viscous")
         )
+        return Drive(gear, rotor_inertia, viscous, (positive, negative))
 
     def shapes(self, where: str, forms: Iterable[ShapeForm]) -> tuple[Shape, ...]:
         return tuple(self.shape(f"{where}: shape", form) for form in forms)
 
     def shape(self, where: str, form: ShapeForm) -> Shape:
-        placement = self.placement(where, form.xyz, form.rpy)
+        placement = self.placement(where, form)
+        return Shape(self.geometry(where, form), placement, form.color)
+
+    def geometry(self, where: str, form: ShapeForm) -> Geometry:
         if form.mesh is not None:
-            return Shape(Mesh(form.mesh, self.vector(f"{where}.scale", form.scale)), placement, form.color)
+            return Mesh(form.mesh, self.vector(f"{where}.scale", form.scale))
         if form.box is not None:
-            return Shape(Box(self.vector(f"{where}.box", form.box, self.units.metres)), placement, form.color)
+            return Box(self.vector(f"{where}.box", form.box, self.units.metres))
         if form.sphere is not None:
-            return Shape(Sphere(self.length(f"{where}.sphere.radius", form.sphere.radius)), placement, form.color)
+            return Sphere(self.length(f"{where}.sphere.radius", form.sphere.radius))
         for kind, ends in ((Cylinder, form.cylinder), (Capsule, form.capsule)):
             if ends is not None:
-                radius = self.length(f"{where}.radius", ends.radius)
-                return Shape(kind(radius, self.length(f"{where}.length", ends.length)), placement, form.color)
+                return kind(self.length(f"{where}.radius", ends.radius), self.length(f"{where}.length", ends.length))
         raise DescriptionError(f"{where}: no geometry")
 
     def configuration(self, name: str, q: Sequence[Entry]) -> tuple[Expression, ...]:

@@ -21,36 +21,56 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
+from dhkit.description.parameters import PARAMETER_NAME
+from dhkit.description.toml_text import Document
+from dhkit.description.validation import (
+    BODY_NAME,
+    MAX_BODIES,
+    MAX_CONFIGURATIONS,
+    MAX_JOINTS,
+    MAX_PARAMETERS,
+    MAX_SHAPES,
+    NAME,
+)
 from dhkit.errors import DescriptionError
 
 Entry: TypeAlias = int | Decimal | str
 """A number as the file has it: bare, or text in quotes."""
 
+KeyPath: TypeAlias = tuple[int | str, ...]
+"""Keys of tables and places in lists, from the root of a document to a value in it."""
+
+JsonSchema: TypeAlias = dict[str, Any]
+"""A JSON Schema, draft 2020-12."""
+
+
+def expected(text: str) -> PydanticCustomError:
+    """Return a fault whose message is what was found and then this text."""
+    return PydanticCustomError("expected", "{text}", {"text": text})
+
 
 def _entry(value: object) -> Entry:
     if isinstance(value, bool) or not isinstance(value, (int, Decimal, float, str)):
-        raise PydanticCustomError("number", "expected a number, or an expression in quotes")
+        raise expected("a number, or an expression in quotes")
     return Decimal(repr(value)) if isinstance(value, float) else value
-
-
-def _one_or_several(value: object) -> object:
-    return [value] if isinstance(value, dict) else value
 
 
 def _keyed_inertia(value: object) -> object:
     """Turn a 3x3 list into keys; refuse a list of six, which every tool orders in its own way."""
     if not isinstance(value, list):
         return value
-    if len(value) == 3 and all(isinstance(row, list) and len(row) == 3 for row in value):
-        rows = [[_entry(entry) for entry in row] for row in value]
-        for i, j in ((0, 1), (1, 2), (0, 2)):
-            if rows[i][j] != rows[j][i]:
-                raise PydanticCustomError("inertia", f"expected a symmetric matrix; {rows[i][j]} is not {rows[j][i]}")
-        (xx, xy, xz), (_, yy, yz), (_, _, zz) = rows
-        return {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
-    raise PydanticCustomError(
-        "inertia", "expected keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently"
-    )
+    if len(value) != 3 or not all(isinstance(row, list) and len(row) == 3 for row in value):
+        raise expected("keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently")
+    rows = [[_entry(entry) for entry in row] for row in value]
+    for i, j in ((0, 1), (1, 2), (0, 2)):
+        if rows[i][j] != rows[j][i]:
+            raise expected(f"a symmetric matrix; {rows[i][j]} is not {rows[j][i]}")
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = rows
+    return {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+
+
+def _list_of_tables(value: object) -> object:
+    return [value] if isinstance(value, dict) else value
 
 
 def _one_or_two(value: object) -> object:
@@ -61,8 +81,8 @@ def _one_or_three(value: object) -> object:
     return value if isinstance(value, list) else [value] * 3
 
 
-class _Also:
-    """Tells the JSON Schema what a field takes besides its type, before its validator brings it into that."""
+class _AlsoTakes:
+    """Adds to the JSON Schema a second form of a field, which its validator converts to the field's type."""
 
     def __init__(self, other: Callable[[JsonSchemaValue], JsonSchemaValue]) -> None:
         self.other = other
@@ -73,12 +93,8 @@ class _Also:
 
 
 NUMBER = {"type": ["number", "string"]}
-THREE_BY_THREE = {
-    "type": "array",
-    "items": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
-    "minItems": 3,
-    "maxItems": 3,
-}
+ROW = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
+THREE_BY_THREE = ROW | {"items": ROW}
 Number = Annotated[
     Entry,
     PlainValidator(_entry),
@@ -113,13 +129,18 @@ class InertiaForm(Form):
     xz: Number = 0
 
 
+KeyedInertia = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)]
+
+
 class BodyForm(Form):
     """Mass, kg, centre of mass and inertia of a link, or of a part of it, in the link's own DH frame."""
 
     name: Text = ""
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
-    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _Also(lambda _: THREE_BY_THREE)] = InertiaForm()
+    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)] = (
+        InertiaForm()
+    )
     unphysical: bool = False
 
 
@@ -133,7 +154,7 @@ class DriveForm(Form):
         list[Number],
         BeforeValidator(_one_or_two),
         Field(min_length=1, max_length=2),
-        _Also(lambda _: NUMBER),
+        _AlsoTakes(lambda _: NUMBER),
     ] = [0]
 
 
@@ -154,7 +175,7 @@ class ShapeForm(Form):
     """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame."""
 
     mesh: Text | None = None
-    scale: Annotated[Triple, BeforeValidator(_one_or_three), _Also(lambda _: NUMBER)] = [1, 1, 1]
+    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: NUMBER)] = [1, 1, 1]
     box: Triple | None = None
     cylinder: RoundForm | None = None
     capsule: RoundForm | None = None
@@ -168,17 +189,15 @@ class ShapeForm(Form):
         kinds = ("mesh", "box", "cylinder", "capsule", "sphere")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         if len(given) != 1:
-            raise PydanticCustomError(
-                "shape", f"expected exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
-            )
+            raise expected(f"exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}")
         return self
 
 
 Shapes = Annotated[
     list[ShapeForm],
-    BeforeValidator(_one_or_several),
-    Field(max_length=200, default=[]),
-    _Also(lambda several: several["items"]),
+    BeforeValidator(_list_of_tables),
+    Field(max_length=MAX_SHAPES, default=[]),
+    _AlsoTakes(lambda several: several["items"]),
 ]
 
 
@@ -197,7 +216,7 @@ class JointForm(Form):
     velocity: Number | None = None
     effort: Number | None = None
     body: BodyForm | None = None
-    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=16)] | None = None
+    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=MAX_BODIES)] | None = None
     drive: DriveForm | None = None
     shape: Shapes
     assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
@@ -207,17 +226,8 @@ class JointForm(Form):
     @model_validator(mode="after")
     def _one_of_body_and_bodies(self) -> JointForm:
         if self.body is not None and self.bodies is not None:
-            raise PydanticCustomError("both", "found both body and bodies; expected one of them")
+            raise PydanticCustomError("text", "found both body and bodies; expected one of them")
         return self
-
-
-class BaseForm(Form):
-    """Frame 0 in the world, and link 0."""
-
-    xyz: Triple = Field(default=[0, 0, 0])
-    rpy: Triple = Field(default=[0, 0, 0])
-    shape: Shapes
-    body: BodyForm | None = None
 
 
 class ToolForm(Form):
@@ -226,6 +236,12 @@ class ToolForm(Form):
     xyz: Triple = Field(default=[0, 0, 0])
     rpy: Triple = Field(default=[0, 0, 0])
     shape: Shapes
+
+
+class BaseForm(ToolForm):
+    """Frame 0 in the world, and link 0."""
+
+    body: BodyForm | None = None
 
 
 class RobotForm(Form):
@@ -239,96 +255,99 @@ class RobotForm(Form):
     source: Text = ""
     notes: Text = ""
     drawn: bool = True
-    parameters: dict[str, Number] = Field(default={}, max_length=200)
-    joint: list[JointForm] = Field(min_length=1, max_length=32)
+    parameters: dict[str, Number] = Field(default={}, max_length=MAX_PARAMETERS)
+    joint: list[JointForm] = Field(min_length=1, max_length=MAX_JOINTS)
     base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))
     tool: ToolForm = Field(default_factory=lambda: ToolForm.model_validate({}))
-    configurations: dict[str, list[Number]] = Field(default={}, max_length=100)
+    configurations: dict[str, list[Number]] = Field(default={}, max_length=MAX_CONFIGURATIONS)
 
 
-def robot_schema() -> dict[str, Any]:
+def robot_schema() -> JsonSchema:
     """Return the JSON Schema of robot files, made from the definition that validates them."""
-    from dhkit.description.parameters import NAME as PARAMETER
-    from dhkit.description.validation import BODY_NAME, NAME
-
     schema = RobotForm.model_json_schema()
     joint, body = (schema["$defs"][form]["properties"] for form in ("JointForm", "BodyForm"))
     schema["properties"]["name"]["pattern"] = f"^{NAME.pattern}$"
     joint["name"]["pattern"], body["name"]["pattern"] = f"^({NAME.pattern})?$", f"^({BODY_NAME.pattern})?$"
     schema["properties"]["configurations"]["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
-    schema["properties"]["parameters"]["propertyNames"] = {"pattern": f"^{PARAMETER.pattern}$"}
+    schema["properties"]["parameters"]["propertyNames"] = {"pattern": f"^{PARAMETER_NAME.pattern}$"}
     for key in ("velocity", "effort"):
         joint[key]["exclusiveMinimum"] = 0
     body["mass"]["minimum"] = 0
     return titled_schema("dhkit robot file, format 1", schema)
 
 
-def titled_schema(title: str, schema: Mapping[str, Any]) -> dict[str, Any]:
+def titled_schema(title: str, schema: Mapping[str, object]) -> JsonSchema:
     """Return a file format's JSON Schema, draft 2020-12, under another title."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
     return head | {key: value for key, value in schema.items() if key != "title"}
 
 
-def validated(document: Mapping[str, Any]) -> RobotForm:
+def validated(document: Document) -> RobotForm:
     """Check a parsed robot file's keys and types.
 
     Raises
     ------
     DescriptionError
-        The first thing wrong: where, what was found, what was expected.
+        The first fault: where, what was found, what was expected.
     """
     try:
         return RobotForm.model_validate(document)
     except ValidationError as error:
-        # A mistyped key is also a missing one: what is there says more than what is not.
-        found = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        raise DescriptionError(_one_line(found[0], document)) from None
+        # A mistyped key is also a missing one: the unknown key is the more useful message.
+        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+        raise DescriptionError(_fault_text(faults[0], document)) from None
 
 
-def _one_line(error: ErrorDetails, document: Mapping[str, Any]) -> str:
-    path = tuple(part for part in error["loc"])
-    key, found = path[-1] if path else "", error["input"]
+def _fault_text(error: ErrorDetails, document: Document) -> str:
+    path, value = tuple(error["loc"]), error["input"]
+    where = _place_text(path, document)
     match error["type"]:
         case "missing":
-            return f"{_place(path[:-1], document)}key {key!r} is missing"
+            return f"{_place_text(path[:-1], document)}key {path[-1]!r} is missing"
         case "extra_forbidden":
-            return f"{_place(path[:-1], document)}unknown key {str(key)[:80]!r}{_hint(path)}"
-        case "model_type" | "dict_type":
-            expected = "a table"
+            return f"{_place_text(path[:-1], document)}unknown key {str(path[-1])[:80]!r}{_key_hint(path)}"
         case "too_long" | "too_short":
-            count = error["ctx"]
-            bound = f"at most {count['max_length']}" if "max_length" in count else f"at least {count['min_length']}"
-            return f"{_place(path, document)}found {len(found)} entries; expected {bound}"
-        case "both":
-            return f"{_place(path, document)}{error['msg']}"
+            return f"{where}found {len(value)} entries; expected {length_bound(error)}"
+        case "text":
+            return f"{where}{error['msg']}"
+        case "model_type" | "dict_type":
+            expectation = "a table"
         case "literal_error":
-            expected = str(error["ctx"]["expected"])
-        case "number" | "inertia" | "shape":
-            expected = error["msg"].removeprefix("expected ")
+            expectation = str(error["ctx"]["expected"])
         case _:
-            expected = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
-    return f"{_place(path, document)}found {_shown(found)}; expected {expected}"
+            expectation = error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    return f"{where}found {shortened(value)}; expected {expectation}"
 
 
-def _shown(found: object) -> str:
-    text = str(found) if isinstance(found, Decimal) else repr(found)
+def length_bound(error: ErrorDetails) -> str:
+    """Return how many entries a list may have that is too long or too short: ``at most 3``."""
+    bounds = error["ctx"]
+    return f"at most {bounds['max_length']}" if "max_length" in bounds else f"at least {bounds['min_length']}"
+
+
+def shortened(value: object) -> str:
+    """Return a value of a document as text of 60 characters at most, decimals as they were written."""
+    text = str(value) if isinstance(value, Decimal) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _place(path: tuple[int | str, ...], document: Mapping[str, Any]) -> str:
-    """Say where in words: ``joint 2 (elbow): body.mass: ``."""
-    place = ""
-    if path[:1] == ("joint",) and len(path) > 1 and isinstance(path[1], int):
-        row = document["joint"][path[1]]
-        name = row.get("name") if isinstance(row, dict) else None
-        place = f"joint {path[1] + 1}{f' ({name[:40]})' if isinstance(name, str) else ''}: "
-        path = path[2:]
+def key_text(path: KeyPath) -> str:
+    """Return a path of keys and indices as the beginning of a message: ``body.com[0]: ``; empty for no keys."""
     keys = "".join(f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path).removeprefix(".")
-    return place + (f"{keys}: " if keys else "")
+    return f"{keys}: " if keys else ""
 
 
-def _hint(path: tuple[int | str, ...]) -> str:
-    """Name the known key that an unknown one is nearest to."""
+def _place_text(path: KeyPath, document: Document) -> str:
+    """Return where a value stands, joints by number and name: ``joint 2 (elbow): body.mass: ``."""
+    if path[:1] != ("joint",) or len(path) < 2 or not isinstance(path[1], int):
+        return key_text(path)
+    row = document["joint"][path[1]]
+    name = row.get("name") if isinstance(row, dict) else None
+    return f"joint {path[1] + 1}{f' ({name[:40]})' if isinstance(name, str) else ''}: {key_text(path[2:])}"
+
+
+def _key_hint(path: KeyPath) -> str:
+    """Return the known key that is most similar to an unknown one, or all known keys."""
     forms: dict[str, type[Form]] = {
         "joint": JointForm,
         "units": UnitsForm,
@@ -343,7 +362,7 @@ def _hint(path: tuple[int | str, ...]) -> str:
         "capsule": RoundForm,
         "sphere": BallForm,
     }
-    within = [forms[part] for part in path[:-1] if isinstance(part, str) and part in forms]
-    known = list((within[-1] if within else RobotForm).model_fields)
+    tables = [forms[part] for part in path[:-1] if isinstance(part, str) and part in forms]
+    known = list((tables[-1] if tables else RobotForm).model_fields)
     close = difflib.get_close_matches(str(path[-1])[:80], known, n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"

@@ -1,4 +1,4 @@
-"""The Denavit-Hartenberg table of a robot as people read it: in a terminal, in a notebook, in LaTeX."""
+"""The Denavit-Hartenberg table of a robot for printing: in a terminal, in a notebook, in LaTeX."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from dhkit.display import counted, html_table, repr_line
 from dhkit.expressions import Expression
 
 COLUMNS = ("theta", "d", "a", "alpha")
-LONGEST_ENTRY = 400
-"""Characters of an entry in a notebook and on a page of equations."""
+MAX_CELL_LENGTH = 400
+"""Longest entry in a notebook's table, in characters."""
 
 
 def length(value: Expression, units: Units) -> str:
-    """Return a length as text in these units: a number, or the expression that it is."""
+    """Return a length as text in these units: a number, or the expression of an unknown length."""
     bare = (value / units.metres).rational
-    return str(value) if bare is None else _short(bare)
+    return str(value) if bare is None else _short_number(bare)
 
 
 def angle(value: Expression) -> str:
-    """Return an angle as text: degrees where it is a number, else the expression that it is."""
+    """Return an angle as text: degrees, rad for other numbers, or the expression of an unknown angle."""
     if value.half_turns is not None:
-        return f"{_short(value.half_turns * 180)}°"
+        return f"{_short_number(value.half_turns * 180)}°"
     number = value.rational
-    return value.text if number is None else f"{_short(number)} rad"
+    return value.text if number is None else f"{_short_number(number)} rad"
 
 
-def _short(number: Fraction) -> str:
-    exactly = Expression.number(number).text
-    return exactly if len(exactly) <= 12 and "/" not in exactly else f"{float(number):.6g}"
+def _short_number(number: Fraction) -> str:
+    exact_text = Expression.number(number).text
+    return exact_text if len(exact_text) <= 12 and "/" not in exact_text else f"{float(number):.6g}"
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class DHTable:
         Column titles, with units.
     rows
         The entries as text, one row a joint.
+    latex_rows
+        The entries as LaTeX, one row a joint.
     """
 
     convention: Convention
@@ -55,25 +57,22 @@ class DHTable:
 
     @classmethod
     def of(cls, description: Robot) -> DHTable:
-        """Read a robot's table, in the units of its file."""
+        """Return a robot's table, in the units of its file."""
         description = data_of(description)
-        # An expression is in metres, and then so is the whole table.
+        # Expressions are in metres, so a table with expressions is in metres as a whole.
         symbolic = any(joint.a.symbols or joint.d.symbols for joint in description.joints)
         units = Units() if symbolic else description.units
         shift = "₋₁" if description.convention is Convention.MODIFIED else ""
         headings = ("joint", "θ", f"d [{units.length}]", f"a{shift} [{units.length}]", f"α{shift}")
         rows, latex_rows = [], []
         for i, joint in enumerate(description.joints, start=1):
-            entries = {
-                "theta": angle(joint.theta),
-                "d": length(joint.d, units),
-                "a": length(joint.a, units),
-                "alpha": angle(joint.alpha),
-            }
-            rows.append((f"{i} {joint.name}", *(_with_variable(key, entries[key], joint, f"q{i}") for key in COLUMNS)))
-            latex_rows.append(
-                (str(i), *(_latex(_with_variable(key, entries[key], joint, f"q_{{{i}}}")) for key in COLUMNS))
+            entries = dict(zip(COLUMNS, _row(joint, units), strict=True))
+            plain, latex = (
+                [_with_variable(key, entry, joint, variable) for key, entry in entries.items()]
+                for variable in (f"q{i}", f"q_{{{i}}}")
             )
+            rows.append((f"{i} {joint.name}", *plain))
+            latex_rows.append((str(i), *map(_latex, latex)))
         return cls(description.convention, headings, tuple(rows), tuple(latex_rows))
 
     def __str__(self) -> str:
@@ -89,7 +88,7 @@ class DHTable:
 
     def _repr_html_(self) -> str:
         caption = f"{self.convention.value} DH"
-        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=LONGEST_ENTRY)
+        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=MAX_CELL_LENGTH)
 
     def latex(self) -> str:
         """Return the table as a LaTeX ``tabular``."""
@@ -100,8 +99,13 @@ class DHTable:
         return "\n".join([r"\begin{tabular}{ccccc}", *lines, r"\end{tabular}"])
 
 
+def _row(joint: Joint, units: Units) -> tuple[str, str, str, str]:
+    """Return the entries of a joint's row as text, in the order of COLUMNS."""
+    return angle(joint.theta), length(joint.d, units), length(joint.a, units), angle(joint.alpha)
+
+
 def _with_variable(column: str, entry: str, joint: Joint, variable: str) -> str:
-    """Add the joint variable to the entry that it belongs to."""
+    """Return an entry with the joint variable added in the column that it belongs to."""
     if column != ("theta" if joint.is_revolute else "d"):
         return entry
     if entry in ("0°", "0"):

@@ -1,4 +1,4 @@
-"""A Denavit-Hartenberg table given row by row in Python, made a description."""
+"""Descriptions from Denavit-Hartenberg tables that are given row by row in Python."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia
 from dhkit.description.named import Named
@@ -22,7 +22,7 @@ Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
 
 
 def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
-    """Return an argument's exact value; bare numbers are in ``unit``, text is in SI.
+    """Return an argument's exact value; bare numbers are in ``unit``, text is in SI and may use these ``names``.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def from_dh(
     name: str = "arm",
     parameters: Mapping[str, Quantity] | None = None,
     limits: Sequence[Sequence[Quantity] | None] | None = None,
-    bodies: Sequence[Body | Mapping[str, Any] | None] | None = None,
+    bodies: Sequence[Body | Mapping[str, object] | None] | None = None,
 ) -> Description:
     """Return the description of a Denavit-Hartenberg table.
 
@@ -58,7 +58,7 @@ def from_dh(
     rows
         One row a joint: four numbers, in the units given, or text in metres and radians.
     order
-        What the columns are.
+        Names of the columns, in their order.
     kinds
         One letter a joint: R or P; all revolute if not given.
     convention
@@ -88,65 +88,61 @@ def from_dh(
     """
     if sorted(order) != sorted(COLUMNS):
         raise DescriptionError(f"order is {tuple(order)}; expected {', '.join(COLUMNS)} in some order")
-    for what, found, known in (
+    for what, value, known in (
         ("convention", convention, [c.value for c in Convention]),
         ("angle", angle, list(Units.ANGLES)),
         ("length", length, list(Units.LENGTHS)),
     ):
-        if found not in known:
-            raise DescriptionError(f"{what} is {found!r}; expected one of {', '.join(known)}")
-    types = "".join(kinds or "R" * len(rows)).upper()
-    if len(types) != len(rows) or set(types) - {"R", "P"}:
+        if value not in known:
+            raise DescriptionError(f"{what} is {value!r}; expected one of {', '.join(known)}")
+    letters = "".join(kinds or "R" * len(rows)).upper()
+    if len(letters) != len(rows) or set(letters) - {"R", "P"}:
         raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
     units = Units(length, angle)
-    named = dict(parameters or {})
-    for key in named:
+    names = dict(parameters or {})
+    for key in names:
         check_parameter_name(key)
-    joints = [
-        _joint(i, row, order, type, units, named) for i, (row, type) in enumerate(zip(rows, types, strict=True), 1)
-    ]
-    for what, given in (("limits", limits), ("bodies", bodies)):
-        if given is not None and len(given) != len(joints):
-            raise DescriptionError(f"{what}: {len(given)} entries; expected {len(joints)}, one a joint")
+    joints = [_joint(i, row, order, letters[i - 1], units, names) for i, row in enumerate(rows, start=1)]
+    for what, several in (("limits", limits), ("bodies", bodies)):
+        if several is not None and len(several) != len(joints):
+            raise DescriptionError(f"{what}: {len(several)} entries; expected {len(joints)}, one a joint")
     for i, pair in enumerate(limits or ()):
         if pair is not None:
-            joints[i] = replace(joints[i], limits=_limits(i + 1, pair, joints[i], units, named))
+            joints[i] = replace(joints[i], limits=_limits(i + 1, pair, joints[i], units, names))
     for i, body in enumerate(bodies or ()):
         if body is not None:
-            joints[i] = replace(joints[i], bodies=(_body(i + 1, body, named),))
+            joints[i] = replace(joints[i], bodies=(_body(i + 1, body, names),))
     return Description(
         name=name,
         convention=Convention(convention),
         joints=tuple(joints),
-        parameters=Named({key: quantity(f"parameters.{key}", value, named) for key, value in named.items()}),
+        parameters=Named({key: quantity(f"parameters.{key}", value, names) for key, value in names.items()}),
         units=units,
     )
 
 
+def _has_length(value: object, length: int) -> bool:
+    return not isinstance(value, str) and hasattr(value, "__len__") and len(value) == length
+
+
 def _joint(
-    number: int,
-    row: Sequence[Quantity],
-    order: Sequence[str],
-    type: str,
-    units: Units,
-    names: Mapping[str, object],
+    number: int, row: Sequence[Quantity], order: Sequence[str], letter: str, units: Units, names: Mapping[str, object]
 ) -> Joint:
-    if isinstance(row, str) or not hasattr(row, "__len__") or len(row) != len(COLUMNS):
+    if not _has_length(row, len(COLUMNS)):
         raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
-    entries: dict[str, Expression] = {
+    entries = {
         key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
         for key, value in zip(order, row, strict=True)
     }
-    for key in ("theta", "alpha"):
-        entries[key] = exact_angle(entries[key])
-    a, alpha, d, theta = (entries[key] for key in ("a", "alpha", "d", "theta"))
-    return Joint(JointType.REVOLUTE if type == "R" else JointType.PRISMATIC, a, alpha, d, theta)
+    theta, alpha = (exact_angle(entries[key]) for key in ("theta", "alpha"))
+    kind = JointType.REVOLUTE if letter == "R" else JointType.PRISMATIC
+    return Joint(kind, entries["a"], alpha, entries["d"], theta)
 
 
 def _limits(
     number: int, pair: Sequence[Quantity], joint: Joint, units: Units, names: Mapping[str, object]
 ) -> tuple[Expression, Expression]:
-    if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
+    if not _has_length(pair, 2):
         raise DescriptionError(f"limits of joint {number}: found {pair!r}; expected lowest and highest value, or None")
     unit = units.radians if joint.is_revolute else units.metres
     low, high = (quantity(f"limits of joint {number}", value, names, unit) for value in pair)

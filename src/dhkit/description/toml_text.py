@@ -1,4 +1,4 @@
-"""TOML that anybody may have written: bounded in size, depth and digits, decimals as they stand."""
+"""TOML text from untrusted files: bounded in depth and size of numbers, decimals kept digit by digit."""
 
 from __future__ import annotations
 
@@ -6,17 +6,22 @@ import re
 import tomllib
 from collections.abc import Mapping
 from decimal import Decimal, InvalidOperation
-from typing import Any
+from typing import Any, TypeAlias
 
 from dhkit.errors import DescriptionError
 
+Document: TypeAlias = dict[str, Any]
+"""A parsed document: tables, lists, texts, whole numbers, Decimal, booleans and dates, not checked further."""
+
 DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
-"""No key of ours is dotted so deep, and tomllib takes quadratic time over such keys. (Possessive: linear itself.)"""
-MAX_BITS = 2_048
-"""Of a whole number: beyond the range of a double."""
+"""A key of ten dotted parts or more, which no file of ours has; tomllib takes quadratic time over such keys.
+
+Possessive quantifiers keep this expression itself linear."""
+MAX_INTEGER_BITS = 2_048
+"""Largest size of a whole number, in bits: beyond the range of a double."""
 
 
-def toml_document(text: str) -> dict[str, Any]:
+def toml_document(text: str) -> Document:
     """Return a TOML document.
 
     Raises
@@ -37,7 +42,7 @@ def toml_document(text: str) -> dict[str, Any]:
 
 
 def plain_numbers(value: Any) -> Any:
-    """Return a document with doubles for decimals."""
+    """Return a document, or a part of one, with doubles in place of decimals."""
     if isinstance(value, Mapping):
         return {key: plain_numbers(entry) for key, entry in value.items()}
     if isinstance(value, list):
@@ -52,11 +57,11 @@ def _decimal(text: str) -> Decimal:
         raise DescriptionError(f"{text[:40]} is beyond the range of a double") from None
 
 
-def _check_numbers(value: Any) -> None:
+def _check_numbers(value: object) -> None:
     if isinstance(value, Mapping):
         value = list(value.values())
     if isinstance(value, list):
         for entry in value:
             _check_numbers(entry)
-    elif isinstance(value, int) and value.bit_length() > MAX_BITS:
+    elif isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
         raise DescriptionError("a whole number beyond the range of a double")

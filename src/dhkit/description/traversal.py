@@ -1,4 +1,4 @@
-"""Every expression inside a value: replaced, or asked for its names."""
+"""Traversal of nested values (tuples, mappings, dataclasses) for the expressions in them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def with_expressions(value: T, change: Callable[[Expression], Expression]) -> T:
-    """Return a value with every expression in it changed; what holds none stays the same object."""
+    """Return a value with every expression in it changed; parts without a change stay the same objects."""
     result: Any = value
     if isinstance(value, Expression):
         result = change(value)
@@ -22,15 +22,15 @@ def with_expressions(value: T, change: Callable[[Expression], Expression]) -> T:
     elif isinstance(value, Named):
         result = Named({name: with_expressions(entry, change) for name, entry in value.items()})
     elif is_dataclass(value) and not isinstance(value, type):
-        held = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
-        changed = {name: with_expressions(entry, change) for name, entry in held.items()}
-        if any(changed[name] is not entry for name, entry in held.items()):
+        entries = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
+        changed = {name: with_expressions(entry, change) for name, entry in entries.items()}
+        if any(changed[name] is not entry for name, entry in entries.items()):
             result = replace(value, **changed)
     return result if isinstance(value, Expression) or result != value else value
 
 
 def with_values(value: T, values: Mapping[str, Expression]) -> T:
-    """Return a value with names replaced by what they stand for."""
+    """Return a value with parameters replaced by their values."""
     return with_expressions(value, lambda expression: substitute(expression, values))
 
 
@@ -38,15 +38,16 @@ def expressions_in(value: object) -> Iterator[Expression]:
     """Yield every expression in a value."""
     if isinstance(value, Expression):
         yield value
-    elif isinstance(value, tuple):
-        for entry in value:
-            yield from expressions_in(entry)
-    elif isinstance(value, Named):
-        yield from expressions_in(tuple(value.values()))
+        return
+    entries: tuple[object, ...] = ()
+    if isinstance(value, (tuple, Named)):
+        entries = tuple(value.values()) if isinstance(value, Named) else value
     elif is_dataclass(value) and not isinstance(value, type):
-        yield from expressions_in(tuple(getattr(value, item.name) for item in fields(value)))
+        entries = tuple(getattr(value, item.name) for item in fields(value))
+    for entry in entries:
+        yield from expressions_in(entry)
 
 
 def names_in(value: object) -> frozenset[str]:
-    """Return the parameters that a value depends on."""
+    """Return the names of the parameters in a value."""
     return frozenset(name for expression in expressions_in(value) for name in expression.symbols)

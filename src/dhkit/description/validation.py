@@ -1,4 +1,4 @@
-"""Whether the values of a description make a robot: errors that stop, warnings that are kept."""
+"""Checks whether the values of a description make a robot: errors are raised, warnings are returned."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from dhkit.description.assets import MESH_FORMATS, inside
-from dhkit.description.bodies import Body
-from dhkit.description.joint_words import outside_words
-from dhkit.description.mesh_files import check_mesh_file
+from dhkit.description.bodies import MIN_EIGENVALUE_TOLERANCE, Body, eigenvalue_tolerance
+from dhkit.description.joint_text import violated_limit_text
+from dhkit.description.mesh_files import MeshFileError, check_mesh_file
 from dhkit.description.parameters import check_parameter_name, resolved
 from dhkit.description.robot_data import RobotData
 from dhkit.description.values import Box, Drive, Geometry, Joint, Mesh, Placement, Shape
@@ -19,31 +19,33 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
 
 MAX_JOINTS = 32
-LARGEST = 1e12
-"""Size of a number, SI units: products of several of them are finite doubles, and no robot comes near."""
-MESSAGE = 300
-"""Characters of an expression's own message, which may quote the whole of it."""
 MAX_PARAMETERS = 200
 MAX_CONFIGURATIONS = 100
 MAX_SHAPES = 200
-"""A humanoid's trunk with both arms frozen has 110."""
+"""Largest number of shapes of a link: a humanoid's trunk with both arms locked has 110."""
 MAX_BODIES = 16
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]{0,63}", re.ASCII)
-BODY_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.\- ]{0,63}", re.ASCII)
-RESERVED = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
-"""Names of the URDF's links and fixed joints: a joint of the same name would confuse Pinocchio."""
-CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
-"""What no XML may hold, and what a terminal would act on."""
+"""Largest number of rigid bodies of a link."""
+MAX_NUMBER = 1e12
+"""Largest absolute value of a number, SI units: products of several such numbers are finite doubles."""
+MAX_MESSAGE_LENGTH = 300
+"""Characters kept of an expression's own message, which may quote the whole expression."""
+MAX_NAME_LENGTH = 64
+"""Longest name of a robot, joint, body or configuration, in characters."""
+NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
+BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
+RESERVED_NAME = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
+"""Names of links and fixed joints of our URDFs: a joint of the same name would confuse Pinocchio."""
+CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+"""Characters that XML may not hold or that a terminal would act on."""
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
-ABSOLUTE_SLACK = 1e-12
-"""kg m^2: the smallest eigenvalue of a published inertia may be this far below zero."""
-RELATIVE_SLACK = 1e-9
-"""Share of the largest eigenvalue, for tensors given to ten digits."""
 
-WHOLE_TURN, SEVERAL_TURNS, LARGEST_DEGREES = math.tau + 1e-9, 2 * math.tau + 1e-9, 1080.0
-"""rad: an angle of the table, or a joint limit, between these and the last is likely one in degrees."""
+MAX_TABLE_ANGLE, MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
+"""rad: larger angles of the table, or joint limits, are probably degrees; see MAX_DEGREES."""
+MAX_DEGREES = 1080.0
+"""Angles beyond this number are no degrees either, so nothing is said."""
 
 Value = Callable[[str, Expression], float]
+"""Returns the number of an expression, SI and radians; the text names the expression in messages."""
 
 
 def check(description: RobotData) -> tuple[str, ...]:
@@ -52,17 +54,23 @@ def check(description: RobotData) -> tuple[str, ...]:
     Raises
     ------
     DescriptionError
-        The first thing found that makes it no robot: joint, key, found, expected.
+        The first fault: joint, key, what was found and what was expected.
     """
-    _check_counts(description)
+    for what, count, least, most in (
+        ("joints", description.n, 1, MAX_JOINTS),
+        ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
+        ("configurations", len(description.configurations), 0, MAX_CONFIGURATIONS),
+    ):
+        if not least <= count <= most:
+            raise DescriptionError(f"{count} {what}; expected {least} to {most}")
     for name in description.parameters:
         check_parameter_name(name)
     values = resolved(description.parameters)
     for name, parameter in values.items():
-        _finite(f"parameters.{name}", parameter, {})
+        _number(f"parameters.{name}", parameter, {})
 
     def value(where: str, expression: Expression) -> float:
-        return _finite(where, expression, values)
+        return _number(where, expression, values)
 
     for i, component in enumerate(description.gravity):
         value(f"gravity[{i}]", component)
@@ -71,74 +79,55 @@ def check(description: RobotData) -> tuple[str, ...]:
         warnings += _check_joint(joint, f"joint {number} ({joint.name})", value)
     _check_names(description)
     for key in ("source", "notes"):
-        if found := CONTROL.search(getattr(description, key)):
-            raise DescriptionError(f"{key}: holds the control character {found.group()!r}; expected plain text")
-    for part, placement, shapes in (
-        ("base", description.base.placement, description.base.shapes),
-        ("tool", description.tool.placement, description.tool.shapes),
-    ):
-        _check_placement(placement, f"{part}: ", value)
-        warnings += _check_shapes(shapes, part, value, description)
+        if control := CONTROL_CHARACTER.search(getattr(description, key)):
+            raise DescriptionError(f"{key}: holds the control character {control.group()!r}; expected plain text")
+    base, tool = description.base, description.tool
+    for part, placed in (("base", base), ("tool", tool)):
+        _check_placement(placed.placement, f"{part}: ", value)
+        warnings += _check_shapes(placed.shapes, part, value, description)
     for joint in description.joints:
         warnings += _check_shapes(joint.shapes, f"link of {joint.name}", value, description)
-    if description.base.body is not None:
-        warnings += _check_lone_body(description.base.body, "base", value)
+    if base.body is not None:
+        warnings += _check_only_body(base.body, "base", value)
     warnings += _check_configurations(description, value)
     return tuple(warnings)
 
 
-def _finite(where: str, expression: Expression, values: Mapping[str, Expression]) -> float:
+def _number(where: str, expression: Expression, values: Mapping[str, Expression]) -> float:
     try:
-        value = float(substitute(expression, values))
+        number = float(substitute(expression, values))
     except ExpressionError as error:
-        raise DescriptionError(f"{where}: {str(error)[:MESSAGE]}") from None
-    if abs(value) > LARGEST:
-        raise DescriptionError(f"{where}: {value:.3g} in SI units; expected at most {LARGEST:g}")
-    return value
-
-
-def _check_counts(description: RobotData) -> None:
-    for what, count, least, most in (
-        ("joints", description.n, 1, MAX_JOINTS),
-        ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
-        ("configurations", len(description.configurations), 0, MAX_CONFIGURATIONS),
-    ):
-        if not least <= count <= most:
-            raise DescriptionError(f"{count} {what}; expected {least} to {most}")
+        raise DescriptionError(f"{where}: {str(error)[:MAX_MESSAGE_LENGTH]}") from None
+    if abs(number) > MAX_NUMBER:
+        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {MAX_NUMBER:g}")
+    return number
 
 
 def _check_names(description: RobotData) -> None:
+    expected = "expected letters, digits, '_', '.', '-', beginning with a letter"
     if not NAME.fullmatch(description.name):
-        raise DescriptionError(
-            f"name: found {description.name[:80]!r}; expected letters, digits, '_', '.', '-', beginning with a letter"
-        )
-    seen: set[str] = set()
-    for i, joint in enumerate(description.joints, start=1):
-        if not NAME.fullmatch(joint.name):
-            raise DescriptionError(
-                f"joint {i}: name {joint.name[:80]!r}; expected letters, digits, '_', '.', '-', beginning with a letter"
-            )
-        if RESERVED.fullmatch(joint.name):
-            raise DescriptionError(f"joint {i}: name {joint.name!r} is taken by a frame of the URDF; choose another")
-        if joint.name in seen:
-            raise DescriptionError(f"joint {i}: name {joint.name!r} is another joint's already")
-        seen.add(joint.name)
+        raise DescriptionError(f"name: found {description.name[:80]!r}; {expected}")
+    names = [joint.name for joint in description.joints]
+    for i, name in enumerate(names, start=1):
+        if not NAME.fullmatch(name):
+            raise DescriptionError(f"joint {i}: name {name[:80]!r}; {expected}")
+        if RESERVED_NAME.fullmatch(name):
+            raise DescriptionError(f"joint {i}: name {name!r} is taken by a frame of the URDF; choose another")
+        if name in names[: i - 1]:
+            raise DescriptionError(f"joint {i}: name {name!r} is another joint's already")
 
 
 def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
-    angles = list[tuple[str, float, float]]()
-    for key in ("a", "alpha", "d", "theta"):
-        size = value(f"{where}: {key}", getattr(joint, key))
-        if key in ("alpha", "theta"):
-            angles.append((key, size, WHOLE_TURN))
+    row = {key: value(f"{where}: {key}", getattr(joint, key)) for key in ("a", "alpha", "d", "theta")}
+    angles = [(key, row[key], MAX_TABLE_ANGLE) for key in ("alpha", "theta")]
     if joint.limits is not None:
         lower, upper = (value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits))
         if lower > upper:
             raise DescriptionError(f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round")
         if joint.is_revolute:
-            angles += [("lower limit", lower, SEVERAL_TURNS), ("upper limit", upper, SEVERAL_TURNS)]
+            angles += [("lower limit", lower, MAX_LIMIT_ANGLE), ("upper limit", upper, MAX_LIMIT_ANGLE)]
     for key, angle, most in angles:
-        if most < abs(angle) <= LARGEST_DEGREES:
+        if most < abs(angle) <= MAX_DEGREES:
             yield f"{where}: {key} is {angle:.6g} rad, {abs(angle) / math.tau:.3g} turns; are angles in degrees?"
     for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
         limit = getattr(joint, key)
@@ -146,11 +135,10 @@ def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
             raise DescriptionError(f"{where}: {key} is {limit}; expected a positive number of {unit}")
     if joint.drive is not None:
         _check_drive(joint.drive, where, value)
+    _check_body_names(joint.bodies, where)
     if len(joint.bodies) == 1:
-        _check_body_names(joint.bodies, where)
-        yield from _check_lone_body(joint.bodies[0], where, value)
-    elif joint.bodies:
-        _check_body_names(joint.bodies, where)
+        yield from _check_only_body(joint.bodies[0], where, value)
+    else:
         for body in joint.bodies:
             yield from _check_body(body, f"{where}, {body.name}", value)
 
@@ -158,25 +146,24 @@ def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
 def _check_body_names(bodies: Sequence[Body], where: str) -> None:
     if len(bodies) > MAX_BODIES:
         raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {MAX_BODIES}")
-    seen: set[str] = set()
-    for k, body in enumerate(bodies, start=1):
-        if body.name and not BODY_NAME.fullmatch(body.name):
+    names = [body.name for body in bodies]
+    for k, name in enumerate(names, start=1):
+        if name and not BODY_NAME.fullmatch(name):
             raise DescriptionError(
-                f"{where}: body {k} has the name {body.name[:80]!r}; expected letters, digits, '_', '.', '-' and "
+                f"{where}: body {k} has the name {name[:80]!r}; expected letters, digits, '_', '.', '-' and "
                 "spaces, beginning with a letter"
             )
-        if body.name in seen:
-            raise DescriptionError(f"{where}: name {body.name!r} is another body's already")
-        seen.add(body.name)
+        if name in names[: k - 1]:
+            raise DescriptionError(f"{where}: name {name!r} is another body's already")
 
 
 def _check_drive(drive: Drive, where: str, value: Value) -> None:
     if value(f"{where}: drive.gear", drive.gear) == 0:
         raise DescriptionError(f"{where}: drive.gear is 0; expected the ratio of motor to joint speed")
     for key, unit in (("rotor_inertia", "kg m^2"), ("viscous", "N m s/rad")):
-        found = value(f"{where}: drive.{key}", getattr(drive, key))
-        if found < 0:
-            raise DescriptionError(f"{where}: drive.{key} is {found:g} {unit}; expected none below 0")
+        number = value(f"{where}: drive.{key}", getattr(drive, key))
+        if number < 0:
+            raise DescriptionError(f"{where}: drive.{key} is {number:g} {unit}; expected none below 0")
     positive, negative = (value(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(drive.coulomb))
     if positive < 0 or negative > 0:
         raise DescriptionError(
@@ -191,27 +178,27 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
     for i, entry in enumerate(body.com):
         value(f"{where}: body.com[{i}]", entry)
     lowest, middle, largest = _principal_moments(body, where, value)
-    slack = ABSOLUTE_SLACK + RELATIVE_SLACK * abs(largest)
-    if lowest < -slack:
+    tolerance = eigenvalue_tolerance(largest)
+    if lowest < -tolerance:
         message = f"{where}: body.inertia has the eigenvalue {lowest:.6g} kg m^2; expected none below 0"
         if not body.unphysical:
             raise DescriptionError(message)
         yield message
-    elif largest > lowest + middle + slack:
+    elif largest > lowest + middle + tolerance:
         yield (
             f"{where}: no body has principal moments {lowest:.4g}, {middle:.4g}, {largest:.4g} kg m^2 "
             "(triangle inequality)"
         )
-    if mass == 0 and largest > slack:
+    if mass == 0 and largest > tolerance:
         yield f"{where}: a body without mass has inertia"
 
 
-def _check_lone_body(body: Body, where: str, value: Value) -> Iterator[str]:
-    """Check the only body of a link: one of several may well be a point mass."""
+def _check_only_body(body: Body, where: str, value: Value) -> Iterator[str]:
+    """Check the only body of a link, which is unlikely to be a point mass; one of several bodies may be one."""
     yield from _check_body(body, where, value)
     mass = value(f"{where}: body.mass", body.mass)
     lowest, _, largest = _principal_moments(body, where, value)
-    if mass > 0 and math.isclose(max(abs(lowest), abs(largest)), 0.0, abs_tol=ABSOLUTE_SLACK):
+    if mass > 0 and max(abs(lowest), abs(largest)) <= MIN_EIGENVALUE_TOLERANCE:
         yield f"{where}: a body of {mass:g} kg has no inertia"
 
 
@@ -229,15 +216,14 @@ def _check_placement(placement: Placement, prefix: str, value: Value) -> None:
 
 
 def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None:
-    """Refuse a body that is none, by itself.
+    """Refuse an impossible body.
 
     Raises
     ------
     DescriptionError
         A negative mass, an impossible inertia, or a value that is not finite.
     """
-    for _ in _check_body(body, where, lambda place, expression: _finite(place, expression, values)):
-        pass
+    list(_check_body(body, where, lambda place, expression: _number(place, expression, values)))
 
 
 def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: RobotData) -> Iterator[str]:
@@ -247,26 +233,26 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
         _check_placement(shape.placement, f"{where}: shape.", value)
         if shape.color is not None and not COLOR.fullmatch(shape.color):
             raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
-        yield from _check_geometry(shape.geometry, f"{where}: shape", value, description)
+        if isinstance(shape.geometry, Mesh):
+            yield from _check_mesh(shape.geometry, f"{where}: shape", value, description)
+        else:
+            _check_sizes(shape.geometry, f"{where}: shape", value)
 
 
-def _check_geometry(geometry: Geometry, where: str, value: Value, description: RobotData) -> Iterator[str]:
-    if isinstance(geometry, Mesh):
-        yield from _check_mesh(geometry, where, value, description)
-        return
+def _check_sizes(geometry: Geometry, where: str, value: Value) -> None:
     if isinstance(geometry, Box):
         sizes = {f"box[{i}]": edge for i, edge in enumerate(geometry.size)}
     else:
         sizes = dict(vars(geometry))
     for key, size in sizes.items():
-        found = value(f"{where}.{key}", size)
-        if not found > 0:
-            raise DescriptionError(f"{where}.{key} is {found:g}; expected a positive number")
+        number = value(f"{where}.{key}", size)
+        if not number > 0:
+            raise DescriptionError(f"{where}.{key} is {number:g}; expected a positive number")
 
 
 def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) -> Iterator[str]:
-    """Refuse a path or a scale that is none; a file that is none is a warning, for the arm works without it."""
-    file = inside(description.mesh_folder, mesh.path, where)
+    """Refuse an invalid path or scale; a file that is no mesh is a warning, for the arm works without it."""
+    file = inside(description.mesh_folder, mesh.path, f"{where}.mesh")
     if not mesh.path.lower().endswith(MESH_FORMATS):
         raise DescriptionError(f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
     for i, entry in enumerate(mesh.scale):
@@ -276,10 +262,9 @@ def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) ->
         return
     try:
         check_mesh_file(file)
-    except DescriptionError as error:
-        cause = str(error).removeprefix(f"{file}: ")
-        what = "is not there" if not file.exists() else f"is no mesh that can be read ({cause})"
-        yield f"{where}.mesh: {mesh.path!r} {what}; the link is drawn from the table"
+    except MeshFileError as error:
+        fault = "is not there" if not file.exists() else f"is no mesh that can be read ({error.reason})"
+        yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn from the table"
 
 
 def _check_configurations(description: RobotData, value: Value) -> Iterator[str]:
@@ -288,10 +273,10 @@ def _check_configurations(description: RobotData, value: Value) -> Iterator[str]
             raise DescriptionError(f"configurations: {name[:80]!r} is no name")
         if len(q) != description.n:
             raise DescriptionError(f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint")
-        for i, entry in enumerate(q):
-            found, joint = value(f"configurations.{name}[{i}]", entry), description.joints[i]
+        for i, (entry, joint) in enumerate(zip(q, description.joints, strict=True)):
+            number = value(f"configurations.{name}[{i}]", entry)
             if joint.limits is None:
                 continue
             lower, upper = (value("", limit) for limit in joint.limits)
-            if words := outside_words(found, lower, upper, slides=not joint.is_revolute):
-                yield f"configurations.{name}: {joint.name} is {words}"
+            if violation := violated_limit_text(number, lower, upper, slides=not joint.is_revolute):
+                yield f"configurations.{name}: {joint.name} is {violation}"

@@ -1,4 +1,4 @@
-"""What a robot is put together from: frozen values with exact numbers, in SI units and radians."""
+"""The parts of a robot: frozen values with exact numbers, in SI units and radians."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Convention(Enum):
 
 
 class JointType(Enum):
-    """What the joint variable adds to."""
+    """Which entry of the table's row the joint variable is added to."""
 
     REVOLUTE = "revolute"
     """The angle theta, rad."""
@@ -36,7 +36,7 @@ class JointType(Enum):
 
 @dataclass(frozen=True)
 class Units:
-    """The units that a robot file's bare numbers are in."""
+    """The units of a robot file's bare numbers."""
 
     length: str = "m"
     angle: str = "rad"
@@ -75,8 +75,8 @@ class Drive:
 
     def __repr__(self) -> str:
         against = " and ".join(map(str, self.coulomb))
-        said = f"gear {self.gear}, rotor {self.rotor_inertia} kg m^2, viscous {self.viscous} N m s, dry {against} N m"
-        return repr_line("Drive", said=said)
+        text = f"gear {self.gear}, rotor {self.rotor_inertia} kg m^2, viscous {self.viscous} N m s, dry {against} N m"
+        return repr_line("Drive", "", text)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Placement:
     rpy: Vector = ORIGIN
 
     def __repr__(self) -> str:
-        return repr_line("Placement", said=f"xyz {vector_text(self.xyz)} m, rpy {vector_text(self.rpy)} rad")
+        return repr_line("Placement", "", f"xyz {vector_text(self.xyz)} m, rpy {vector_text(self.rpy)} rad")
 
 
 @dataclass(frozen=True)
@@ -102,46 +102,41 @@ class Mesh:
         return repr_line("Mesh", self.path, f"times {vector_text(self.scale)}")
 
 
-@dataclass(frozen=True)
-class Box:
-    """A box centred on the origin, edges in m."""
-
-    size: Vector
+class _Solid:
+    """A geometry that prints in one line, as its constructor is written."""
 
     def __repr__(self) -> str:
         return value_line(self)
 
 
-@dataclass(frozen=True)
-class Cylinder:
+@dataclass(frozen=True, repr=False)
+class Box(_Solid):
+    """A box centred on the origin, edges in m."""
+
+    size: Vector
+
+
+@dataclass(frozen=True, repr=False)
+class Cylinder(_Solid):
     """A cylinder along z centred on the origin, m."""
 
     radius: Expression
     length: Expression
 
-    def __repr__(self) -> str:
-        return value_line(self)
 
-
-@dataclass(frozen=True)
-class Capsule:
+@dataclass(frozen=True, repr=False)
+class Capsule(_Solid):
     """A cylinder along z with half balls on its ends; ``length`` is the cylinder's, m."""
 
     radius: Expression
     length: Expression
 
-    def __repr__(self) -> str:
-        return value_line(self)
 
-
-@dataclass(frozen=True)
-class Sphere:
+@dataclass(frozen=True, repr=False)
+class Sphere(_Solid):
     """A ball around the origin, m."""
 
     radius: Expression
-
-    def __repr__(self) -> str:
-        return value_line(self)
 
 
 Geometry: TypeAlias = Mesh | Box | Cylinder | Capsule | Sphere
@@ -149,7 +144,7 @@ Geometry: TypeAlias = Mesh | Box | Cylinder | Capsule | Sphere
 
 @dataclass(frozen=True)
 class Shape:
-    """What a link looks like, in its own DH frame."""
+    """Geometry of a link for drawings and collisions, in the link's own DH frame."""
 
     geometry: Geometry
     placement: Placement = Placement()
@@ -157,16 +152,16 @@ class Shape:
     """``#rrggbb``."""
 
     def __repr__(self) -> str:
-        position = f"at {vector_text(self.placement.xyz)} m"
-        said = position if self.color is None else f"{position}, {self.color}"
-        return repr_line("Shape", type(self.geometry).__name__.lower(), said)
+        color = "" if self.color is None else f", {self.color}"
+        position = f"at {vector_text(self.placement.xyz)} m{color}"
+        return repr_line("Shape", type(self.geometry).__name__.lower(), position)
 
 
 @dataclass(frozen=True)
 class Joint:
     """A row of the table with the link that it moves.
 
-    ``theta`` of a revolute and ``d`` of a prismatic joint are what the joint variable is added to. In the modified
+    The joint variable is added to ``theta`` of a revolute and to ``d`` of a prismatic joint. In the modified
     convention ``a`` and ``alpha`` are those of the link before (a_(i-1), alpha_(i-1)).
     """
 
@@ -176,7 +171,7 @@ class Joint:
     d: Expression
     theta: Expression
     name: str = ""
-    """Empty: the description calls it ``joint1``, ``joint2`` ... by its place."""
+    """If empty, the description names the joint ``joint1``, ``joint2`` ... by its place."""
     limits: tuple[Expression, Expression] | None = None
     """Lowest and highest value of the joint variable, rad or m; None: unlimited."""
     velocity: Expression | None = None
@@ -184,12 +179,12 @@ class Joint:
     effort: Expression | None = None
     """Largest torque or force, N m or N."""
     bodies: tuple[Body, ...] = ()
-    """What the link is made of; without one its dynamics are unknown."""
+    """The link's rigid bodies; the dynamics of a link without a body are unknown."""
     drive: Drive | None = None
     shapes: tuple[Shape, ...] = ()
-    """Without one, the link is drawn from the table."""
+    """Shapes of the link; a link without shapes is drawn from the table."""
     assumed: tuple[str, ...] = ()
-    """Keys of this joint whose numbers are nobody's publication."""
+    """Keys of this joint whose numbers are assumptions, not from a publication."""
 
     def __post_init__(self) -> None:
         if len(self.bodies) > 1:
@@ -198,7 +193,7 @@ class Joint:
 
     @cached_property
     def body(self) -> Body | None:
-        """The link as one rigid body: the only one itself, several joined about their common centre of mass."""
+        """The link as one rigid body; several bodies are joined about their common centre of mass."""
         return joined(self.bodies) if self.bodies else None
 
     @property
@@ -207,29 +202,33 @@ class Joint:
         return self.type is JointType.REVOLUTE
 
     def __repr__(self) -> str:
-        said = f"{self.type.value}, theta {self.theta}, d {self.d}, a {self.a}, alpha {self.alpha}"
-        return repr_line(f"Joint {self.name}" if self.name else "Joint", said=said)
+        row = f"{self.type.value}, theta {self.theta}, d {self.d}, a {self.a}, alpha {self.alpha}"
+        return repr_line(f"Joint {self.name}" if self.name else "Joint", "", row)
 
 
 @dataclass(frozen=True)
 class Base:
-    """Link 0 and where frame 0 stands in the world; its shapes and body are in frame 0."""
+    """Link 0 and the pose of frame 0 in the world; its shapes and body are in frame 0."""
 
     placement: Placement = Placement()
     shapes: tuple[Shape, ...] = ()
     body: Body | None = None
-    """Moves nothing; holds what was locked to the base."""
+    """Body of link 0, which does not move: links that were locked to the base are kept in it."""
 
     def __repr__(self) -> str:
-        return repr_line("Base", said=f"at {vector_text(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
+        return _placed_repr("Base", self.placement, self.shapes)
 
 
 @dataclass(frozen=True)
 class Tool:
-    """Where the tool's frame stands in DH frame n; its shapes are in the tool's frame."""
+    """The pose of the tool's frame in DH frame n; its shapes are in the tool's frame."""
 
     placement: Placement = Placement()
     shapes: tuple[Shape, ...] = ()
 
     def __repr__(self) -> str:
-        return repr_line("Tool", said=f"at {vector_text(self.placement.xyz)} m, {counted(len(self.shapes), 'shape')}")
+        return _placed_repr("Tool", self.placement, self.shapes)
+
+
+def _placed_repr(kind: str, placement: Placement, shapes: tuple[Shape, ...]) -> str:
+    return repr_line(kind, "", f"at {vector_text(placement.xyz)} m, {counted(len(shapes), 'shape')}")

@@ -61,7 +61,7 @@ def evaluate(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return a quantity of ``EXPRESSIONS``, shape (..., *tail), at joint vectors by name, each (..., n).
+    """Return a quantity of ``EXPRESSIONS``, shape (..., *tail), at joint vectors by name, each (..., n), in SI units.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def evaluate(
 
 @lru_cache(maxsize=4096)
 def dynamics_kernel(quantity: str, description: Description) -> tuple[Kernel, Array]:
-    """Return the kernel of a quantity and the arm's values of its parameters.
+    """Return the kernel of a quantity and the arm's values of its parameters, shape (p,), in SI units.
 
     Raises
     ------

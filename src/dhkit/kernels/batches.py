@@ -80,7 +80,7 @@ def check_whole(name: str, value: object, least: int) -> None:
 
 
 def pose_rows(T: ArrayLike) -> Array:
-    """Return T as a C-contiguous float64 array (..., 4, 4).
+    """Return poses T as a C-contiguous float64 array (..., 4, 4), m.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def pose_rows(T: ArrayLike) -> Array:
 
 
 def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
-    """Return ``out``, or a new array where it is None.
+    """Return ``out`` of this shape, or a new array if it is None; in any unit.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class Stage:
     """Objects that ``run`` needs and that must stay alive."""
 
     def work(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
-        """Compute one item for each row of the arrays."""
+        """Write the outputs (items, ...) of parameters (p,) and inputs (items, ...), in the units of the program."""
         self.parameters[...] = parameters
         for staged, array in zip(self.inputs, inputs, strict=True):
             staged[...] = array
@@ -54,13 +54,13 @@ class Stages(threading.local):
 
 
 def aligned(size: int, alignment: int) -> Array:
-    """Return an array of doubles whose address is a multiple of an alignment in bytes."""
+    """Return an array of ``size`` doubles, shape (size,), whose address is a multiple of ``alignment`` bytes."""
     array = np.empty(size + alignment // 8)
     skipped = -address(array) % alignment // 8
     return array[skipped : skipped + size]
 
 
 def address(array: NDArray[Any]) -> int:
-    """Return the address of an array's first entry."""
+    """Return the address in bytes of the first entry of an array of any shape."""
     found: int = array.__array_interface__["data"][0]
     return found

@@ -55,12 +55,12 @@ class Axes:
         return "".join("P" if moves else "R" for moves in self.prismatic)
 
     def direction(self, i: int) -> Array:
-        """Return the direction of axis i (from 1)."""
+        """Return the unit vector along axis i (from 1), shape (3,), world axes."""
         direction: Array = self.directions[i - 1]
         return direction
 
     def point(self, i: int) -> Array:
-        """Return a point of axis i (from 1), m."""
+        """Return a point of axis i (from 1), shape (3,), m, in the world."""
         point: Array = self.points[i - 1]
         return point
 
@@ -81,7 +81,7 @@ class Axes:
         return float(np.linalg.norm(np.cross(self.direction(i), point - self.point(i))))
 
     def on(self, i: int, point: Array) -> bool:
-        """Return whether axis i passes through a point."""
+        """Return whether axis i passes through a point, shape (3,), m."""
         return self.distance(i, point) <= self.tolerance * self.scale
 
     def snapped(self, length: float) -> float:
@@ -101,7 +101,7 @@ class Axes:
 
 
 def inverse_pose(T: Array) -> Array:
-    """Return the inverse of a rigid transform, shape (4, 4), by its transposed rotation."""
+    """Return the inverse of a rigid transform T (4, 4), m, by its transposed rotation, shape (4, 4)."""
     inverse = np.eye(4)
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]

@@ -64,7 +64,7 @@ def are_poses(T: Array) -> NDArray[np.bool_]:
 
 
 def orthonormal(T: Array) -> Array:
-    """Return poses (..., 4, 4) with orthonormal rotations, from poses whose rotations are orthonormal to 1e-6.
+    """Return poses (..., 4, 4), m, with orthonormal rotations, from poses T whose rotations are orthonormal to 1e-6.
 
     Each iteration R (3 - R^T R) / 2 squares the defect (Björck and Bowie 1971).
     """
@@ -77,7 +77,7 @@ def orthonormal(T: Array) -> Array:
 
 
 def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
-    """Return joint positions (..., n) with the angles of marked joints, shape (n,), reduced to (-pi, pi]."""
+    """Return joint values q (..., n), rad and m, with angles of the marked joints (n,) reduced to (-pi, pi]."""
     inside = (q > -np.pi) & (q <= np.pi)
     wound: Array = np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
     return wound

@@ -48,7 +48,7 @@ class Newton:
 
     @property
     def endless(self) -> NDArray[np.bool_]:
-        """Whether a joint need not stop at a limit because a whole turn leads back inside, shape (n,)."""
+        """Whether a joint's range is at least 2 pi rad, so that it never stops at a limit, shape (n,)."""
         endless: NDArray[np.bool_] = ~self.description.numbers.prismatic & (self.upper - self.lower >= math.tau)
         return endless
 
@@ -59,12 +59,12 @@ class Newton:
         return (lower + upper) / 2
 
     def ranges(self, room: Array | float) -> tuple[Array, Array]:
-        """Return the limits, shape (n,) each; without limits a joint goes as far as ``room`` to both sides."""
+        """Return the limits, shape (n,) each, rad and m; -``room`` and ``room`` for joints without limits."""
         limited = np.isfinite(self.upper - self.lower)
         return np.where(limited, self.lower, -np.asarray(room)), np.where(limited, self.upper, room)
 
     def inside(self, q: Array) -> Array:
-        """Return joint values (..., n) moved into the limits: by whole turns, or else to the nearest limit."""
+        """Return joint values q (..., n), rad and m, moved into the limits by whole turns or to the nearest limit."""
         outside = (q < self.lower) | (q > self.upper)
         turns = np.where(self.description.numbers.prismatic, 0.0, math.tau * np.rint((q - self.middle) / math.tau))
         return np.clip(np.where(outside, q - turns, q), self.lower, self.upper)

@@ -55,7 +55,7 @@ class AngleFactor:
         return f"{name} = {first} ({at_zero}) or {second} ({at_pi})"
 
     def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Return joint positions (k, n) with this joint moved to a zero of the factor, inside limits if possible."""
+        """Return joint values q (k, n), rad and m, with this joint at a zero of the factor, inside limits if it can."""
         low, high = lower[self.joint], upper[self.joint]
         values = _wind_into_limits(np.array(self.values), low, high)
         inside = values[(values >= low) & (values <= high)]
@@ -94,7 +94,7 @@ class SlideFactor:
         return f"q{self.joint + 1} = {self.values[0]:.6g} m: {point} is {near}"
 
     def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Return joint positions (k, n) with this joint moved to where the factor vanishes."""
+        """Return joint values q (k, n), rad and m, with this joint moved to the zero of the factor."""
         moved = q.copy()
         moved[:, self.joint] = self.values[0]
         return moved
@@ -181,7 +181,7 @@ class ShoulderFactor:
         return text.removeprefix(" + ") + " = 0"
 
     def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
-        """Return joint positions (k, n) with joint 2 moved to where x = 0, inside its limits if possible, else NaN."""
+        """Return joint values q (k, n), rad and m, with joint 2 moved to x = 0, inside limits if possible; else NaN."""
         arm = self._arm(q)
         length = np.abs(arm)
         with np.errstate(invalid="ignore", divide="ignore"):

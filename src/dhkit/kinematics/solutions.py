@@ -83,12 +83,12 @@ class IKSolutions:
 
     @property
     def prismatic(self) -> NDArray[np.bool_]:
-        """Which joints slide, shape (n,)."""
+        """Whether each joint is prismatic, shape (n,)."""
         return self.description.numbers.prismatic
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """The names of the poses' status, shape (...): ok, singular, out_of_reach or not_a_pose."""
+        """Names of the status of the poses, without unit, shape (...): ok, singular, out_of_reach or not_a_pose."""
         names: NDArray[np.str_] = np.array([status.name for status in IKStatus])[self.status_code]
         return names
 
@@ -144,13 +144,13 @@ class IKSolutions:
         return self._closest(self.wound(self.q, near[..., None, :], limits=False), near, self.valid)
 
     def within_limits(self, near: ArrayLike | None = None) -> Array:
-        """Return all branches inside the joint limits, shape (..., B, n), the others NaN.
+        """Return all branches inside the joint limits, shape (..., B, n), rad and m, the others NaN.
 
         Parameters
         ----------
         near
-            Joint values, shape (n,) or (..., n): each angle gets the whole turns that bring it nearest to its entry,
-            as far as the limits allow. Without it, nearest to the middle of the limits, or to 0 where there are none.
+            Joint values, shape (n,) or (..., n), rad and m: each angle gets the whole turns that bring it nearest to
+            its entry, as far as the limits allow. Unless given, the middle of the limits, or 0 without limits.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class IKSolutions:
         return np.where(self.allowed[..., None], self.wound(self.q, at, limits=True), np.nan)
 
     def wound(self, q: Array, near: Array, *, limits: bool) -> Array:
-        """Return joint values (..., n) with the whole turns added that bring each angle nearest to ``near``.
+        """Return joint values (..., n), rad and m, with whole turns added to bring each angle nearest to ``near``.
 
         With limits, as near as they allow; angles that no winding brings inside them stay outside.
         """
@@ -174,7 +174,7 @@ class IKSolutions:
         return q + math.tau * np.where(self.prismatic | ~np.isfinite(turns), 0.0, turns)
 
     def windings(self, branch: str) -> list[Array]:
-        """Return every joint vector inside the limits that puts one pose's branch there, whole turns added.
+        """Return all joint values (n,), rad and m, inside the limits that are one pose's branch plus whole turns.
 
         Joints without limits stay as they are.
 
@@ -190,7 +190,7 @@ class IKSolutions:
         return [np.array(choice) for choice in product(*choices)]
 
     def require(self, near: ArrayLike | None = None) -> Array:
-        """Return one solution inside the limits for each pose, shape (..., n), the nearest to ``near``.
+        """Return one solution inside the limits for each pose, shape (..., n), rad and m, the nearest to ``near``.
 
         Raises
         ------

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
@@ -17,26 +17,33 @@ from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.display import counted, html_block, html_table, plain, repr_line, value_line
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.kinematics import classify
-from dhkit.lab.assignment_form import AssignmentForm, GoalForm, PoseForm, StepForm, validated
+from dhkit.lab.assignment_form import GoalForm, PoseForm, ToleranceForm, validated
 from dhkit.trajectories import Trajectory
 
 MAX_BYTES = 100_000
-MAX_BYTES_OF_ROBOT = 1_000_000
-"""Of a robot file: what is longer is neither."""
+MAX_ROBOT_BYTES = 1_000_000
+"""Largest size of a file that is looked at to tell an assignment from a robot file."""
 ROUNDING = 1e-9
-"""Of joint limits (rad, m), durations (s) and shares of points."""
+"""Rounding that joint limits (rad, m), durations (s) and shares of points may be exceeded by."""
 
 
-@dataclass(frozen=True, eq=False)
-class ToolAt:
+class Condition:
+    """What a goal asks for; its subclasses are the kinds of conditions."""
+
+    def __repr__(self) -> str:
+        return value_line(self)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ToolAt(Condition):
     """The tool at a pose.
 
     Attributes
     ----------
     T
-        The pose in the world, shape (4, 4).
+        The pose, shape (4, 4), m, world.
     turned
-        Whether its rotation counts; otherwise the position alone.
+        Whether the rotation counts; otherwise only the position does.
     position, angle
         Largest distance, m, and largest angle between the two rotations, rad.
     """
@@ -46,74 +53,98 @@ class ToolAt:
     position: float
     angle: float
 
-    def met(self, T: Array) -> bool:
-        """Return whether a pose of the tool, shape (4, 4), is near enough."""
+    def is_reached(self, T: Array) -> bool:
+        """Return whether a pose of the tool, shape (4, 4), m, world, is near enough."""
         if np.linalg.norm(T[:3, 3] - self.T[:3, 3]) > self.position:
             return False
         # The Frobenius norm of the difference of two rotations is 2 sqrt(2) times the sine of half the angle between.
         chord = float(np.linalg.norm(T[:3, :3] - self.T[:3, :3])) / np.sqrt(8.0)
         return not self.turned or bool(2 * np.arcsin(min(1.0, chord)) <= self.angle)
 
-    def __repr__(self) -> str:
-        return value_line(self)
 
+@dataclass(frozen=True, eq=False, repr=False)
+class JointsAt(Condition):
+    """Joint values.
 
-@dataclass(frozen=True, eq=False)
-class JointsAt:
-    """Joint values, shape (n,), each within ``joint``, rad or m."""
+    Attributes
+    ----------
+    q
+        The joint values, shape (n,), rad and m.
+    joint
+        Largest difference of each joint value, rad or m.
+    """
 
     q: Array
     joint: float
 
-    def met(self, q: Array) -> bool:
-        """Return whether joint values, shape (n,), are near enough; whole turns count."""
+    def is_reached(self, q: Array) -> bool:
+        """Return whether joint values, shape (n,), rad and m, are near enough; whole turns count."""
         return bool(np.abs(q - self.q).max() <= self.joint)
 
-    def __repr__(self) -> str:
-        return value_line(self)
 
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionBetween(Condition):
+    """A motion between joint values, within the arm's limits.
 
-@dataclass(frozen=True, eq=False)
-class MotionBetween:
-    """A motion from joint values to others, shape (n,) each, within ``joint``, rad or m, and the arm's limits."""
+    Attributes
+    ----------
+    begin, end
+        Joint values at the beginning and the end, shape (n,), rad and m.
+    joint
+        Largest difference of each joint value there, rad or m.
+    duration
+        Longest duration, s.
+    """
 
     begin: Array
     end: Array
     joint: float
     duration: float
-    """s at most."""
 
-    def met(self, motion: Trajectory, excess: str | None) -> bool:
-        """Return whether a motion is one; ``excess`` is the limit that it exceeds."""
+    def is_reached(self, motion: Trajectory, excess: str | None) -> bool:
+        """Return whether a motion is as asked for; ``excess`` names the limit that it exceeds, None if it keeps all."""
         if excess is not None or motion.duration > self.duration + ROUNDING:
             return False
         ends = motion.q(np.array([0.0, motion.duration]))
         return bool(np.abs(ends - np.stack([self.begin, self.end])).max() <= self.joint)
 
-    def __repr__(self) -> str:
-        return value_line(self)
 
+@dataclass(frozen=True, repr=False)
+class OwnScore(Condition):
+    """A score of a function of the person's own program.
 
-@dataclass(frozen=True)
-class OwnScore:
-    """A share, from 0 to 1, of the points of a function of the person's own program."""
+    Attributes
+    ----------
+    function
+        The function.
+    share
+        Smallest share of the function's points, from 0 to 1.
+    """
 
     function: Literal["fk", "ik", "controller"]
     share: float
 
-    def met(self, report: Mapping[str, Any]) -> bool:
-        """Return whether a report, as :meth:`dhkit.programs.CheckReport.to_dict` has it, says so."""
-        parts = report.get("functions", {}).get(self.function, ())
-        most = sum(part["most"] for part in parts)
-        return bool(most > 0 and sum(part["points"] for part in parts) >= (self.share - ROUNDING) * most)
-
-
-Condition: TypeAlias = ToolAt | JointsAt | MotionBetween | OwnScore
+    def is_reached(self, report: Mapping[str, object]) -> bool:
+        """Return whether a report, as :meth:`dhkit.programs.CheckReport.to_dict` has it, has enough points."""
+        functions = report.get("functions", {})
+        parts = functions.get(self.function, ()) if isinstance(functions, Mapping) else ()
+        max_points = sum(part["most"] for part in parts)
+        return bool(max_points > 0 and sum(part["points"] for part in parts) >= (self.share - ROUNDING) * max_points)
 
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What is to be reached, in words, and as a condition that is checked."""
+    """What is to be reached.
+
+    Attributes
+    ----------
+    text
+        The goal in words.
+    points
+        What the goal is worth.
+    condition
+        The goal as a condition that is checked.
+    """
 
     text: str
     points: float
@@ -125,7 +156,17 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A step: a title, a text of paragraphs between empty lines, a panel to open, and goals."""
+    """A step of an assignment.
+
+    Attributes
+    ----------
+    title, text
+        Its title, and paragraphs between empty lines.
+    panel
+        Name of the panel to open; None for none.
+    goals
+        Its goals, in their order.
+    """
 
     title: str
     text: str
@@ -138,20 +179,20 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A robot, where it begins, and steps with goals.
+    """A robot, the joint values where it begins, and steps with goals.
 
     Attributes
     ----------
     title
-        In one line.
+        Title, one line.
     arm
         The robot.
     start
-        Joint values, shape (n,), rad and m; None for those that the lab shows anyway.
+        Joint values at the beginning, shape (n,), rad and m; None for those that the lab shows by default.
     panels
-        Names of the panels that are shown beside the task's; None for all.
+        Names of the panels that are shown beside that of the task; None for all.
     steps
-        In their order.
+        The steps, in their order.
 
     Examples
     --------
@@ -180,7 +221,7 @@ class Assignment:
 
     @property
     def points(self) -> float:
-        """What all goals are worth together."""
+        """The points of all goals together."""
         return sum(goal.points for step in self.steps for goal in step.goals)
 
     @classmethod
@@ -190,8 +231,9 @@ class Assignment:
         Raises
         ------
         DescriptionError
-            No such file, one over 100 kB, no TOML, an unknown key, a value that does not fit, or a goal that the robot
-            cannot reach: names the file, the key, what was found and what was expected.
+            There is no such file, it is over 100 kB or no TOML, or it has an unknown key, a value that does not fit or
+            a goal that the robot cannot reach. The message names the file, the key, what was found and what was
+            expected.
         """
         path = Path(path)
         content = read_bounded(path, MAX_BYTES, "an assignment")
@@ -199,10 +241,19 @@ class Assignment:
             form = validated(plain_numbers(toml_document(content.decode())))
             arm = _arm_of(form.robot, path.parent)
             start = None if form.start is None else _joint_values(arm, form.start, "start: ")
-            steps = tuple(_step(arm, step, form, f"step {k}: ") for k, step in enumerate(form.step, start=1))
+            steps = []
+            for k, step in enumerate(form.step, start=1):
+                place = f"step {k}: "
+                if form.panels is not None and step.panel not in (None, *form.panels):
+                    raise DescriptionError(f"{place}panel: found {step.panel!r}; expected one that panels lists")
+                goals = tuple(
+                    Goal(goal.text, goal.points, _condition(arm, goal, f"{place}goal {i}: "))
+                    for i, goal in enumerate(step.goal, start=1)
+                )
+                steps.append(Step(step.title, step.text or "", step.panel, goals))
         except (DescriptionError, UnicodeDecodeError) as error:
             raise DescriptionError(f"{path}: {error}") from None
-        return cls(form.title, arm, start, form.panels, steps)
+        return cls(form.title, arm, start, form.panels, tuple(steps))
 
     def require(self, arm: Arm) -> None:
         """Refuse another robot than the assignment's.
@@ -210,14 +261,14 @@ class Assignment:
         Raises
         ------
         DescriptionError
-            It is another one.
+            The robot is another one.
         """
         if arm.description.digest != self.arm.description.digest:
             raise DescriptionError(f"found {arm.name}; expected {self.arm.name} as the assignment has it")
 
     def __repr__(self) -> str:
-        said = f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
-        return repr_line(f"Assignment {plain(self.title, 60)}", said=said)
+        content = f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
+        return repr_line(f"Assignment {plain(self.title, 60)}", said=content)
 
     def _repr_html_(self) -> str:
         rows = [(step.title, f"{goal.points:g}", goal.text) for step in self.steps for goal in step.goals]
@@ -225,17 +276,17 @@ class Assignment:
 
 
 def is_assignment(path: str | Path) -> bool:
-    """Return whether a file is TOML that says ``kind = "assignment"``; what else it says is not looked at.
+    """Return whether a file is TOML with ``kind = "assignment"``; its other contents do not count.
 
     Raises
     ------
     DescriptionError
-        It says a kind that nearly is this one.
+        The kind is a misspelling of this one.
     """
     if Path(path).suffix.lower() != ".toml":
         return False
     try:
-        document = toml_document(read_bounded(Path(path), MAX_BYTES_OF_ROBOT).decode())
+        document = toml_document(read_bounded(Path(path), MAX_ROBOT_BYTES).decode())
     except (DhkitError, UnicodeDecodeError):
         return False
     kind = document.get("kind")
@@ -246,62 +297,50 @@ def is_assignment(path: str | Path) -> bool:
 
 def _arm_of(name: str, folder: Path) -> Arm:
     """Return a robot of the library, or of a file in an assignment's own folder."""
-    if not name.endswith(".toml"):
-        try:
-            return Arm(library_robot(name))
-        except DescriptionError as error:
-            raise DescriptionError(f"robot: {error}") from None
+    try:
+        return Arm(read_robot(_robot_path(name, folder)) if name.endswith(".toml") else library_robot(name))
+    except DescriptionError as error:
+        raise DescriptionError(f"robot: {error}") from None
+
+
+def _robot_path(name: str, folder: Path) -> Path:
     expected = "expected a library name, or a robot file beside the assignment"
     inside = folder.resolve()
     try:
         path = (inside / name).resolve()
     except (ValueError, OSError, RuntimeError):  # a NUL in the name, one too long, a link to itself
-        raise DescriptionError(f"robot: {name[:60]!r} is no file name; {expected}") from None
+        raise DescriptionError(f"{name[:60]!r} is no file name; {expected}") from None
     if not name.isprintable() or not path.is_relative_to(inside):
-        raise DescriptionError(f"robot: {name[:60]!r} leaves the assignment's folder; {expected}")
-    try:
-        return Arm(read_robot(path))
-    except DescriptionError as error:
-        raise DescriptionError(f"robot: {error}") from None
-
-
-def _step(arm: Arm, form: StepForm, assignment: AssignmentForm, place: str) -> Step:
-    if assignment.panels is not None and form.panel not in (None, *assignment.panels):
-        raise DescriptionError(f"{place}panel: found {form.panel!r}; expected one that panels lists")
-    goals = tuple(_goal(arm, goal, f"{place}goal {k}: ") for k, goal in enumerate(form.goal, start=1))
-    return Step(form.title, form.text or "", form.panel, goals)
-
-
-def _goal(arm: Arm, form: GoalForm, place: str) -> Goal:
-    return Goal(form.text, form.points, _condition(arm, form, place))
+        raise DescriptionError(f"{name[:60]!r} leaves the assignment's folder; {expected}")
+    return path
 
 
 def _condition(arm: Arm, form: GoalForm, place: str) -> Condition:
-    within = form.tolerance
+    tolerance = form.tolerance
     if form.pose is not None:
-        return _tool_at(arm, form.pose, within.position, within.angle, f"{place}pose: ")
+        return _tool_at(arm, form.pose, tolerance, f"{place}pose: ")
     if form.joints is not None:
-        return JointsAt(_joint_values(arm, form.joints, f"{place}joints: "), within.joint)
+        return JointsAt(_joint_values(arm, form.joints, f"{place}joints: "), tolerance.joint)
     if form.motion is not None:
         begin = _joint_values(arm, form.motion.begin, f"{place}motion.from: ")
         end = _joint_values(arm, form.motion.end, f"{place}motion.to: ")
-        if np.abs(begin - end).max() <= within.joint:
+        if np.abs(begin - end).max() <= tolerance.joint:
             raise DescriptionError(f"{place}motion: it ends where it begins; expected two configurations")
-        longest = np.inf if form.motion.duration is None else form.motion.duration
-        return MotionBetween(begin, end, within.joint, longest)
+        max_duration = np.inf if form.motion.duration is None else form.motion.duration
+        return MotionBetween(begin, end, tolerance.joint, max_duration)
     own = form.own
     assert own is not None  # noqa: S101 - for mypy: the form has exactly one
     return OwnScore(own.function, own.share)
 
 
 def _joint_values(arm: Arm, given: str | tuple[float, ...], place: str) -> Array:
-    """Return joint values, shape (n,), that are inside the limits."""
+    """Return the joint values, shape (n,), rad and m, of a configuration or a list, if they are inside the limits."""
     if isinstance(given, str):
-        known = {"zero": np.zeros(arm.n), **arm.configurations}
-        if given not in known:
+        configurations = {"zero": np.zeros(arm.n), **arm.configurations}
+        if given not in configurations:
             found = f"{arm.name} has no configuration {given[:40]!r}"
-            raise DescriptionError(f"{place}{found}; expected {', '.join(known)}, or a list of joint values")
-        q = np.array(known[given])
+            raise DescriptionError(f"{place}{found}; expected {', '.join(configurations)}, or a list of joint values")
+        q = np.array(configurations[given])
     elif len(given) != arm.n:
         raise DescriptionError(f"{place}found {len(given)} joint values; expected {arm.n} for {arm.name}")
     else:
@@ -313,21 +352,22 @@ def _joint_values(arm: Arm, given: str | tuple[float, ...], place: str) -> Array
     return q
 
 
-def _tool_at(arm: Arm, form: PoseForm, position: float, angle: float, place: str) -> ToolAt:
+def _tool_at(arm: Arm, form: PoseForm, tolerance: ToleranceForm, place: str) -> ToolAt:
     T = pose(form.xyz, euler=form.euler, order=form.order)
-    description = arm.description
-    numbers = description.numbers
-    away = float(np.linalg.norm(T[:3, 3] - numbers.T_world_base[:3, 3]))
+    numbers = arm.description.numbers
+    distance = float(np.linalg.norm(T[:3, 3] - numbers.T_world_base[:3, 3]))
     reach = numbers.reach + float(np.linalg.norm(numbers.T_last_tool[:3, 3]))
-    if away > reach + position:
-        raise DescriptionError(f"{place}{away:.4g} m from the base; expected at most {reach:.4g} m, the arm's reach")
-    fit = classify(description).fit
-    # With a rotation the pose must be met; without one, the position of an arm that has no other choice.
-    decided = fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.met) <= {"x", "y", "z"})
-    if decided:
-        found = arm.ik(T)
-        near = 0 < float(found.distance) <= position  # beyond the workspace by less than the tolerance
-        if not near and not bool(np.any(found.valid & found.allowed)):
-            beyond = "in reach only outside the joint limits" if np.any(found.valid) else "out of reach"
-            raise DescriptionError(f"{place}{beyond}; expected a pose that the arm can take")
-    return ToolAt(T, form.euler is not None, position, angle)
+    if distance > reach + tolerance.position:
+        raise DescriptionError(
+            f"{place}{distance:.4g} m from the base; expected at most {reach:.4g} m, the arm's reach"
+        )
+    fit = classify(arm.description).fit
+    # With a rotation, the closed form of six joints decides whether the pose is reached; without one, the closed form
+    # of an arm whose solutions meet the position alone.
+    if fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.met) <= {"x", "y", "z"}):
+        solutions = arm.ik(T)
+        is_near = 0 < float(solutions.distance) <= tolerance.position  # beyond the workspace by less than the tolerance
+        if not is_near and not bool(np.any(solutions.valid & solutions.allowed)):
+            problem = "in reach only outside the joint limits" if np.any(solutions.valid) else "out of reach"
+            raise DescriptionError(f"{place}{problem}; expected a pose that the arm can take")
+    return ToolAt(T, form.euler is not None, tolerance.position, tolerance.angle)

@@ -27,31 +27,35 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from dhkit.description.schema import titled_schema
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
-from dhkit.lab.tool_panel import ORDERS
+from dhkit.lab.tool_panel import EULER_ORDERS
 
 CONDITIONS = ("pose", "joints", "motion", "own")
-MOST_STEPS, MOST_GOALS, MOST_JOINTS = 20, 20, 32
-LONGEST_TEXT, LONGEST_LINE, LONGEST_EXPRESSION = 4_000, 200, 200
-"""Characters of a step's text; of a title, a goal's text and a name; of a number that is an expression."""
-LARGEST = 1e4
-"""rad or m of a number."""
-PANEL = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
-STEERING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that turn the direction of the text behind them, and so what a reader sees."""
+MAX_STEPS, MAX_GOALS, MAX_JOINTS = 20, 20, 32
+MAX_TEXT_LENGTH = 4_000
+"""Longest text of a step, characters."""
+MAX_LINE_LENGTH = 200
+"""Longest title, text of a goal and name, characters."""
+MAX_EXPRESSION_LENGTH = 200
+"""Longest number that is written as an expression, characters."""
+MAX_NUMBER = 1e4
+"""Largest number, rad or m."""
+PANEL_ENTRY = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
+DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that change the direction of the text behind them, and so what a reader sees."""
 
 
 @cache
 def panel_names() -> tuple[str, ...]:
     """Return the names of the lab's panels that an assignment may show, as the page lists them."""
     script = (resources.files("dhkit.viewer") / "static" / "lab" / "panels.js").read_text("utf-8")
-    return tuple(name for name in PANEL.findall(script) if name != "task")
+    return tuple(name for name in PANEL_ENTRY.findall(script) if name != "task")
 
 
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise PydanticCustomError("expected", "a number, or an expression in quotes")
-    if isinstance(value, str) and len(value) > LONGEST_EXPRESSION:
-        raise PydanticCustomError("expected", f"an expression of at most {LONGEST_EXPRESSION} characters")
+    if isinstance(value, str) and len(value) > MAX_EXPRESSION_LENGTH:
+        raise PydanticCustomError("expected", f"an expression of at most {MAX_EXPRESSION_LENGTH} characters")
     try:
         number = float(parse(value)) if isinstance(value, str) else float(value)
     except ExpressionError as error:
@@ -59,22 +63,22 @@ def _number(value: object) -> float:
         raise PydanticCustomError("expected", "an expression such as pi/2 ({reason})", {"reason": reason}) from None
     except OverflowError:
         number = float("inf")
-    if not abs(number) <= LARGEST:
-        raise PydanticCustomError("expected", f"a finite number of at most {LARGEST:g}")
+    if not abs(number) <= MAX_NUMBER:
+        raise PydanticCustomError("expected", f"a finite number of at most {MAX_NUMBER:g}")
     return number
 
 
 def _joint_values(value: object) -> str | tuple[float, ...]:
-    if isinstance(value, str) and 0 < len(value) <= LONGEST_LINE:
+    if isinstance(value, str) and 0 < len(value) <= MAX_LINE_LENGTH:
         return value
-    if not isinstance(value, list) or len(value) > MOST_JOINTS:
+    if not isinstance(value, list) or len(value) > MAX_JOINTS:
         raise PydanticCustomError("expected", "a configuration's name, or a list of joint values")
     return tuple(map(_number, value))
 
 
 def _readable(text: str) -> str:
     for letter in text:
-        if letter in STEERING or (unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t"):
+        if letter in DIRECTION_CONTROLS or (unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t"):
             raise PydanticCustomError("text", f"found the control character U+{ord(letter):04X}; expected plain text")
     if not text.strip():
         raise PydanticCustomError("text", "found an empty text; expected words")
@@ -94,25 +98,25 @@ def _panel(name: str) -> str:
 
 
 def _order(name: str) -> str:
-    if name not in ORDERS:
-        raise PydanticCustomError("expected", f"one of {', '.join(ORDERS)}")
+    if name not in EULER_ORDERS:
+        raise PydanticCustomError("expected", f"one of {', '.join(EULER_ORDERS)}")
     return name
 
 
 STRICT = ConfigDict(extra="forbid")
 NUMBER = {"type": ["number", "string"], "description": "a number, or an expression such as pi/2"}
-NAME = {"type": "string", "minLength": 1, "maxLength": LONGEST_LINE}
+NAME = {"type": "string", "minLength": 1, "maxLength": MAX_LINE_LENGTH}
 Number = Annotated[float, PlainValidator(_number), WithJsonSchema(NUMBER)]
 Triple = Annotated[tuple[Number, ...], Field(min_length=3, max_length=3)]
 JointValues: TypeAlias = Annotated[
     str | tuple[float, ...],
     PlainValidator(_joint_values),
-    WithJsonSchema({"anyOf": [NAME, {"type": "array", "items": NUMBER, "maxItems": MOST_JOINTS}]}),
+    WithJsonSchema({"anyOf": [NAME, {"type": "array", "items": NUMBER, "maxItems": MAX_JOINTS}]}),
 ]
-Line = Annotated[str, Field(max_length=LONGEST_LINE), AfterValidator(_readable), AfterValidator(_in_one_line)]
-Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_readable)]
+Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), AfterValidator(_readable), AfterValidator(_in_one_line)]
+Text = Annotated[str, Field(max_length=MAX_TEXT_LENGTH), AfterValidator(_readable)]
 Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=[*panel_names()]))]
-Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*ORDERS]))]
+Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*EULER_ORDERS]))]
 Points = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
 Within = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(strict=True, gt=0, le=600, allow_inf_nan=False)]
@@ -129,7 +133,7 @@ class PoseForm:
 
 @dataclass(frozen=True, config=STRICT)
 class ToleranceForm:
-    """How near is near enough: position, m; angle between two rotations, rad; joint values, rad or m."""
+    """Largest differences: position, m; angle between two rotations, rad; joint values, rad or m."""
 
     position: Within = 0.005
     angle: Within = 0.02
@@ -147,7 +151,7 @@ class MotionForm:
 
 @dataclass(frozen=True, config=STRICT)
 class OwnForm:
-    """A share of the points of a function of the person's own program."""
+    """A function of the person's own program, and the smallest share of its points."""
 
     function: Literal["fk", "ik", "controller"]
     share: Within = 1.0
@@ -185,7 +189,7 @@ class StepForm:
     title: Line
     text: Text | None = None
     panel: Panel | None = None
-    goal: Annotated[tuple[GoalForm, ...], Field(max_length=MOST_GOALS)] = ()
+    goal: Annotated[tuple[GoalForm, ...], Field(max_length=MAX_GOALS)] = ()
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -195,8 +199,8 @@ class AssignmentForm:
     kind: Literal["assignment"]
     format: Literal[1]
     title: Line
-    robot: Annotated[str, Field(min_length=1, max_length=LONGEST_LINE)]
-    step: Annotated[tuple[StepForm, ...], Field(min_length=1, max_length=MOST_STEPS)]
+    robot: Annotated[str, Field(min_length=1, max_length=MAX_LINE_LENGTH)]
+    step: Annotated[tuple[StepForm, ...], Field(min_length=1, max_length=MAX_STEPS)]
     start: JointValues | None = None
     panels: Annotated[tuple[Panel, ...], Field(min_length=1, max_length=40)] | None = None
 
@@ -209,7 +213,7 @@ FORMS: dict[str, type] = {
     "motion": MotionForm,
     "own": OwnForm,
 }
-"""By the key that a table stands behind."""
+"""The forms of tables inside the file, by the keys of the tables."""
 
 
 def assignment_schema() -> dict[str, Any]:
@@ -223,7 +227,7 @@ def validated(document: Mapping[str, Any]) -> AssignmentForm:
     Raises
     ------
     DescriptionError
-        The first thing wrong: where, what was found, what was expected.
+        The message names the first error: its place, what was found and what was expected.
     """
     try:
         return TypeAdapter(AssignmentForm).validate_python(dict(document))

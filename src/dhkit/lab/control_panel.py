@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,71 +13,89 @@ from dhkit.arm import Arm
 from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Sine, make_controller
 from dhkit.description import Array
 from dhkit.errors import DhkitError
-from dhkit.lab.desk import Desk, file_content
-from dhkit.lab.fields import Fields
-from dhkit.lab.live import Live, Wanted
+from dhkit.lab.desk import Desk, file_content, has_bodies
+from dhkit.lab.live import Live
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
-from dhkit.lab.references import back_and_forth, gentle_sine
-from dhkit.lab.run_settings import OWN, PARTS, TITLES, Settings
-from dhkit.viewer.streams import Samples
+from dhkit.lab.requests import Fields, JsonObject, Panel, answers
+from dhkit.lab.run_settings import (
+    CONTROLLER_TITLES,
+    OWN,
+    SETTING_NAMES,
+    ReferenceKind,
+    Setpoints,
+    Settings,
+    back_and_forth,
+    gentle_sine,
+)
+from dhkit.viewer.protocol import Samples
 
 log = logging.getLogger(__name__)
 
-RATE = 1000.0
-"""Hz of the controller."""
-FRAMES = 60.0
-"""Pictures a second."""
-BEHIND = 5
-"""Frames that a slow machine is behind before time is let go."""
-REBUILT = ("controller", "bandwidth", "damping", "compensate")
+CONTROL_RATE = 1000.0
+"""Calls of the controller per second, Hz."""
+FRAME_RATE = 60.0
+"""Pictures per second, Hz."""
+MAX_FRAMES_BEHIND = 5
+"""Frames that the simulation may be behind on a slow machine; with more, it runs slower than real time."""
+PUBLISH_PERIOD = 0.25
+"""Time between two states of the panel while a simulation runs, s."""
+CONTROLLER_SETTINGS = ("controller", "bandwidth", "damping", "compensate")
 """Settings of which the controller is made."""
-MOST_FORCE, LONGEST_PUSH = 1e4, 10.0
-GHOST = (0.55, 0.6, 0.68)
-"""Red, green and blue of the reference."""
+MAX_PUSH_FORCE = 1e4
+"""Largest component of a push, N."""
+MAX_PUSH_DURATION = 10.0
+"""Longest duration of a push, s."""
+GHOST_COLOR = (0.55, 0.6, 0.68)
+"""Red, green and blue of the reference's ghost, from 0 to 1."""
 
 
-class ControlPanel:
-    """Requests ``control.…``, ``bodies.assume`` and ``arm.planar``; the run has a thread of its own."""
+class ControlPanel(Panel):
+    """Requests ``control.…``, ``bodies.assume`` and ``arm.planar``; a run has a thread of its own."""
 
     def __init__(self, desk: Desk, motions: MotionPanel, own: OwnPanel) -> None:
-        self.desk, self.motions, self.own = desk, motions, own
+        super().__init__(desk)
+        self.motions, self.own = motions, own
         self.settings = Settings()
         self.planar = False
+        """Whether only joints 2 and 3 are free."""
+        self.free: list[int] = []
+        """The joints that a run moves, from 0."""
+        self.sine: Sine | None = None
+        """The sine that the last run with one follows."""
         self._lock = threading.RLock()
         self._live: Live | None = None
-        self._free: list[int] = []
-        self._base: Array = np.zeros(0)
+        self._start_q: Array = np.zeros(0)
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._paused = False
         self._speed = 1.0
         self._error: str | None = None
-        desk.changed.append(self._forget)
+        desk.on_replace.append(self._forget_run)
         desk.steer = self._steer
-        motions.changed.append(self._motion_changed)
-        own.changed.append(self.publish)
-        self.sine: Sine | None = None
-        """What a run that follows a sine follows."""
+        motions.on_change.append(self._follow_changed_motion)
+        own.on_change.append(self.publish)
 
-    def start(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("control.start", *SETTING_NAMES)
+    def start(self, fields: Fields) -> None:
         """Simulate from the state on show."""
-        settings = self.settings.changed("control.start", data)
+        settings = self.settings.changed(fields)
         arm = self.desk.arm
-        if not all(joint.bodies for joint in arm.description.joints):
+        if not has_bodies(arm):
             raise ValueError("control.start: the arm has no bodies; expected uniform links to be assumed first")
         self._require_reference(settings.reference)
-        self._end()
+        self._end_run()
         with self._lock:
-            before, self.settings = self.settings, settings
-            self._free = [1, 2] if self.planar else list(range(arm.n))
-            self._base = self.desk.q.copy()
+            previous, self.settings = self.settings, settings
+            self.free = [1, 2] if self.planar else list(range(arm.n))
+            self._start_q = self.desk.q.copy()
             try:
-                live = Live(self._simulated(arm), self._plant(arm), settings.model, self._base[self._free], RATE)
+                friction = settings.friction_model
+                live = Live(self._free_arm(arm), self._plant(arm), friction, self._start_q[self.free], CONTROL_RATE)
                 live.take(self._controller(live))
-                live.wanted = self._wanted(live, arm)
+                live.setpoints = self._setpoints(live, arm)
             except (DhkitError, ValueError):
-                self.settings = before
+                self.settings = previous
                 self.publish()
                 raise
             self._live = live
@@ -88,112 +105,104 @@ class ControlPanel:
         self.desk.running = True
         self._thread.start()
         self.publish()
-        return {}
 
-    def change(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Change the settings, while it runs too: what they do not concern goes on as it is."""
+    @answers("control.change", *SETTING_NAMES)
+    def change(self, fields: Fields) -> None:
+        """Change settings, also while a simulation runs: whatever they do not concern goes on as it is."""
         with self._lock:
-            before, now = self.settings, self.settings.changed("control.change", data)
+            previous, settings = self.settings, self.settings.changed(fields)
             live = self._live if self.desk.running else None
             if live is not None:
                 try:
-                    if "reference" in data:
-                        self._require_reference(now.reference)
-                    self.settings = now
+                    if "reference" in fields.data:
+                        self._require_reference(settings.reference)
+                    self.settings = settings
                     controller = None
-                    if any(getattr(now, name) != getattr(before, name) for name in REBUILT):
+                    if any(getattr(settings, name) != getattr(previous, name) for name in CONTROLLER_SETTINGS):
                         controller = self._controller(live)
-                    if (now.payload, now.friction) != (before.payload, before.friction):
-                        live.change(self._plant(self.desk.arm), now.model)
+                    if (settings.payload, settings.friction) != (previous.payload, previous.friction):
+                        live.change(self._plant(self.desk.arm), settings.friction_model)
                 except (DhkitError, ValueError):
-                    self.settings = before
+                    self.settings = previous
                     raise
                 if controller is not None:
                     live.take(controller)
-                if "reference" in data:
-                    live.wanted = self._wanted(live, self.desk.arm)
-            self.settings = now
+                if "reference" in fields.data:
+                    live.setpoints = self._setpoints(live, self.desk.arm)
+            self.settings = settings
         self.publish()
-        return {}
 
-    def pause(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Hold the time, or let it go on."""
-        Fields("control.pause", data, [])
+    @answers("control.pause")
+    def pause(self, _: Fields) -> None:
+        """Stop the simulated time, or let it go on."""
         if not self.desk.running:
             raise ValueError("control.pause: nothing runs")
         self._paused = not self._paused
         self.publish()
-        return {}
 
-    def stop(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("control.stop")
+    def stop(self, _: Fields) -> None:
         """End the run; its samples stay."""
-        Fields("control.stop", data, [])
-        self._end()
+        self._end_run()
         self.publish()
-        return {}
 
-    def push(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("control.push", "link", "force", "duration")
+    def push(self, fields: Fields) -> None:
         """Push a link or the tool from now on."""
-        fields = Fields("control.push", data, ["link", "force", "duration"])
-        link = fields.whole("link", 1, self.desk.arm.n) if "link" in fields else None
+        link = fields.integer("link", 1, self.desk.arm.n) if "link" in fields else None
         force = fields.vector("force", 3)
-        duration = fields.number("duration", 0.0, LONGEST_PUSH, 0.2)
-        if np.abs(force).max() > MOST_FORCE:
-            raise ValueError(f"control.push: force is beyond {MOST_FORCE:g} N")
+        duration = fields.number("duration", 0.0, MAX_PUSH_DURATION, 0.2)
+        if np.abs(force).max() > MAX_PUSH_FORCE:
+            raise ValueError(f"control.push: force is beyond {MAX_PUSH_FORCE:g} N")
         with self._lock:
             if self._live is None or not self.desk.running:
                 raise ValueError("control.push: nothing runs")
             if self.planar and link is not None:
                 raise ValueError("control.push: only the tool can be pushed while joints are locked")
             self._live.push(link, force, duration)
-        return {}
 
-    def download(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("control.download", "format")
+    def download(self, fields: Fields) -> JsonObject:
         """Return the run so far as a file."""
-        kind = Fields("control.download", data, ["format"]).choice("format", ("csv", "npz"))
+        kind = fields.choice("format", ("csv", "npz"))
         with self._lock:
             if self._live is None:
                 raise ValueError("control.download: nothing has been simulated yet")
             result = self._live.result()
         return {"name": f"{self.desk.arm.name}-run.{kind}", "content": file_content(result, kind)}
 
-    def assume(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("bodies.assume")
+    def assume_bodies(self, _: Fields) -> None:
         """Give an arm without bodies uniform links."""
-        Fields("bodies.assume", data, [])
-        if all(joint.bodies for joint in self.desk.arm.description.joints):
+        if has_bodies(self.desk.arm):
             raise ValueError("bodies.assume: every link has a mass; expected one without")
-        self._end()
+        self._end_run()
         self.desk.assumed_bodies = True
         self.desk.replace(self.desk.arm.with_uniform_links())
-        return {}
 
-    def lock_to_planar(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Leave only joints 2 and 3 free, or all again."""
-        on = Fields("arm.planar", data, ["on"]).flag("on")
-        kinds = self.desk.arm.description.kinds
+    @answers("arm.planar", "on")
+    def lock_to_planar(self, fields: Fields) -> None:
+        """Leave only joints 2 and 3 free, or all joints again."""
+        on, kinds = fields.flag("on"), self.desk.arm.description.kinds
         if on and (self.desk.arm.n < 4 or kinds[1:3] != "RR"):
             raise ValueError(f"arm.planar: joints are {kinds}; expected at least 4, the second and third revolute")
-        self._end()
+        self._end_run()
         self.planar = on
         self.publish()
-        return {}
 
     def publish(self) -> None:
-        """Tell the pages what runs."""
-        live, settings = self._live, self.settings
-        running = self._thread is not None
+        """Send the settings and the state of the run to the pages."""
+        live = self._live
+        names = [*CONTROLLERS, *([OWN] if self.own.has_controller else [])]
         self.desk.view.panel(
             "control",
             {
-                "running": running,
+                "running": self._thread is not None,
                 "paused": self._paused,
-                "controllers": [
-                    {"name": name, "title": TITLES.get(name, name)}
-                    for name in [*CONTROLLERS, *([OWN] if self.own.controls else [])]
-                ],
-                **{name: getattr(settings, name) for name in PARTS},
+                "controllers": [{"name": name, "title": CONTROLLER_TITLES.get(name, name)} for name in names],
+                **vars(self.settings),
                 "planar": self.planar,
-                "rate": RATE,
+                "rate": CONTROL_RATE,
                 "speed": round(self._speed, 2),
                 "time": round(live.t, 3) if live is not None else 0.0,
                 "error": self._error,
@@ -202,81 +211,75 @@ class ControlPanel:
         )
 
     @property
-    def free(self) -> list[int]:
-        """The joints that a run moves, from 0."""
-        return self._free
-
-    @property
     def locked(self) -> dict[int, float]:
         """The values of the joints that a run does not move, by joint from 0."""
-        return {i: float(x) for i, x in enumerate(self._base) if i not in self._free} if self.planar else {}
+        return {i: float(x) for i, x in enumerate(self._start_q) if i not in self.free} if self.planar else {}
 
     @property
-    def wanted(self) -> Array:
-        """The joint values that a run follows now, of the free joints."""
-        live = self._live
-        return np.zeros(len(self._free)) if live is None else live.wanted(live.t)[0]
+    def setpoint(self) -> Array:
+        """The values of the free joints that a run follows now, shape (k,), rad and m."""
+        return np.zeros(len(self.free)) if self._live is None else self._live.setpoint_q
 
     def close(self) -> None:
         """End the run."""
-        self._end()
+        self._end_run()
 
     # The run
 
     def _run(self, live: Live, stop: threading.Event) -> None:
-        begin, frame, told = time.monotonic(), 0, 0.0
+        """Simulate and show frame after frame; with more than MAX_FRAMES_BEHIND, begin to count frames anew."""
+        begin, frame, published = time.monotonic(), 0, 0.0
         columns = self._columns()
         self.desk.view.append(Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True))
         try:
             while not stop.is_set():
                 if self._paused:
-                    time.sleep(1 / FRAMES)
+                    time.sleep(1 / FRAME_RATE)
                     begin, frame = time.monotonic(), 0
                     continue
-                late = time.monotonic() - (begin + frame / FRAMES)
-                if late < 0:
-                    time.sleep(-late)
-                elif late > BEHIND / FRAMES:
-                    self._speed = 0.8 * self._speed + 0.2 * (frame / FRAMES) / max(time.monotonic() - begin, 1e-9)
+                delay = time.monotonic() - (begin + frame / FRAME_RATE)
+                if delay < 0:
+                    time.sleep(-delay)
+                elif delay > MAX_FRAMES_BEHIND / FRAME_RATE:
+                    speed = frame / FRAME_RATE / max(time.monotonic() - begin, 1e-9)
+                    self._speed = 0.8 * self._speed + 0.2 * speed
                     begin, frame = time.monotonic(), 0
-                self._frame(live)
+                self._simulate_frame(live)
                 frame += 1
-                if frame / FRAMES >= 1.0 and late <= BEHIND / FRAMES:
+                if frame / FRAME_RATE >= 1.0 and delay <= MAX_FRAMES_BEHIND / FRAME_RATE:
                     self._speed = min(1.0, 0.8 * self._speed + 0.2)
-                if time.monotonic() - told > 0.25:
-                    told = time.monotonic()
+                if time.monotonic() - published > PUBLISH_PERIOD:
+                    published = time.monotonic()
                     self.publish()
         except (DhkitError, ValueError) as error:
-            self._failed(live, stop, " ".join(str(error).split()))
+            self._report_failure(live, stop, " ".join(str(error).split()))
         except Exception as error:
             log.exception("the simulation failed")
-            self._failed(live, stop, f"{type(error).__name__}: Python's log says more")
+            self._report_failure(live, stop, f"{type(error).__name__}: Python's log says more")
 
-    def _frame(self, live: Live) -> None:
+    def _simulate_frame(self, live: Live) -> None:
         with self._lock:
-            error = tau = np.zeros(len(self._free))
-            for _ in range(round(RATE / FRAMES)):
+            error = tau = np.zeros(len(self.free))
+            for _ in range(round(CONTROL_RATE / FRAME_RATE)):
                 error, tau = live.advance()
-            q, wanted = self._full(live.q), self._full(live.wanted(live.t)[0])
-            t = live.t
+            q, reference, t = self._whole_arm(live.q), self._whole_arm(live.setpoint_q), live.t
         self.desk.show(q)
-        self.desk.view.ghosts(wanted[None], GHOST)
-        tool = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(wanted)[:3, 3])
-        row = np.array([[t, *error, *tau, tool]], dtype=np.float32)
+        self.desk.view.ghosts(reference[None], GHOST_COLOR)
+        tool_error = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(reference)[:3, 3])
+        row = np.array([[t, *error, *tau, tool_error]], dtype=np.float32)
         self.desk.view.append(Samples("control", self._columns(), row))
 
     def _columns(self) -> tuple[str, ...]:
-        """Return the names of the samples' numbers: time, errors and torques of the free joints, the tool's error."""
-        return ("t", *(f"{name}{i + 1}" for name in ("e", "tau") for i in self._free), "tool")
+        """Return the names of a sample's numbers: time, errors and torques of the free joints, the tool's error."""
+        return ("t", *(f"{name}{i + 1}" for name in ("e", "tau") for i in self.free), "tool")
 
-    def _failed(self, live: Live, stop: threading.Event, error: str) -> None:
-        if stop.is_set():
-            return  # the lab ends, and its pages with it
-        if live is self._live and not self._stop.is_set():
+    def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
+        """Publish why a run failed, unless it was ended meanwhile, and its pages with it."""
+        if not stop.is_set() and live is self._live and not self._stop.is_set():
             self._error, self._thread, self.desk.running = error, None, False
             self.publish()
 
-    def _end(self) -> None:
+    def _end_run(self) -> None:
         self._stop.set()
         self.desk.running = False
         thread = self._thread
@@ -285,45 +288,42 @@ class ControlPanel:
             self._thread = None
             self.desk.view.ghosts(None)
 
-    def _forget(self) -> None:
-        """End a run of another arm."""
-        ran = self.desk.running
-        self._end()
+    def _forget_run(self) -> None:
+        """End the run of an arm that another has replaced."""
+        was_running = self.desk.running
+        self._end_run()
         with self._lock:
             self._live, self.planar = None, False
-            self._error = "ended: the arm was edited" if ran else None
+            self._error = "ended: the arm was edited" if was_running else None
         self.publish()
 
-    def _motion_changed(self) -> None:
-        """Follow another motion from now on; hold where there is none any more."""
+    def _follow_changed_motion(self) -> None:
+        """Follow the new motion from now on; hold the setpoint where the motion was taken away."""
         with self._lock:
             live = self._live
-            if live is None or not self.desk.running or self.settings.reference != "motion":
+            if live is None or not self.desk.running or self.settings.reference is not ReferenceKind.MOTION:
                 return
             if self.motions.motion is None:
-                self.settings = replace(self.settings, reference="hold")
-            live.wanted = self._wanted(live, self.desk.arm)
+                self.settings = replace(self.settings, reference=ReferenceKind.HOLD)
+            live.setpoints = self._setpoints(live, self.desk.arm)
         self.publish()
 
-    def _full(self, q: Array) -> Array:
-        """Return the joint values of the whole arm."""
-        full = self._base.copy()
-        full[self._free] = q
-        return full
+    def _whole_arm(self, q: Array) -> Array:
+        """Return the joint values of the whole arm, shape (n,), for those of the free joints, shape (k,)."""
+        whole = self._start_q.copy()
+        whole[self.free] = q
+        return whole
 
-    def _simulated(self, arm: Arm) -> Arm:
-        """Return the arm whose joints are free."""
-        if not self.planar:
-            return arm
-        return arm.lock({i: self.locked[i] for i in self.locked})
+    def _free_arm(self, arm: Arm) -> Arm:
+        """Return the arm that has the free joints alone."""
+        return arm.lock({i: self.locked[i] for i in self.locked}) if self.planar else arm
 
     def _plant(self, arm: Arm) -> Arm:
-        simulated = self._simulated(arm)
-        return simulated.with_payload(self.settings.payload) if self.settings.payload else simulated
+        free_arm = self._free_arm(arm)
+        return free_arm.with_payload(self.settings.payload) if self.settings.payload else free_arm
 
-    def _controller(self, live: Live) -> Any:
-        settings = self.settings
-        description = live.arm.description
+    def _controller(self, live: Live) -> Controller:
+        settings, description = self.settings, live.arm.description
         controller: Controller = (
             self.own.controller()
             if settings.controller == OWN
@@ -331,56 +331,57 @@ class ControlPanel:
         )
         return FrictionCompensation(controller, live.arm) if settings.compensate else controller
 
-    def _require_reference(self, name: str) -> None:
-        """Refuse to follow what is not there.
+    def _require_reference(self, reference: ReferenceKind) -> None:
+        """Refuse a reference that does not exist.
 
         Raises
         ------
         ValueError
-            Says what is missing.
+            Names what is missing.
         """
-        if name == "motion" and self.motions.motion is None:
+        if reference is ReferenceKind.MOTION and self.motions.motion is None:
             raise ValueError("control: there is no motion to follow; expected one planned first (Motion)")
-        if name == "target" and self.desk.aimed is None:
+        if reference is ReferenceKind.TARGET and self.desk.target_q is None:
             raise ValueError("control: there is no target to follow; expected one that is in reach (Tool)")
 
-    def _wanted(self, live: Live, arm: Arm) -> Wanted:
-        """Return what the run follows from now on."""
-        begin, free = live.t, self._free
-        held = live.wanted(begin)[0] if live.t else live.q.copy()
-        still = np.zeros(len(free))
-        if self.settings.reference == "target":
-            return lambda t: (self._aimed(held), still, still)
-        if self.settings.reference == "motion":
-            motion = self.motions.motion
-            assert motion is not None  # noqa: S101 - for mypy: it was asked for before
-            return lambda t: back_and_forth(motion, t - begin, free)
-        if self.settings.reference == "sine":
-            self.sine = sine = gentle_sine(arm, held, free)
+    def _setpoints(self, live: Live, arm: Arm) -> Setpoints:
+        """Return the setpoints of the free joints that the run follows from now on."""
+        begin, free = live.t, self.free
+        held = live.setpoint_q if live.t else live.q.copy()
+        at_rest = np.zeros(len(free))
+        match self.settings.reference:
+            case ReferenceKind.TARGET:
+                return lambda t: (self._target_setpoint(held), at_rest, at_rest)
+            case ReferenceKind.MOTION:
+                motion = self.motions.motion
+                assert motion is not None  # noqa: S101 - for mypy: _require_reference was called before
+                return lambda t: back_and_forth(motion, t - begin, free)
+            case ReferenceKind.SINE:
+                self.sine = sine = gentle_sine(arm, held, free)
 
-            def sampled(t: float) -> tuple[Array, Array, Array]:
-                q, qd, qdd = sine.sampled(np.array([t - begin]))
-                return q[0], qd[0], qdd[0]
+                def sample(t: float) -> tuple[Array, Array, Array]:
+                    q, qd, qdd = sine.sampled(np.array([t - begin]))
+                    return q[0], qd[0], qdd[0]
 
-            return sampled
-        return lambda t: (held, still, still)
+                return sample
+        return lambda t: (held, at_rest, at_rest)
+
+    def _target_setpoint(self, held: Array) -> Array:
+        target_q = self.desk.target_q
+        return held if target_q is None else target_q[self.free]
 
     def _steer(self, q: Array, joint: int | None) -> None:
-        """Show joint values that a person asks for, or have the run hold them: of one joint, or of all."""
+        """Show the joint values that a person asks for, shape (n,); a run holds those of one joint, or of all."""
         with self._lock:
             live = self._live
             if live is None or not self.desk.running:
                 self.desk.show(q)
                 return
-            held, still = live.wanted(live.t)[0].copy(), np.zeros(len(self._free))
-            asked = [k for k, i in enumerate(self._free) if joint in (None, i)]
-            if not asked:
+            held, at_rest = live.setpoint_q.copy(), np.zeros(len(self.free))
+            steered = [k for k, i in enumerate(self.free) if joint in (None, i)]
+            if not steered:
                 raise ValueError(f"joint {1 + (joint or 0)} is locked: only joints 2 and 3 move")
-            held[asked] = q[self._free][asked]
-            self.settings = replace(self.settings, reference="sliders")
-            live.wanted = lambda t: (held, still, still)
+            held[steered] = q[self.free][steered]
+            self.settings = replace(self.settings, reference=ReferenceKind.SLIDERS)
+            live.setpoints = lambda t: (held, at_rest, at_rest)
         self.publish()
-
-    def _aimed(self, held: Array) -> Array:
-        aimed = self.desk.aimed
-        return held if aimed is None else aimed[self._free]

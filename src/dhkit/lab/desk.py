@@ -1,4 +1,4 @@
-"""What all pages of a lab show: one arm in one state, and what is known about it."""
+"""The desk: the one arm and state that all pages of a lab show, with the numbers that are known about it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import base64
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,21 +16,28 @@ from dhkit.kinematics import freedoms, singular_values
 from dhkit.lab.contacts import Contacts
 from dhkit.viewer import View
 from dhkit.viewer.interactive import arm_state
+from dhkit.viewer.scene import first_configuration
 
 if TYPE_CHECKING:
     from dhkit.control import SimulationResult
     from dhkit.trajectories import Trajectory
 
-UNIQUE = 1e-6
-"""Cosine (or sine) of the second Euler angle below which the first and third are not unique."""
-SINGULAR = 1e-3
-"""Smallest over largest singular value of the Jacobian (m and rad): below it a state is told as singular."""
+EULER_TOLERANCE = 1e-6
+"""The first and third Euler angles are not unique where the cosine (or sine) of the second is at most this."""
+SINGULAR_RATIO = 1e-3
+"""A state is shown as singular where the smallest over the largest singular value of the Jacobian (rad and m) is below
+this."""
 
 
 def file_content(result: Trajectory | SimulationResult, kind: str) -> str:
     """Return a motion or a run as the content of a file that ends in ``kind``, in base64."""
     with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
         return base64.b64encode(result.save(Path(folder) / f"file.{kind}").read_bytes()).decode()
+
+
+def has_bodies(arm: Arm) -> bool:
+    """Return whether every link of an arm has a mass."""
+    return all(joint.bodies for joint in arm.description.joints)
 
 
 class Desk:
@@ -41,105 +48,98 @@ class Desk:
     arm
         The arm.
     view
-        Where it is shown; its pages have panels.
+        The view that shows it; its pages have panels.
     """
 
     def __init__(self, arm: Arm, view: View) -> None:
         self.arm, self.view = arm, view
         self.assumed_bodies = False
+        """Whether the links' masses are assumed, as uniform rods."""
         self.order = "XYZ"
-        self.q = self.first(arm)
+        """Convention of the tool's Euler angles."""
+        self.q = first_configuration(arm.description)
+        """Joint values on show, shape (n,), rad and m."""
         self.running = False
         """Whether a simulation moves the arm."""
         self.steer: Callable[[Array, int | None], None] = lambda q, joint: self.show(q)
-        """What is done with the joint values, shape (n,), that a person asks for; the joint, from 0, if it is one."""
-        self._contacts = Contacts()
-        self.aimed: Array | None = None
-        """Joint values at the target of the tool, which a simulation may follow, shape (n,)."""
-        self.shown: list[Callable[[Array], None]] = []
+        """Called with the joint values, shape (n,), that a person asks for, and the joint, from 0, if only one is
+        moved. A simulation replaces it, and takes the values as its setpoint."""
+        self.target_q: Array | None = None
+        """Joint values, shape (n,), at which the tool is at its target; a simulation may follow them."""
+        self.on_show: list[Callable[[Array], None]] = []
         """Called with the joint values, shape (n,), of every state that is shown."""
-        self.changed: list[Callable[[], None]] = []
-        """Called after another arm has taken this one's place."""
-
-    @staticmethod
-    def first(arm: Arm) -> Array:
-        """Return the joint values that an arm is first shown in, shape (n,)."""
-        ready = arm.configurations.get("ready")
-        return np.zeros(arm.n) if ready is None else np.array(ready)
+        self.on_replace: list[Callable[[], None]] = []
+        """Called after another arm has replaced this one."""
+        self._contacts = Contacts()
 
     def replace(self, arm: Arm, q: Array | None = None) -> None:
-        """Put another arm in the place of this one."""
-        kept = (
-            q if q is not None else self.q if arm.description.kinds == self.arm.description.kinds else self.first(arm)
-        )
-        before = self.arm, self.q, self.aimed
-        self.arm, self.q, self.aimed = arm, kept, None
+        """Show another arm in place of this one; if the pages cannot show it, the old arm stays.
+
+        Parameters
+        ----------
+        arm
+            The new arm.
+        q
+            Its joint values, shape (n,), rad and m. By default those on show, if the kinds of joints are the same, and
+            otherwise the new arm's first configuration.
+        """
+        if q is None:
+            same_kinds = arm.description.kinds == self.arm.description.kinds
+            q = self.q if same_kinds else first_configuration(arm.description)
+        previous = self.arm, self.q, self.target_q
+        self.arm, self.q, self.target_q = arm, q, None
         try:
-            self.view.replace(arm.description, kept)
+            self.view.replace(arm.description, q)
             self.publish()
         except BaseException:
-            self.arm, self.q, self.aimed = before
+            self.arm, self.q, self.target_q = previous
             self.view.replace(self.arm.description, self.q)
             self.publish()
             raise
-        for call in self.changed:
+        for call in self.on_replace:
             call()
 
     def show(self, q: Array) -> None:
-        """Show joint values, shape (n,)."""
+        """Show joint values, shape (n,), rad and m."""
         self.q = q.copy()
         self.view.show(self.q)
         self.publish_state()
-        for call in self.shown:
+        for call in self.on_show:
             call(self.q)
 
     def publish(self) -> None:
-        """Tell the pages everything about the arm, and its state."""
+        """Send the arm and its state to the pages."""
         self.view.panel("arm", arm_state(self.arm.description, assumed_bodies=self.assumed_bodies))
         self._contacts.prepare(self.arm, self.publish_state)
         self.show(self.q)
 
     def publish_state(self) -> None:
-        """Tell the pages the numbers of the state on show."""
+        """Send the numbers of the state on show to the pages."""
         arm, q = self.arm, self.q  # another thread may replace them meanwhile
         numbers = arm.description.numbers
-        outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper))
-        self.view.panel(
-            "joints",
-            {
-                "q": q.tolist(),
-                "within": not len(outside),
-                "outside": outside.tolist(),
-                "touching": self._contacts.links(arm, q),
-            },
-        )
-        self.view.panel("tool", self.tool(arm, q))
+        outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper)).tolist()
+        touching = self._contacts.links(arm, q)
+        self.view.panel("joints", {"q": q.tolist(), "within": not outside, "outside": outside, "touching": touching})
+        self.view.panel("tool", self.tool_state(arm, q))
 
-    def tool(self, arm: Arm, q: Array) -> dict[str, Any]:
-        """Return the numbers of the tool at joint values, shape (n,)."""
+    def tool_state(self, arm: Arm, q: Array) -> dict[str, object]:
+        """Return the numbers of the tool of an arm at joint values, shape (n,), rad and m, as pages show them."""
         T = arm.fk(q)
         xyz, euler = pose_parts(T, order=self.order)
-        # Where the second angle is at the end of its range only the sum or difference of the others counts.
-        ends = np.cos(euler[1]) if self.order[0] != self.order[2] else np.sin(euler[1])
+        # Where this is 0 the second angle is at an end of its range: only the sum or difference of the others counts.
+        uniqueness = np.cos(euler[1]) if self.order[0] != self.order[2] else np.sin(euler[1])
+        sigma, rank = singular_values(arm.description, q, "whole"), freedoms(arm.description, "whole")
+        singular = rank >= 1 and sigma[rank - 1] < SINGULAR_RATIO * sigma[0]
         return {
             "T": T.ravel().tolist(),
             "xyz": xyz.tolist(),
             "euler": euler.tolist(),
             "order": self.order,
-            "unique": bool(abs(ends) > UNIQUE),
+            "unique": bool(abs(uniqueness) > EULER_TOLERANCE),
             "manipulability": float(arm.manipulability(q)),
-            "singular": _singular(arm, q),
+            "singular": "singular: the tool cannot move in one of its directions here" if singular else None,
         }
 
     def close(self) -> None:
         """End what runs in the background."""
         self._contacts.close()
-
-
-def _singular(arm: Arm, q: Array) -> str | None:
-    """Return what is said of a state that is singular, or None."""
-    sigma = singular_values(arm.description, q, "whole")
-    rank = freedoms(arm.description, "whole")
-    if rank < 1 or sigma[rank - 1] >= SINGULAR * sigma[0]:
-        return None
-    return "singular: the tool cannot move in one of its directions here"

@@ -1,4 +1,4 @@
-"""Work that takes longer than a request: one job at a time, in a thread of its own, that can be cancelled."""
+"""Jobs: work that takes longer than a request, one at a time, in a thread of its own, that can be cancelled."""
 
 from __future__ import annotations
 
@@ -6,120 +6,129 @@ import logging
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from typing import TypedDict, TypeVar
 
 from dhkit.errors import DhkitError
 
 log = logging.getLogger(__name__)
 
-LONGEST_END = 20.0
-"""s from the cancelling of a job to its next :meth:`Job.progress`: some seconds while it makes its program."""
+MAX_END_TIME = 20.0
+"""Time that a cancelled job may take to end, s: making an optimizer's program, for one, takes some seconds."""
+
+Result = TypeVar("Result")
 
 
 class Cancelled(Exception):  # noqa: N818 - no error: the person who asked does not want it any more
     """The job was cancelled."""
 
 
-class Job:
-    """What a running job is given."""
+class JobState(TypedDict):
+    """The state of a job, as pages show it."""
 
-    def __init__(self, number: int, title: str, tell: Callable[[Job], None]) -> None:
+    id: int
+    title: str
+    progress: str
+    running: bool
+    error: str | None
+
+
+class Job:
+    """A job, as the work that it runs sees it."""
+
+    def __init__(self, number: int, title: str, report: Callable[[Job], None]) -> None:
         self.number, self.title, self.text = number, title, ""
-        self._tell = tell
+        self._report = report
         self._cancelled = threading.Event()
 
     def progress(self, text: str) -> None:
-        """Tell how far it is.
+        """Report how far the work is.
 
         Raises
         ------
         Cancelled
-            Nobody wants it any more.
+            The job was cancelled.
         """
-        if self._cancelled.is_set():
-            raise Cancelled
+        self.wait(0.0)
         self.text = text
-        self._tell(self)
+        self._report(self)
 
     def wait(self, seconds: float) -> None:
-        """Wait for a time.
+        """Wait for a time in s.
 
         Raises
         ------
         Cancelled
-            Nobody wants it any more.
+            The job was cancelled.
         """
         if self._cancelled.wait(seconds):
             raise Cancelled
 
     def cancel(self) -> None:
-        """End it at its next :meth:`progress` or :meth:`wait`."""
+        """Make the next :meth:`progress` or :meth:`wait` raise :class:`Cancelled`."""
         self._cancelled.set()
 
     @property
-    def cancelled(self) -> bool:
-        """Whether its result is still wanted."""
+    def is_cancelled(self) -> bool:
+        """Whether the job was cancelled."""
         return self._cancelled.is_set()
 
 
 class Jobs:
-    """Jobs, of which the latest counts: one runs, and at most one waits until it has noticed that it is cancelled.
+    """Jobs of which the latest counts: one runs, and at most one waits until that one has noticed its cancelling.
 
     Parameters
     ----------
-    tell
-        Called with a panel's state: what runs, how far it is, and what went wrong.
+    publish
+        Called with the state of the job, and with None when there is none any more.
     lock
-        Held while a result is taken: what it belongs to must not change meanwhile.
+        Held while a result is taken: the arm that it belongs to must not change meanwhile.
     """
 
-    def __init__(self, tell: Callable[[Any], None], lock: AbstractContextManager[Any] | None = None) -> None:
-        self._tell = tell
-        self._taking: AbstractContextManager[Any] = nullcontext() if lock is None else lock
+    def __init__(
+        self,
+        publish: Callable[[JobState | None], None] = lambda state: None,
+        lock: AbstractContextManager[object] | None = None,
+    ) -> None:
+        self._publish = publish
+        self._result_lock: AbstractContextManager[object] = nullcontext() if lock is None else lock
         self._count = 0
         self._job: Job | None = None
         self._lock = threading.Lock()
         self._waiting: Callable[[], None] | None = None
         self._thread: threading.Thread | None = None
 
-    def start(self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None]) -> int:
-        """Begin a job in place of the one that runs; ``done`` is called with its result.
-
-        Returns
-        -------
-        int
-            Its number.
-        """
+    def start(self, title: str, work: Callable[[Job], Result], take: Callable[[Result], None]) -> int:
+        """Start a job in place of the one that runs, and return its number; ``take`` is called with its result."""
         self.cancel()
         self._count += 1
-        job = self._job = Job(self._count, title, self._told)
-        self._told(job)
+        job = self._job = Job(self._count, title, self._report)
+        self._report(job)
         with self._lock:
-            self._waiting = lambda: self._run(job, work, done)
+            self._waiting = lambda: self._run(job, work, take)
             if self._thread is None:
-                self._thread = threading.Thread(target=self._work, name="dhkit-job", daemon=True)
+                self._thread = threading.Thread(target=self._run_waiting, name="dhkit-job", daemon=True)
                 self._thread.start()
         return job.number
 
     def cancel(self) -> None:
-        """Cancel what runs."""
+        """Cancel the job that runs."""
         job, self._job = self._job, None
         with self._lock:
             self._waiting = None
         if job is not None:
             job.cancel()
-            self._tell(None)
+            self._publish(None)
 
     def close(self) -> None:
-        """Cancel what runs and wait for its end: a solver that still runs when Python exits makes it crash."""
+        """Cancel the job that runs and wait for its end: a solver that still runs when Python exits makes it crash."""
         self.cancel()
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
-            thread.join(LONGEST_END)
+            thread.join(MAX_END_TIME)
             if thread.is_alive():
-                log.warning("a job did not end within %g s", LONGEST_END)
+                log.warning("a job did not end within %g s", MAX_END_TIME)
 
-    def _work(self) -> None:
+    def _run_waiting(self) -> None:
         while True:
             with self._lock:
                 run, self._waiting = self._waiting, None
@@ -128,31 +137,28 @@ class Jobs:
                     return
             run()
 
-    def _run(self, job: Job, work: Callable[[Job], Any], done: Callable[[Any], None]) -> None:
+    def _run(self, job: Job, work: Callable[[Job], Result], take: Callable[[Result], None]) -> None:
+        error = None
         try:
             result = work(job)
-            with self._taking:
-                if not job.cancelled:
-                    done(result)
+            with self._result_lock:
+                if not job.is_cancelled:
+                    take(result)
         except Cancelled:
             return
-        except (DhkitError, ValueError, TypeError) as error:
-            self._ended(job, " ".join(str(error).split()))
-        except Exception as error:
+        except (DhkitError, ValueError, TypeError) as failure:
+            error = " ".join(str(failure).split())
+        except Exception as failure:
             log.exception("%s failed", job.title)
-            self._ended(job, f"{type(error).__name__}: Python's log says more")
-        else:
-            self._ended(job, None)
-
-    def _told(self, job: Job) -> None:
-        if job is self._job:
-            self._tell(_state(job, running=True, error=None))
-
-    def _ended(self, job: Job, error: str | None) -> None:
+            error = f"{type(failure).__name__}: Python's log says more"
         if job is self._job:
             self._job = None
-            self._tell(_state(job, running=False, error=error) if error else None)
+            self._publish(_state(job, error) if error else None)
+
+    def _report(self, job: Job) -> None:
+        if job is self._job:
+            self._publish(_state(job, None))
 
 
-def _state(job: Job, *, running: bool, error: str | None) -> dict[str, Any]:
-    return {"id": job.number, "title": job.title, "progress": job.text, "running": running, "error": error}
+def _state(job: Job, error: str | None) -> JobState:
+    return {"id": job.number, "title": job.title, "progress": job.text, "running": error is None, "error": error}

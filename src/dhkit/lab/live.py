@@ -2,62 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.control import Plant, Push, Setpoint, SimulationResult
-from dhkit.control.controller import called, reset, torques
-from dhkit.control.events import advanced
+from dhkit.control import Controller, Plant, Push, Setpoint, SimulationResult
+from dhkit.control.controller import call_controller, reset, torques
+from dhkit.control.events import advance
 from dhkit.control.integrators import RungeKutta, State
 from dhkit.control.runs import result_of
 from dhkit.description import Array
 from dhkit.dynamics import Friction
+from dhkit.lab.run_settings import Setpoints
 
-MOST_ROWS = 20_000
-"""Rows that are kept: the first 20 s at 1 kHz, 7 MB for six joints. When they are full every second one is dropped, and
-from then on half as many are added, so that a run of any length is kept whole."""
-MOST_PUSHES = 32
-"""Pushes that act at a time."""
-
+MAX_ROWS = 20_000
+"""Largest number of rows that are recorded: 20 s at 1 kHz, 7 MB for six joints. When they are full every second one is
+dropped, and from then on half as many are added, so that a run of any length is recorded whole."""
+MAX_PUSHES = 32
+"""Largest number of pushes that act at a time."""
 COLUMNS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
-"""What is kept of a period behind its time."""
-Wanted = Callable[[float], tuple[Array, Array, Array]]
-"""Joint values, rates and accelerations that are asked for at a time."""
+"""Quantities, of n numbers each, that a recorded row has behind its time."""
 
 
 class Live:
-    """A run that goes on for as long as it is told to.
+    """A run that goes on for as long as it is advanced.
 
     Parameters
     ----------
     arm
-        What the controller knows.
+        The arm that the controller knows, of n joints.
     plant
-        What moves.
+        The arm that is simulated.
     friction
-        Of the joints.
+        Friction of the joints.
     q
-        Where it begins, at rest, shape (n,).
+        Joint values at the beginning, at rest, shape (n,), rad and m.
     rate
-        Calls of the controller, Hz.
+        Calls of the controller per second, Hz.
     """
 
     def __init__(self, arm: Arm, plant: Arm, friction: Friction | None, q: Array, rate: float) -> None:
         self.arm, self.rate = arm, rate
-        self.controller: Any = None
-        self.wanted: Wanted = lambda t: (q, np.zeros(len(q)), np.zeros(len(q)))
+        self.controller: Controller | None = None
+        self.setpoints: Setpoints = lambda t: (q, np.zeros(len(q)), np.zeros(len(q)))
         self._pushes: tuple[Push, ...] = ()
-        self._friction = friction
-        self._plant = self._moving(plant)
+        self._plant = Plant(plant.description, friction, 0.0, ())
         self._state = State(0.0, np.array(q, dtype=float), np.zeros(len(q)), np.zeros(0))
-        self._start = self._state
-        self._rows = np.zeros((MOST_ROWS, 1 + 7 * len(q)))
-        self._count, self._steps, self._stride = 0, 0, 1
-        self._turnover = 0.0
+        self._rows = np.zeros((MAX_ROWS, 1 + len(COLUMNS) * len(q)))
+        self._begin_record(self._state)
 
     @property
     def t(self) -> float:
@@ -66,28 +59,39 @@ class Live:
 
     @property
     def q(self) -> Array:
-        """The joint values now, shape (n,)."""
+        """The joint values now, shape (n,), rad and m."""
         return self._state.q
 
-    def take(self, controller: Any) -> None:
-        """Put another controller in place of the one there is."""
+    @property
+    def setpoint_q(self) -> Array:
+        """The joint values to follow now, shape (n,), rad and m."""
+        return self.setpoints(self.t)[0]
+
+    def take(self, controller: Controller) -> None:
+        """Use another controller from now on; it is reset."""
         reset(controller)
         self.controller = controller
 
     def change(self, plant: Arm, friction: Friction | None) -> None:
-        """Go on with another load or friction.
+        """Simulate another load or friction from now on.
 
-        What is recorded begins anew: the work of one run is that of one arm.
+        The record begins anew, since the work in a record is that of one arm.
         """
-        self._friction = friction
-        self._plant = self._moving(plant)
+        self._plant = Plant(plant.description, friction, 0.0, self._pushes)
         state = self._state
-        self._start = self._state = State(state.t, state.q, state.qd, state.memory)  # no work is done yet
-        self._turnover = 0.0
-        self._count, self._steps, self._stride = 0, 0, 1
+        self._begin_record(State(state.t, state.q, state.qd, state.memory))  # the new record has done no work yet
 
     def push(self, link: int | None, force: Array, duration: float) -> None:
-        """Push from now on for a while.
+        """Push from now on for a duration, s.
+
+        Parameters
+        ----------
+        link
+            The link, from 1, or None for the tool.
+        force
+            Force in the world, shape (3,), N.
+        duration
+            Duration, s.
 
         Raises
         ------
@@ -95,13 +99,18 @@ class Live:
             Too many pushes act already.
         """
         active = [push for push in self._pushes if push.end > self.t]
-        if len(active) >= MOST_PUSHES:
-            raise ValueError(f"{MOST_PUSHES} pushes act already; expected at most so many at a time")
+        if len(active) >= MAX_PUSHES:
+            raise ValueError(f"{MAX_PUSHES} pushes act already; expected at most so many at a time")
         self._pushes = (*active, Push(force, link=link, begin=self.t, end=self.t + duration))
         self._plant = replace(self._plant, pushes=self._pushes)
 
     def advance(self) -> tuple[Array, Array]:
-        """Take one period of the controller; return the errors and the torques, shape (n,) each.
+        """Simulate one period of the controller.
+
+        Returns
+        -------
+        tuple[Array, Array]
+            Errors of the joint values (rad and m) and torques (N m and N) at its beginning, shape (n,) each.
 
         Raises
         ------
@@ -109,24 +118,27 @@ class Live:
             The controller fails, or the state is no longer finite.
         """
         plant, state, n = self._plant, self._state, self.arm.n
-        setpoint = Setpoint(self.arm.description, *self.wanted(state.t))
-        asked = torques(called(self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint), n, state.t)
+        assert self.controller is not None  # noqa: S101 - for mypy: a controller was taken before
+        setpoint = Setpoint(self.arm.description, *self.setpoints(state.t))
+        returned = call_controller(self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint)
+        commanded = torques(returned, n, state.t)
         effort = plant.description.numbers.effort
-        tau = np.clip(asked, -effort, effort)
+        tau = np.clip(commanded, -effort, effort)
         phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
-        self._keep((state.t, *state.q, *state.qd, *phase.qdd, *tau, *asked, *setpoint.q, *setpoint.qd))
+        self._record((state.t, *state.q, *state.qd, *phase.qdd, *tau, *commanded, *setpoint.q, *setpoint.qd))
         begin, end = state.t, state.t + 1 / self.rate
         edges = sorted({edge for push in self._pushes for edge in (push.begin, push.end) if begin < edge < end})
         integrator = RungeKutta(plant, tau)
-        state = advanced(plant, integrator, state, [*edges, end][0], phase)
-        for until in [*edges, end][1:]:
-            state = advanced(plant, integrator, state, until)
+        first_end, *later_ends = [*edges, end]
+        state = advance(plant, integrator, state, first_end, phase)
+        for time in later_ends:
+            state = advance(plant, integrator, state, time)
         self._turnover += float(np.abs(tau * (state.q - self._state.q)).sum())
         self._state = state
         return setpoint.q - state.q, tau
 
     def result(self) -> SimulationResult:
-        """Return the run so far.
+        """Return the recorded run.
 
         Raises
         ------
@@ -142,14 +154,16 @@ class Live:
             self.arm.description, self._plant, recorded, self._start, self._state, self._turnover, self.controller
         )
 
-    def _keep(self, row: tuple[float, ...]) -> None:
+    def _begin_record(self, state: State) -> None:
+        self._start = self._state = state
+        self._turnover = 0.0
+        self._count, self._steps, self._stride = 0, 0, 1
+
+    def _record(self, row: tuple[float, ...]) -> None:
         if self._steps % self._stride == 0:
-            if self._count == MOST_ROWS:
-                self._count, self._stride = MOST_ROWS // 2, 2 * self._stride
+            if self._count == MAX_ROWS:
+                self._count, self._stride = MAX_ROWS // 2, 2 * self._stride
                 self._rows[: self._count] = self._rows[::2].copy()
             self._rows[self._count] = row
             self._count += 1
         self._steps += 1
-
-    def _moving(self, plant: Arm) -> Plant:
-        return Plant(plant.description, self._friction, 0.0, self._pushes)

@@ -4,166 +4,182 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
+from dhkit.control import Controller
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 from dhkit.lab.desk import Desk
-from dhkit.lab.fields import Fields
 from dhkit.lab.jobs import Job, Jobs
+from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.programs import Limits, Program, ProgramError, check
 
 log = logging.getLogger(__name__)
 
 PERIOD = 0.1
-"""s between two looks at the state on show, and at the file."""
-SAMPLES = 100
+"""Time between two comparisons with the state on show, and between two looks at the program's file, s."""
+SCORE_SAMPLES = 100
 """Random poses of a score."""
-CLOSE = 1e-6
-"""m and entries of a rotation matrix."""
-PRINTED = 2_000
-"""Characters of what the program prints that are shown: the last."""
-LIVE = Limits(seconds=1.0)
-"""Of a call while a person moves the arm."""
+POSE_TOLERANCE = 1e-6
+"""Largest error of a pose that a solution leads to: m, and entries of the rotation matrix."""
+MAX_OUTPUT_LENGTH = 2_000
+"""Characters that are shown of what the program prints: the last ones."""
+MAX_SOLUTIONS = 16
+"""Solutions that are shown of a pose."""
+CALL_LIMITS = Limits(seconds=1.0)
+"""Limits of a call while a person moves the arm."""
 
 
-class OwnPanel:
-    """Requests ``own.…``; a thread of its own compares the program with the arm, and loads it anew when it is saved."""
+class OwnPanel(Panel):
+    """Requests ``own.…``; a thread of its own compares the program with the arm, and loads it again when it is saved.
+
+    Parameters
+    ----------
+    desk
+        The arm and its state.
+    source
+        The program, as :class:`dhkit.programs.Program` takes it; None if there is none.
+    sandbox
+        The sandbox of the program: ``"bwrap"``, or None.
+    lock
+        Held while a score is taken.
+    """
 
     def __init__(
         self,
         desk: Desk,
-        source: Path | Sequence[str] | None,
+        source: str | Path | Sequence[str] | None,
         sandbox: str | None = None,
-        lock: AbstractContextManager[Any] | None = None,
+        lock: AbstractContextManager[object] | None = None,
     ) -> None:
-        self.desk, self.source, self._sandbox = desk, source, sandbox
-        self.changed: list[Callable[[], None]] = []
-        """Called when there are other functions."""
-        self.scored: list[Callable[[Arm, dict[str, Any]], None]] = []
+        super().__init__(desk)
+        self.source, self._sandbox = source, sandbox
+        self.on_change: list[Callable[[], None]] = []
+        """Called when the program has been loaded, with the functions that it defines now."""
+        self.on_score: list[Callable[[Arm, Mapping[str, object]], None]] = []
         """Called with a score, as :meth:`dhkit.programs.CheckReport.to_dict` has it, and the arm that it is about."""
-        self._state: dict[str, Any] = {}
-        self._seen: Any = None
+        self._state: dict[str, object] = {}
+        self._functions: tuple[str, ...] = ()
+        self._compared: tuple[Arm, bytes, bool] | None = None
+        """The arm, its state and whether ghosts are shown, at the last comparison."""
         self._lock = threading.Lock()
-        self._ghosts = False
+        self._shows_ghosts = False
         self._program: Program | None = None
-        self._driver: Program | None = None
-        self._judge: Program | None = None
-        self._scores = Jobs(lambda state: None, lock)
-        desk.changed.append(self._replaced)
+        """The process that is compared; the controller and the score have processes of their own."""
+        self._controller_program: Program | None = None
+        self._scored_program: Program | None = None
+        self._scores = Jobs(lock=lock)
+        desk.on_replace.append(self._forget_results)
         self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
-        if source is not None:
-            self._thread = threading.Thread(target=self._work, name="dhkit-own", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="dhkit-own", daemon=True)
 
     def begin(self) -> None:
-        """Load the program, in the background."""
-        self.publish()
-        if self._thread is not None:
+        """Load the program in the background, if there is one."""
+        if self.source is not None:
             self._thread.start()
 
     @property
-    def controls(self) -> bool:
-        """Whether there is a controller."""
-        return "controller" in self._state.get("functions", ())
+    def has_controller(self) -> bool:
+        """Whether the program defines a controller."""
+        return "controller" in self._functions
 
-    def ghosts(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Show the program's solutions as ghosts, or no longer."""
-        self._ghosts = Fields("own.ghosts", data, ["on"]).flag("on")
-        if not self._ghosts:
+    @answers("own.ghosts", "on")
+    def show_ghosts(self, fields: Fields) -> None:
+        """Show or hide the program's solutions as ghosts."""
+        self._shows_ghosts = fields.flag("on")
+        if not self._shows_ghosts:
             self.desk.view.ghosts(None)
-        self._seen = None
-        return {}
+        self._compared = None
 
-    def score(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("own.score")
+    def score(self, _: Fields) -> None:
         """Score the program once more."""
-        Fields("own.score", data, [])
         if self.source is None:
             raise ValueError("own.score: there is no program; expected --mine FILE")
-        self._score()
-        return {}
+        self._start_score(self.source)
 
-    def controller(self) -> Callable[..., Array]:
+    def controller(self) -> Controller:
         """Return the program's controller, in a process of its own that ends when another is asked for.
 
         Raises
         ------
         ValueError
-            There is none.
+            The program defines none.
         """
-        if self.source is None or not self.controls:
+        if self.source is None or not self.has_controller:
             raise ValueError("control: there is no controller of your own; expected --mine FILE with one")
-        if self._driver is not None:
-            self._driver.close()
-        driver = self._driver = Program(self.source, LIVE, self._sandbox)
-        driver.start()
-
-        return driver.controller
+        if self._controller_program is not None:
+            self._controller_program.close()
+        program = self._controller_program = Program(self.source, CALL_LIMITS, self._sandbox)
+        program.start()
+        return program.controller
 
     def publish(self) -> None:
-        """Tell the pages what is known."""
-        self.desk.view.panel("own", {"ghosts": self._ghosts, **self._state} if self.source is not None else None)
+        """Send what is known about the program to the pages."""
+        state = {"ghosts": self._shows_ghosts, **self._state} if self.source is not None else None
+        self.desk.view.panel("own", state)
 
     def close(self) -> None:
         """End the program's processes."""
         self._stop.set()
-        for program in (self._judge, self._driver, self._program):
+        for program in (self._scored_program, self._controller_program, self._program):
             if program is not None:
                 program.close()
-        if self._thread is not None and self._thread.is_alive():
+        if self._thread.is_alive():
             self._thread.join(5.0)
         self._scores.close()
 
     # The thread
 
-    def _work(self) -> None:
-        saved: object = None
+    def _run(self) -> None:
+        loaded_version: object = None
         while not self._stop.is_set():
             try:
-                now = self._saved()
-                if now != saved:
-                    saved = now
+                version = self._file_version()
+                if version != loaded_version:
+                    loaded_version = version
                     self._load()
                 self._compare()
             except Exception:
                 log.exception("comparing the program failed")
             self._stop.wait(PERIOD)
 
-    def _saved(self) -> object:
-        """Return what changes when the file is saved."""
+    def _file_version(self) -> object:
+        """Return a value that changes when the program's file is saved."""
         if not isinstance(self.source, Path):
             return self.source
         try:
-            about = self.source.stat()
+            status = self.source.stat()
         except OSError:
             return "missing"
-        return about.st_mtime_ns, about.st_size
+        return status.st_mtime_ns, status.st_size
 
     def _load(self) -> None:
-        assert self.source is not None  # noqa: S101 - for mypy: the thread runs with a program alone
+        assert self.source is not None  # noqa: S101 - for mypy: the thread runs only with a program
         if self._program is not None:
             self._program.close()
-        self._program = Program(self.source, LIVE, self._sandbox)
-        self._seen = None
-        self._state = {"file": self._program.name, "functions": [], "loading": True, "report": None}
+        program = self._program = Program(self.source, CALL_LIMITS, self._sandbox)
+        self._compared, self._functions = None, ()
+        self._state = {"file": program.name, "functions": [], "loading": True, "report": None}
         self.publish()
         try:
-            self._program.start()
+            program.start()
         except ProgramError as error:
-            self._tell(loading=False, error=str(error), output=self._program.output[-PRINTED:])
+            self._publish(loading=False, error=str(error), output=program.output[-MAX_OUTPUT_LENGTH:])
             return
-        self._tell(loading=False, error=None, functions=list(self._program.functions))
-        for call in self.changed:
+        self._functions = program.functions
+        self._publish(loading=False, error=None, functions=list(program.functions))
+        for call in self.on_change:
             call()
-        self._score()
+        self._start_score(self.source)
 
-    def _tell(self, **state: Any) -> None:
+    def _publish(self, **state: object) -> None:
+        """Send the state to the pages with some of its parts replaced."""
         with self._lock:
             self._state = {**self._state, **state}
             if not self._stop.is_set():
@@ -171,80 +187,68 @@ class OwnPanel:
 
     def _compare(self) -> None:
         """Compare the program's answers with the arm's, at the state on show."""
-        program, desk = self._program, self.desk
+        program, arm, q = self._program, self.desk.arm, self.desk.q
         if program is None or not program.functions or self._state.get("loading", True):
             return
-        printed = program.output[-PRINTED:]  # which may come after the answer
-        if printed != self._state.get("output", ""):
-            self._tell(output=printed)
-        arm, q = desk.arm, desk.q
-        seen = (arm, q.tobytes(), self._ghosts)
-        if seen == self._seen:
+        output = program.output[-MAX_OUTPUT_LENGTH:]  # it may come after the answer
+        if output != self._state.get("output", ""):
+            self._publish(output=output)
+        state = (arm, q.tobytes(), self._shows_ghosts)
+        if state == self._compared:
             return
-        self._seen = seen
-        found: dict[str, Any] = {}
-        if "fk" in program.functions:
-            found["fk"] = self._answered(lambda: _forward(arm, q, program))
-        if "ik" in program.functions:
-            found["ik"] = self._answered(lambda: self._inverse(arm, q, program))
-        self._tell(**found, imported=list(program.imported))
+        self._compared = state
+        results: dict[str, object] = {}
+        for name, compare in (("fk", self._compare_forward), ("ik", self._compare_inverse)):
+            if name in program.functions:
+                try:
+                    results[name] = compare(arm, q, program)
+                except (ProgramError, ValueError, TypeError) as error:
+                    results[name] = {"error": " ".join(str(error).split())[:300]}
+        self._publish(**results, imported=list(program.imported))
 
-    def _answered(self, ask: Any) -> dict[str, Any]:
-        try:
-            result: dict[str, Any] = ask()
-        except (ProgramError, ValueError, TypeError) as error:
-            return {"error": " ".join(str(error).split())[:300]}
-        return result
+    def _compare_forward(self, arm: Arm, q: Array, program: Program) -> JsonObject:
+        T, T_arm = program.fk(q), arm.fk(q)
+        cosine = np.clip((np.trace(T_arm[:3, :3].T @ T[:3, :3]) - 1) / 2, -1.0, 1.0)
+        distance = float(np.linalg.norm(T[:3, 3] - T_arm[:3, 3]))
+        return {"distance": distance, "angle": float(np.arccos(cosine)), "T": T.ravel().tolist()}
 
-    def _inverse(self, arm: Arm, q: Array, program: Program) -> dict[str, Any]:
+    def _compare_inverse(self, arm: Arm, q: Array, program: Program) -> JsonObject:
         T = arm.fk(q)
-        rows = program.ik(T, arm.n)
-        finite = rows[np.isfinite(rows).all(axis=1)]
-        right = [bool(np.abs(arm.fk(row) - T).max() < CLOSE) for row in finite]
-        if self._ghosts and not self.desk.running:
-            self.desk.view.ghosts(finite[:16] if len(finite) else None)
-        return {"count": len(finite), "right": sum(right), "q": finite[:16].tolist()}
+        solutions = program.ik(T, arm.n)
+        finite = solutions[np.isfinite(solutions).all(axis=1)]
+        right = sum(bool(np.abs(arm.fk(solution) - T).max() < POSE_TOLERANCE) for solution in finite)
+        shown = finite[:MAX_SOLUTIONS]
+        if self._shows_ghosts and not self.desk.running:
+            self.desk.view.ghosts(shown if len(shown) else None)
+        return {"count": len(finite), "right": right, "q": shown.tolist()}
 
-    def _replaced(self) -> None:
-        """Leave what was found about another arm."""
-        if self.source is None:
-            return
-        self._scores.cancel()
-        self._seen = None
-        self._tell(scoring=False, report=None, fk=None, ik=None, edited=True)
+    def _forget_results(self) -> None:
+        """Forget the results about an arm that another has replaced."""
+        if self.source is not None:
+            self._scores.cancel()
+            self._compared = None
+            self._publish(scoring=False, report=None, fk=None, ik=None, edited=True)
 
-    def _score(self) -> None:
-        source, arm = self.source, self.desk.arm
-        assert source is not None  # noqa: S101 - for mypy
-        if self._judge is not None:
-            self._judge.close()
-        judge = self._judge = Program(source, Limits(), self._sandbox)
+    def _start_score(self, source: str | Path | Sequence[str]) -> None:
+        arm = self.desk.arm
+        if self._scored_program is not None:
+            self._scored_program.close()
+        program = self._scored_program = Program(source, Limits(), self._sandbox)
 
-        def work(job: Job) -> dict[str, Any]:
+        def work(job: Job) -> Mapping[str, object]:
             try:
-                with judge:
-                    return check(arm, judge, samples=SAMPLES, progress=job.progress).to_dict()
+                with program:
+                    return check(arm, program, samples=SCORE_SAMPLES, progress=job.progress).to_dict()
             except DhkitError as error:
                 return {"error": str(error)}
 
-        def take(report: dict[str, Any]) -> None:
-            if arm is not self.desk.arm:  # edited meanwhile
-                self._tell(scoring=False, report=None)
+        def take(report: Mapping[str, object]) -> None:
+            if arm is not self.desk.arm:  # the arm was edited meanwhile
+                self._publish(scoring=False, report=None)
                 return
-            self._tell(scoring=False, report=report)
-            for call in self.scored:
+            self._publish(scoring=False, report=report)
+            for call in self.on_score:
                 call(arm, report)
 
-        self._tell(scoring=True, edited=False)
+        self._publish(scoring=True, edited=False)
         self._scores.start("score", work, take)
-
-
-def _forward(arm: Arm, q: Array, program: Program) -> dict[str, Any]:
-    T = program.fk(q)
-    ours = arm.fk(q)
-    cosine = np.clip((np.trace(ours[:3, :3].T @ T[:3, :3]) - 1) / 2, -1.0, 1.0)
-    return {
-        "distance": float(np.linalg.norm(T[:3, 3] - ours[:3, 3])),
-        "angle": float(np.arccos(cosine)),
-        "T": T.ravel().tolist(),
-    }

@@ -1,22 +1,26 @@
-"""What a run of the control panel simulates."""
+"""What a run of the control panel simulates, and the references that it follows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import TypeAlias
 
-from dhkit.control import CONTROLLERS
+import numpy as np
+
+from dhkit.arm import Arm
+from dhkit.control import CONTROLLERS, Sine
+from dhkit.description import Array
 from dhkit.dynamics import Friction
-from dhkit.lab.fields import Fields
+from dhkit.lab.requests import Fields
+from dhkit.trajectories import Trajectory
 
-SMOOTH = 0.05
-"""rad/s or m/s of smooth friction."""
-FRICTIONS = ("none", "smooth", "stiction")
-REFERENCES = ("hold", "sine", "motion", "target", "sliders")
-PARTS = ("controller", "bandwidth", "damping", "friction", "payload", "compensate", "reference")
+SMOOTHING_RATE = 0.05
+"""Joint rate within which smooth friction changes its sign, rad/s or m/s."""
 OWN = "own"
 """The name of the controller of the person's own program."""
-TITLES = {
+CONTROLLER_TITLES = {
     OWN: "Your own",
     "pd": "PD of each joint",
     "pid": "PID of each joint",
@@ -27,42 +31,140 @@ TITLES = {
     "adaptive": "Adaptive",
     "lqr": "LQR",
 }
+SINE_AMPLITUDE = 0.3
+"""Range of a sine from end to end, rad and shares of the arm's reach; less where limits are near."""
+SINE_FREQUENCY = 0.25
+"""Frequency of a sine, Hz."""
+LIMIT_SHARE = 0.9
+"""Largest share of the way to a joint limit that a sine uses."""
+REST_TIME = 1.0
+"""Time that a repeated motion is held at either end, s."""
+
+Setpoints: TypeAlias = Callable[[float], tuple[Array, Array, Array]]
+"""Joint values, rates and accelerations to follow at a time in s, shape (n,) each."""
+
+
+class FrictionKind(StrEnum):
+    """The friction of the joints in a run."""
+
+    NONE = "none"
+    SMOOTH = "smooth"
+    STICTION = "stiction"
+
+
+class ReferenceKind(StrEnum):
+    """What a run follows."""
+
+    HOLD = "hold"
+    SINE = "sine"
+    MOTION = "motion"
+    TARGET = "target"
+    SLIDERS = "sliders"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is simulated."""
+    """What a run simulates.
+
+    Attributes
+    ----------
+    controller
+        Name of the controller: one of :data:`dhkit.control.CONTROLLERS`, or :data:`OWN`.
+    bandwidth, damping
+        Bandwidth, rad/s, and damping ratio that the controller's gains are tuned for.
+    friction
+        Friction of the joints.
+    payload
+        Mass at the tool, kg, that the controller does not know of.
+    compensate
+        Whether the controller compensates friction.
+    reference
+        What the run follows.
+    """
 
     controller: str = "computed-torque"
     bandwidth: float = 20.0
-    """rad/s."""
     damping: float = 1.0
-    friction: str = "none"
+    friction: FrictionKind = FrictionKind.NONE
     payload: float = 0.0
-    """kg at the tool, which the controller does not know of."""
     compensate: bool = False
-    reference: str = "hold"
+    reference: ReferenceKind = ReferenceKind.HOLD
 
-    def changed(self, request: str, data: dict[str, Any]) -> Settings:
-        """Return the settings with some of them changed.
+    def changed(self, given: Fields) -> Settings:
+        """Return the settings with the values of a request's fields in place of their own.
 
         Raises
         ------
         ValueError
-            A value that is none.
+            A value does not fit.
         """
-        fields = Fields(request, data, PARTS)
         return Settings(
-            fields.choice("controller", [*CONTROLLERS, OWN], self.controller),
-            fields.number("bandwidth", 0.1, 1000.0, self.bandwidth),
-            fields.number("damping", 0.01, 10.0, self.damping),
-            fields.choice("friction", FRICTIONS, self.friction),
-            fields.number("payload", 0.0, 1000.0, self.payload),
-            fields.flag("compensate", self.compensate),
-            fields.choice("reference", REFERENCES, self.reference),
+            given.choice("controller", [*CONTROLLERS, OWN], self.controller),
+            given.number("bandwidth", 0.1, 1000.0, self.bandwidth),
+            given.number("damping", 0.01, 10.0, self.damping),
+            FrictionKind(given.choice("friction", list(FrictionKind), self.friction)),
+            given.number("payload", 0.0, 1000.0, self.payload),
+            given.flag("compensate", self.compensate),
+            ReferenceKind(given.choice("reference", list(ReferenceKind), self.reference)),
         )
 
     @property
-    def model(self) -> Friction | None:
-        """The friction of the joints."""
-        return {"none": None, "smooth": Friction(SMOOTH), "stiction": Friction()}[self.friction]
+    def friction_model(self) -> Friction | None:
+        """The friction of the joints, as a simulation takes it."""
+        if self.friction is FrictionKind.NONE:
+            return None
+        return Friction(SMOOTHING_RATE) if self.friction is FrictionKind.SMOOTH else Friction()
+
+
+SETTING_NAMES = tuple(field.name for field in fields(Settings))
+
+
+def back_and_forth(motion: Trajectory, t: float, free: list[int]) -> tuple[Array, Array, Array]:
+    """Return the free joints' values, rates and accelerations, shape (k,) each, of a motion that is repeated.
+
+    The motion is held at its end, goes back the same way, is held again, and begins anew.
+
+    Parameters
+    ----------
+    motion
+        The motion, of n joints.
+    t
+        Time since the beginning, s.
+    free
+        The k joints, from 0.
+    """
+    half_period = motion.duration + REST_TIME
+    s = t % (2 * half_period)
+    returning = s >= half_period
+    if returning:
+        s -= half_period
+    time = min(s, motion.duration)
+    if returning:
+        time = motion.duration - time
+    if s >= motion.duration:
+        at_rest = np.zeros(len(free))
+        return motion.q(time)[free], at_rest, at_rest
+    sign = -1.0 if returning else 1.0
+    return motion.q(time)[free], sign * motion.qd(time)[free], motion.qdd(time)[free]
+
+
+def gentle_sine(arm: Arm, q: Array, free: list[int]) -> Sine:
+    """Return a sine of the k free joints that begins at rest, to the side on which there is more room.
+
+    Parameters
+    ----------
+    arm
+        The arm, of n joints.
+    q
+        Values of the free joints at the beginning, shape (k,), rad and m.
+    free
+        The free joints, from 0.
+    """
+    numbers = arm.description.numbers
+    size = np.where(numbers.prismatic, SINE_AMPLITUDE * arm.description.reach, SINE_AMPLITUDE)[free]
+    room_up, room_down = numbers.upper[free] - q, q - numbers.lower[free]
+    enough_room = room_up >= np.minimum(size, room_down)
+    up = np.clip(np.where(enough_room, np.minimum(size, LIMIT_SHARE * room_up), 0.0), 0.0, None)
+    down = np.clip(np.minimum(size, LIMIT_SHARE * room_down), 0.0, None)
+    amplitude = np.where(up > 0, up, -down) / 2
+    return Sine(q + amplitude, amplitude, SINE_FREQUENCY, -np.pi / 2)

@@ -16,9 +16,9 @@ from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
 
 TOKEN_LENGTH = 22
-"""Characters of a token."""
-LONGEST_TOKEN = 100
-"""Characters that are read where one is kept."""
+"""Length of a token, characters."""
+MAX_TOKEN_LENGTH = 100
+"""Characters that are read of a token's file."""
 
 
 def serve(
@@ -39,32 +39,32 @@ def serve(
     arm
         The arm.
     block
-        Whether to return only when it is interrupted (Ctrl-C); otherwise at once, with the lab running.
+        Whether to return only when the lab is interrupted (Ctrl-C); otherwise it returns at once, with the lab running.
     port
-        Where the page is, for pages that are to find it again after Python was started anew: its token is then kept
-        for this port, readable by this user alone. Any free port, and a new token, unless given.
+        Port of the page, for pages that are to find it again after Python was started anew: its token is then kept
+        for this port, in a file that this user alone can read. By default any free port, and a new token.
     open_browser
         Whether the page is opened in the default browser.
     own, sandbox
-        A program that is held against the arm, and what it runs in: see :class:`Lab`.
+        A program that is compared with the arm, and its sandbox: see :class:`Lab`.
     solid
-        An ``.stl`` file for the panel of transforms; a box unless given.
+        An ``.stl`` file for the panel of transforms; by default a box.
     assignment
-        Texts and goals about this arm: read, or the file.
+        Texts and goals about this arm, or the file that has them.
 
     Returns
     -------
     Lab
-        Running, or closed where it was waited for.
+        The lab: running, or closed after it was interrupted.
 
     Raises
     ------
     ModelError
-        The server did not start, or the place where a port's token is kept can be written by others.
+        The server did not start, or others can write where the port's token is kept.
     DescriptionError
         The assignment cannot be read, or is about another robot.
     ValueError
-        A port that is none for programs of users.
+        The port is not one of those for programs of users.
 
     Examples
     --------
@@ -76,41 +76,42 @@ def serve(
     """
     if port is not None and not 1024 <= port < 65_536:
         raise ValueError(f"port is {port}; expected 1024 to 65535")
-    given = Assignment.read(assignment) if isinstance(assignment, (str, Path)) else assignment
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox, solid, given)
-    if not block:
-        if open_browser:
-            webbrowser.open(lab.url)
-        return lab
+    if isinstance(assignment, (str, Path)):
+        assignment = Assignment.read(assignment)
+    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox, solid, assignment)
     try:
         if open_browser:
             webbrowser.open(lab.url)
-        while True:
+        while block:
             time.sleep(3600)
     except KeyboardInterrupt:
-        return lab
+        if not block:
+            raise
     finally:
-        lab.close()
+        if block:
+            lab.close()
+    return lab
 
 
 def kept_token(port: int) -> str:
-    """Return the token of a port, the same each time; made and kept with mode 0600 where there is none.
+    """Return the token of a port, the same each time; a new one is kept in a file of mode 0600.
 
     A token that others could have read or written is not used again: a new one takes its place.
 
     Raises
     ------
     ModelError
-        The folder for it is not this user's alone, or cannot be written.
+        The folder of tokens is not this user's alone, or cannot be written.
     """
-    folder = _state_folder()
+    home = os.environ.get("XDG_STATE_HOME")
+    folder = (Path(home) if home else Path.home() / ".local" / "state") / "dhkit"
     path = folder / f"lab-{port}.token"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if os.name == "posix" and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022):
             raise ModelError(f"{folder} can be written by others; expected a folder of this user's alone")
         if _is_private(path):
-            token = path.read_bytes()[:LONGEST_TOKEN].decode("ascii", errors="replace").strip()
+            token = path.read_bytes()[:MAX_TOKEN_LENGTH].decode("ascii", errors="replace").strip()
             if len(token) >= TOKEN_LENGTH and token.replace("-", "").replace("_", "").isalnum() and token.isascii():
                 return token
         token = secrets.token_urlsafe(16)
@@ -121,16 +122,11 @@ def kept_token(port: int) -> str:
 
 
 def _is_private(path: Path) -> bool:
-    """Whether a path is a file of this user's that nobody else may read or write."""
+    """Return whether a path is a file of this user's that nobody else may read or write."""
     try:
-        about = path.lstat()
+        status = path.lstat()
     except FileNotFoundError:
         return False
-    if not stat.S_ISREG(about.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return False
-    return os.name != "posix" or (about.st_uid == os.getuid() and not about.st_mode & 0o077)
-
-
-def _state_folder() -> Path:
-    home = os.environ.get("XDG_STATE_HOME")
-    return (Path(home) if home else Path.home() / ".local" / "state") / "dhkit"
+    return os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o077)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -14,21 +13,20 @@ from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError
 from dhkit.kinematics import classify
 from dhkit.lab.desk import Desk
-from dhkit.lab.fields import Fields
+from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.viewer.interactive import COLUMNS, table_texts
 
-MOST_STEPS = 200
-"""Of undo."""
-LARGEST = 1e4
-"""rad or m of an entry."""
+MAX_UNDO_STEPS = 200
+MAX_ENTRY = 1e4
+"""Largest entry of a table, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table as it is typed, and the last good arm that it meant."""
+    """A table as it is typed, and the last valid arm that it described."""
 
     texts: tuple[tuple[str, ...], ...]
-    """Of each row theta, d, a and alpha."""
+    """theta, d, a and alpha of each row."""
     description: Description
     errors: dict[tuple[int, int], str] = field(default_factory=dict)
     """What is wrong with an entry, by row and column."""
@@ -39,116 +37,112 @@ class Table:
         return cls(table_texts(description), description)
 
 
-class TablePanel:
+class TablePanel(Panel):
     """Requests ``table.…``."""
 
     def __init__(self, desk: Desk) -> None:
-        self.desk = desk
-        self._first = self._now = Table.of(desk.arm.description)
-        self._before: list[Table] = []
-        self._after: list[Table] = []
-        self._own = False
-        desk.changed.append(self._replaced)
+        super().__init__(desk)
+        self._first = self._table = Table.of(desk.arm.description)
+        self._undo: list[Table] = []
+        self._redo: list[Table] = []
+        self._is_replacing = False
+        """Whether this panel itself puts another arm on the desk."""
+        desk.on_replace.append(self._take_replaced_arm)
 
-    def edit(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Change an entry; an impossible one is marked and leaves the last good arm standing."""
-        fields = Fields("table.edit", data, ["row", "column", "text"])
-        row = fields.whole("row", 0, self.desk.arm.n - 1)
+    @answers("table.edit", "row", "column", "text")
+    def edit(self, fields: Fields) -> JsonObject:
+        """Change an entry; one that is not valid is marked, and the last valid arm stays."""
+        row = fields.integer("row", 0, self.desk.arm.n - 1)
         column = COLUMNS.index(fields.choice("column", COLUMNS))
-        text = typed(fields.text("text").strip())
-        texts = [list(entries) for entries in self._now.texts]
-        texts[row][column] = text
-        table = self._read(tuple(map(tuple, texts)), self._now.description)
+        texts = [list(entries) for entries in self._table.texts]
+        texts[row][column] = plain_expression(fields.text("text").strip())
+        table = self._read(tuple(map(tuple, texts)), self._table.description)
         self._take(table)
-        error = table.errors.get((row, column))
-        return {"error": error}
+        return {"error": table.errors.get((row, column))}
 
-    def convention(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("table.convention", "convention")
+    def set_convention(self, fields: Fields) -> None:
         """Read the same entries by another convention."""
-        name = Fields("table.convention", data, ["convention"]).choice("convention", [c.value for c in Convention])
-        description = _drawn(replace(self._now.description, convention=Convention(name)))
-        self._take(replace(self._now, description=description))
-        return {}
+        convention = Convention(fields.choice("convention", [c.value for c in Convention]))
+        description = _without_meshes(replace(self._table.description, convention=convention))
+        self._take(replace(self._table, description=description))
 
-    def undo(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Go back by one change."""
-        Fields("table.undo", data, [])
-        if not self._before:
+    @answers("table.undo")
+    def undo(self, _: Fields) -> None:
+        """Take the last change back."""
+        if not self._undo:
             raise ValueError("table.undo: nothing was changed")
-        self._after.append(self._now)
-        self._show(self._before.pop())
-        return {}
+        self._redo.append(self._table)
+        self._show(self._undo.pop())
 
-    def redo(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Make the change again that was gone back on."""
-        Fields("table.redo", data, [])
-        if not self._after:
+    @answers("table.redo")
+    def redo(self, _: Fields) -> None:
+        """Make the change again that was taken back last."""
+        if not self._redo:
             raise ValueError("table.redo: no change was gone back on")
-        self._before.append(self._now)
-        self._show(self._after.pop())
-        return {}
+        self._undo.append(self._table)
+        self._show(self._redo.pop())
 
-    def reset(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("table.reset")
+    def reset(self, _: Fields) -> None:
         """Go back to the arm that the lab was opened with; this too can be undone."""
-        Fields("table.reset", data, [])
         self._take(self._first)
-        return {}
 
-    def steps(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("table.steps", "row")
+    def elementary_steps(self, fields: Fields) -> JsonObject:
         """Return the frames between a row's four elementary transforms, in the world."""
-        row = Fields("table.steps", data, ["row"]).whole("row", 0, self.desk.arm.n - 1)
+        row = fields.integer("row", 0, self.desk.arm.n - 1)
         arm, q = self.desk.arm, self.desk.q
         T = arm.frames(q)[row]
         A = np.eye(4)
         steps = [{"title": f"frame {row}", "T": T.ravel().tolist()}]
-        for title, step in _elementary(arm.description, q, row):
+        for title, step in _elementary_transforms(arm.description, q, row):
             A = A @ step
             steps.append({"title": title, "T": (T @ A).ravel().tolist()})
         return {"steps": steps, "A": A.ravel().tolist()}
 
-    def download(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("table.download", "format")
+    def download(self, fields: Fields) -> JsonObject:
         """Return the arm as a robot file or a URDF."""
-        kind = Fields("table.download", data, ["format"]).choice("format", ("toml", "urdf"))
-        arm = self.desk.arm
+        kind, arm = fields.choice("format", ("toml", "urdf")), self.desk.arm
         return {"name": f"{arm.name}.{kind}", "text": to_toml(arm.description) if kind == "toml" else arm.urdf()}
 
     def publish(self) -> None:
-        """Tell the pages the table."""
-        table = self._now
+        """Send the table to the pages."""
+        table, first = self._table, self._first
         description = table.description
         numbers = description.numbers
+        rows = [
+            {"joint": joint.name, "kind": "R" if joint.is_revolute else "P", **dict(zip(COLUMNS, texts, strict=True))}
+            for joint, texts in zip(description.joints, table.texts, strict=True)
+        ]
+        errors = [{"row": row, "column": COLUMNS[k], "error": text} for (row, k), text in table.errors.items()]
+        same_convention = description.convention is first.description.convention
         self.desk.view.panel(
             "table",
             {
                 "convention": description.convention.value,
-                "rows": [
-                    {"joint": joint.name, "kind": "R" if joint.is_revolute else "P"}
-                    | dict(zip(COLUMNS, texts, strict=True))
-                    for joint, texts in zip(description.joints, table.texts, strict=True)
-                ],
-                "values": np.stack([numbers.theta, numbers.d, numbers.a, numbers.alpha], axis=1).tolist(),
-                "errors": [
-                    {"row": row, "column": COLUMNS[k], "error": text} for (row, k), text in table.errors.items()
-                ],
-                "undo": bool(self._before),
-                "redo": bool(self._after),
-                "changed": table.texts != self._first.texts
-                or description.convention is not self._first.description.convention,
+                "rows": rows,
+                "values": np.stack([getattr(numbers, name) for name in COLUMNS], axis=1).tolist(),
+                "errors": errors,
+                "undo": bool(self._undo),
+                "redo": bool(self._redo),
+                "changed": table.texts != first.texts or not same_convention,
                 "note": self._note(),
             },
         )
 
     def _note(self) -> str | None:
-        before, now = (classify(x).fit for x in (self._first.description, self._now.description))
-        if before is not None and now is None:
+        first_fit, fit = (classify(table.description).fit for table in (self._first, self._table))
+        if first_fit is not None and fit is None:
             return "this table has no closed form: the tool is followed by iteration"
-        meshes, drawn = (any(j.shapes for j in table.description.joints) for table in (self._first, self._now))
-        if meshes and not drawn:
+        had_shapes, has_shapes = (any(j.shapes for j in t.description.joints) for t in (self._first, self._table))
+        if had_shapes and not has_shapes:
             return "drawn from the table: the arm's meshes fit its own lengths alone"
         return None
 
     def _read(self, texts: tuple[tuple[str, ...], ...], last: Description) -> Table:
-        """Return a table of texts, with the last good arm where an entry is impossible."""
+        """Return the table of texts; where an entry is not valid, with the errors and the last valid arm."""
         errors: dict[tuple[int, int], str] = {}
         rows = []
         for i, entries in enumerate(texts):
@@ -161,88 +155,86 @@ class TablePanel:
             rows.append(values)
         if errors:
             return Table(texts, last, errors)
-        joints = tuple(
-            replace(joint, theta=x["theta"], d=x["d"], a=x["a"], alpha=x["alpha"], shapes=())
-            for joint, x in zip(last.joints, rows, strict=True)
-        )
         try:
+            joints = tuple(
+                replace(joint, theta=x["theta"], d=x["d"], a=x["a"], alpha=x["alpha"], shapes=())
+                for joint, x in zip(last.joints, rows, strict=True)
+            )
             description = replace(last, joints=joints)
             numbers = description.numbers
-            beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= LARGEST))
+            beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= MAX_ENTRY))
             if len(beyond):
-                return Table(texts, last, {(int(i), int(k)): f"{COLUMNS[k]}: beyond {LARGEST:g}" for k, i in beyond})
-            first = self._first.description  # whoever types the first arm's numbers again has it again, meshes and all
-            return Table(texts, first if description == _drawn(first) else description)
+                too_large = {(int(i), int(k)): f"{COLUMNS[k]}: beyond {MAX_ENTRY:g}" for k, i in beyond}
+                return Table(texts, last, too_large)
+            first = self._first.description  # who types the first arm's numbers again has it again, with its meshes
+            return Table(texts, first if description == _without_meshes(first) else description)
         except (DhkitError, ValueError) as error:
-            changed = [(i, k) for i, row in enumerate(texts) for k in range(4) if row[k] != self._now.texts[i][k]]
+            changed = [(i, k) for i, row in enumerate(texts) for k in range(4) if row[k] != self._table.texts[i][k]]
             return Table(texts, last, dict.fromkeys(changed or [(0, 0)], str(error)))
 
     def _take(self, table: Table) -> None:
-        self._before = [*self._before[1 - MOST_STEPS :], self._now]
-        self._after = []
+        """Show a table, as a change that can be undone."""
+        self._undo = [*self._undo[1 - MAX_UNDO_STEPS :], self._table]
+        self._redo = []
         self._show(table)
 
     def _show(self, table: Table) -> None:
-        same = table.description == self._now.description
-        before, self._now = self._now, table
-        if same:
-            self.publish()
-            return
-        self._own = True
-        arm = Arm(table.description)
-        try:
-            self.desk.replace(arm.with_uniform_links() if self.desk.assumed_bodies else arm)
-        except BaseException:
-            self._now = before
-            raise
-        finally:
-            self._own = False
+        previous, self._table = self._table, table
+        if table.description != previous.description:
+            self._is_replacing = True
+            arm = Arm(table.description)
+            try:
+                self.desk.replace(arm.with_uniform_links() if self.desk.assumed_bodies else arm)
+            except BaseException:
+                self._table = previous
+                raise
+            finally:
+                self._is_replacing = False
         self.publish()
 
-    def _replaced(self) -> None:
-        """Take an arm of the same table that has got other bodies; begin anew with any other."""
-        if self._own:
+    def _take_replaced_arm(self) -> None:
+        """Keep the table of an arm that has only got other bodies; begin anew with any other arm."""
+        if self._is_replacing:
             return
         table = Table.of(self.desk.arm.description)
-        if table.texts != self._now.texts:
-            self._first = self._now = table
-            self._before, self._after = [], []
+        if table.texts != self._table.texts:
+            self._first = self._table = table
+            self._undo, self._redo = [], []
         self.publish()
 
 
-def typed(text: str) -> str:
+def plain_expression(text: str) -> str:
     """Return an entry as expressions are written: 90° is 90*deg, π is pi, and a decimal comma a point.
 
-    Where something is called, as in ``atan2(1,2)``, a comma stands between values.
+    In a call such as ``atan2(1,2)`` a comma separates values, and stays.
     """
     plain = text.replace("°", "*deg").replace("π", "pi").replace("−", "-")
     return plain if "(" in plain else re.sub(r"(?<=\d),(?=\d)", ".", plain)
 
 
-def _drawn(description: Description) -> Description:
+def _without_meshes(description: Description) -> Description:
     """Return a description whose links are drawn from the table: meshes do not fit other lengths."""
-    joints = tuple(replace(joint, shapes=()) for joint in description.joints)
-    return replace(description, joints=joints)
+    return replace(description, joints=tuple(replace(joint, shapes=()) for joint in description.joints))
 
 
-def _elementary(description: Description, q: Array, row: int) -> list[tuple[str, Array]]:
-    """Return a row's four transforms in their order, with titles."""
+def _elementary_transforms(description: Description, q: Array, row: int) -> list[tuple[str, Array]]:
+    """Return a row's four transforms, shape (4, 4), m, in their order and with titles, at joint values, shape (n,)."""
     numbers = description.numbers
-    slides = bool(numbers.prismatic[row])
-    theta = float(numbers.theta[row] + (0.0 if slides else q[row]))
-    d = float(numbers.d[row] + (q[row] if slides else 0.0))
+    is_prismatic = bool(numbers.prismatic[row])
+    theta = float(numbers.theta[row] + (0.0 if is_prismatic else q[row]))
+    d = float(numbers.d[row] + (q[row] if is_prismatic else 0.0))
     a, alpha = float(numbers.a[row]), float(numbers.alpha[row])
-    about_z = (f"turn about z by {np.degrees(theta):.4g}°", turned(2, theta))
-    along_z = (f"move along z by {d:.4g} m", moved(2, d))
-    along_x = (f"move along x by {a:.4g} m", moved(0, a))
-    about_x = (f"turn about x by {np.degrees(alpha):.4g}°", turned(0, alpha))
+    about_z = (f"turn about z by {np.degrees(theta):.4g}°", rotation_about(2, theta))
+    along_z = (f"move along z by {d:.4g} m", translation_along(2, d))
+    along_x = (f"move along x by {a:.4g} m", translation_along(0, a))
+    about_x = (f"turn about x by {np.degrees(alpha):.4g}°", rotation_about(0, alpha))
     if description.convention is Convention.STANDARD:
         return [about_z, along_z, along_x, about_x]
     return [about_x, along_x, about_z, along_z]
 
 
-def turned(axis: int, angle: float) -> Array:
-    """Return a rotation about x, y or z (0, 1, 2), rad, shape (4, 4)."""
+def rotation_about(axis: int, angle: float) -> Array:
+    """Return a rotation by an angle, rad, about x, y or z (0, 1, 2), shape (4, 4)."""
     T = np.eye(4)
     i, j = [(1, 2), (2, 0), (0, 1)][axis]
     T[i, i] = T[j, j] = np.cos(angle)
@@ -250,8 +242,8 @@ def turned(axis: int, angle: float) -> Array:
     return T
 
 
-def moved(axis: int, length: float) -> Array:
-    """Return a translation along x, y or z (0, 1, 2), m, shape (4, 4)."""
+def translation_along(axis: int, length: float) -> Array:
+    """Return a translation by a length, m, along x, y or z (0, 1, 2), shape (4, 4)."""
     T = np.eye(4)
     T[axis, 3] = length
     return T

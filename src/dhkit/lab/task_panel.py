@@ -1,161 +1,156 @@
-"""The panel of an assignment: its texts, its goals, and which of them have been met."""
+"""The panel of an assignment: its texts, its goals, and which goals have been reached."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array, Description
-from dhkit.lab.assignment import Assignment, Goal, JointsAt, MotionBetween, OwnScore, ToolAt
+from dhkit.lab.assignment import Assignment, Condition, JointsAt, MotionBetween, OwnScore, ToolAt
 from dhkit.lab.desk import Desk
-from dhkit.lab.fields import Fields
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
-
-Place = tuple[int, int]
-"""Of a goal: its step and its number there, from 0."""
+from dhkit.lab.requests import Fields, Panel, answers
 
 
-class TaskPanel:
+class Place(NamedTuple):
+    """The place of a goal in an assignment, counted from 0."""
+
+    step: int
+    goal: int
+
+
+class TaskPanel(Panel):
     """Request ``task.reset``; goals are checked when a state is shown, a motion is made, or a program is scored.
 
-    A goal stays met once it was. A state counts as reached only after another one was shown: a goal that the arm
+    A goal stays reached once it was. A state counts as reached only after another state was shown: a goal that the arm
     begins in has to be left first.
     """
 
     def __init__(self, desk: Desk, motions: MotionPanel, own: OwnPanel, assignment: Assignment | None) -> None:
-        self.desk, self.motions, self.own, self.assignment = desk, motions, own, assignment
+        super().__init__(desk)
+        self.motions, self.own, self.assignment = motions, own, assignment
         self._lock = threading.Lock()
-        self._met: set[Place] = set()
+        self._reached: set[Place] = set()
         self._left: set[Place] = set()
-        """Goals of states that have been away from."""
+        """Goals that are states, and that the arm has been away from."""
         self._arm = desk.arm
-        self._same = True
-        """Whether the arm on show moves as the assignment's: its table may have been edited."""
+        self._is_assigned_arm = True
+        """Whether the arm on show moves as the assignment's arm: its table may have been edited."""
         if assignment is not None:
-            desk.shown.append(self._shown)
-            motions.changed.append(self._planned)
-            own.scored.append(self._scored)
+            desk.on_show.append(self._check_state)
+            motions.on_change.append(self._check_motion)
+            own.on_score.append(self._check_score)
 
-    def reset(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Forget which goals have been met."""
-        Fields("task.reset", data, [])
+    @answers("task.reset")
+    def reset(self, _: Fields) -> None:
+        """Forget which goals have been reached."""
         if self.assignment is None:
             raise ValueError("task.reset: there is no assignment; expected a lab that was opened with one")
         with self._lock:
-            self._met.clear()
+            self._reached.clear()
             self._left.clear()
-        self._shown(self.desk.q)
+        self._check_state(self.desk.q)
         self.publish()
-        return {}
 
     def publish(self) -> None:
-        """Tell the pages the assignment, and what has been met."""
+        """Send the assignment, and what has been reached, to the pages."""
         with self._lock:
             self.desk.view.panel("task", None if self.assignment is None else self._state(self.assignment))
 
-    def _state(self, assignment: Assignment) -> dict[str, Any]:
+    def _state(self, assignment: Assignment) -> dict[str, object]:
+        steps = [
+            {
+                "title": step.title,
+                "text": step.text,
+                "panel": step.panel,
+                "goals": [
+                    {"text": goal.text, "points": goal.points, "met": (i, j) in self._reached}
+                    for j, goal in enumerate(step.goals)
+                ],
+            }
+            for i, step in enumerate(assignment.steps)
+        ]
         return {
             "title": assignment.title,
             "panels": None if assignment.panels is None else list(assignment.panels),
-            "points": sum(goal.points for place, goal in self._goals() if place in self._met),
+            "points": sum(assignment.steps[place.step].goals[place.goal].points for place in sorted(self._reached)),
             "most": assignment.points,
             "note": self._note(),
-            "steps": [
-                {
-                    "title": step.title,
-                    "text": step.text,
-                    "panel": step.panel,
-                    "goals": [
-                        {"text": goal.text, "points": goal.points, "met": (i, j) in self._met}
-                        for j, goal in enumerate(step.goals)
-                    ],
-                }
-                for i, step in enumerate(assignment.steps)
-            ],
+            "steps": steps,
         }
 
     def _note(self) -> str | None:
-        if not self._same:
+        if not self._is_assigned_arm:
             return "The table was edited: goals count again after its Reset."
-        wants_program = any(isinstance(goal.condition, OwnScore) for _, goal in self._goals())
-        if wants_program and self.own.source is None:
+        if self.own.source is None and any(isinstance(condition, OwnScore) for _, condition in self._conditions()):
             return "Some goals ask for a program of your own: start the lab with --mine FILE."
         return None
 
-    def _goals(self) -> Iterator[tuple[Place, Goal]]:
-        steps = () if self.assignment is None else self.assignment.steps
-        for i, step in enumerate(steps):
+    def _conditions(self) -> Iterator[tuple[Place, Condition]]:
+        for i, step in enumerate(() if self.assignment is None else self.assignment.steps):
             for j, goal in enumerate(step.goals):
-                yield (i, j), goal
+                yield Place(i, j), goal.condition
 
-    def _open(self) -> list[tuple[Place, Goal]]:
-        """Return the goals that have not been met; none while the arm on show is not the assignment's."""
-        return [(place, goal) for place, goal in self._goals() if place not in self._met] if self._same else []
-
-    def _shown(self, q: Array) -> None:
-        """Check goals of poses and joint values at a state on show, shape (n,)."""
-        if self._watch_arm():
+    def _check_state(self, q: Array) -> None:
+        """Check goals of poses and joint values at a state on show, shape (n,), rad and m."""
+        if self._update_arm():
             self.publish()
-        found: set[Place] = set()
+        reached: set[Place] = set()
         with self._lock:
             T: Array | None = None
-            for place, goal in self._open():
-                if isinstance(goal.condition, ToolAt):
-                    T = self.desk.arm.fk(q) if T is None else T
-                    there = goal.condition.met(T)
-                elif isinstance(goal.condition, JointsAt):
-                    there = goal.condition.met(q)
-                else:
+            for place, condition in self._conditions() if self._is_assigned_arm else ():
+                if place in self._reached or not isinstance(condition, (ToolAt, JointsAt)):
                     continue
-                if not there:
+                if isinstance(condition, JointsAt):
+                    is_reached = condition.is_reached(q)
+                else:
+                    T = self.desk.arm.fk(q) if T is None else T
+                    is_reached = condition.is_reached(T)
+                if not is_reached:
                     self._left.add(place)
                 elif place in self._left:
-                    found.add(place)
-        self._take(found)
+                    reached.add(place)
+        self._take(reached)
 
-    def _planned(self) -> None:
+    def _check_motion(self) -> None:
         """Check goals of motions."""
         motion, excess = self.motions.motion, self.motions.excess
-        if motion is None:
-            return
-        with self._lock:
-            goals = [(place, goal.condition) for place, goal in self._open()]
-            found = {p for p, one in goals if isinstance(one, MotionBetween) and one.met(motion, excess)}
-        self._take(found)
+        if motion is not None and self._is_assigned_arm:
+            self._check(lambda goal: isinstance(goal, MotionBetween) and goal.is_reached(motion, excess))
 
-    def _scored(self, arm: Arm, report: Mapping[str, Any]) -> None:
+    def _check_score(self, arm: Arm, report: Mapping[str, object]) -> None:
         """Check goals of a program at its score beside an arm."""
-        if self.assignment is None or not moves_alike(arm.description, self.assignment.arm.description):
-            return
-        with self._lock:
-            goals = [(place, goal.condition) for place, goal in self._goals()]
-            found = {p for p, one in goals if isinstance(one, OwnScore) and p not in self._met and one.met(report)}
-        self._take(found)
+        if self.assignment is not None and moves_alike(arm.description, self.assignment.arm.description):
+            self._check(lambda goal: isinstance(goal, OwnScore) and goal.is_reached(report))
 
-    def _take(self, found: set[Place]) -> None:
-        if found:
+    def _check(self, is_reached: Callable[[Condition], bool]) -> None:
+        with self._lock:
+            reached = {place for place, goal in self._conditions() if place not in self._reached and is_reached(goal)}
+        self._take(reached)
+
+    def _take(self, reached: set[Place]) -> None:
+        if reached:
             with self._lock:
-                self._met |= found
+                self._reached |= reached
             self.publish()
 
-    def _watch_arm(self) -> bool:
-        """Compare an arm that has come in place of another with the assignment's; return whether that changed."""
-        arm, before = self.desk.arm, self._same
-        if arm is self._arm or self.assignment is None:
-            return False
-        self._arm = arm
-        self._same = moves_alike(arm.description, self.assignment.arm.description)
-        return self._same is not before
+    def _update_arm(self) -> bool:
+        """Compare an arm that has replaced another with the assignment's; return whether the result has changed."""
+        arm, was_assigned_arm = self.desk.arm, self._is_assigned_arm
+        if arm is not self._arm and self.assignment is not None:
+            self._arm = arm
+            self._is_assigned_arm = moves_alike(arm.description, self.assignment.arm.description)
+        return self._is_assigned_arm is not was_assigned_arm
 
 
-def moves_alike(one: Description, other: Description) -> bool:
-    """Return whether two arms have the same table, base, tool and limits; bodies may differ."""
-    if one.convention is not other.convention or one.kinds != other.kinds:
+def moves_alike(first: Description, second: Description) -> bool:
+    """Return whether two arms have the same table, base, tool and limits; their bodies may differ."""
+    if first.convention is not second.convention or first.kinds != second.kinds:
         return False
     names = ("theta", "d", "a", "alpha", "T_world_base", "T_last_tool", "lower", "upper", "velocity", "effort")
-    return all(np.array_equal(getattr(one.numbers, name), getattr(other.numbers, name)) for name in names)
+    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in names)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -14,84 +13,81 @@ from dhkit.kinematics import workspace
 from dhkit.kinematics.boundaries import boundaries
 from dhkit.kinematics.workspace import first_axis
 from dhkit.lab.desk import Desk
-from dhkit.lab.fields import LARGEST_JOINT_VALUE, Fields
-from dhkit.lab.jobs import Job, Jobs
+from dhkit.lab.jobs import Job, Jobs, JobState
+from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.viewer.overlays import heat_colors
 
-SAMPLES = 400_000
-"""Random states, of which a slice keeps a few in a hundred."""
-SHOWN = 10_000
-"""Points that are drawn at most: more are slow without a graphics processor."""
-THIN = 0.02
-"""Half the thickness of a slice, share of the arm's reach."""
-SAME = 1e-9
-"""m."""
-WRIST = 5
+SLICE_SAMPLES = 400_000
+"""Random states of which a slice keeps a few in a hundred."""
+MAX_POINTS = 10_000
+"""Largest number of points that are drawn: more are slow without a graphics processor."""
+HALF_THICKNESS = 0.02
+"""Half the thickness of a slice, as a share of the arm's reach."""
+SAME_PLACE = 1e-9
+"""Distances below this, m, count as none."""
+WRIST_FRAME = 5
 """Frame whose origin is the wrist's centre of an arm with six joints, in both conventions."""
 
 
-class WorkspacePanel:
+class WorkspacePanel(Panel):
     """Requests ``workspace.…``."""
 
-    def __init__(self, desk: Desk, lock: AbstractContextManager[Any]) -> None:
-        self.desk = desk
-        self._state: dict[str, Any] = {"kind": "none"}
-        self._jobs = Jobs(self._told, lock)
-        desk.changed.append(self._replaced)
+    def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
+        super().__init__(desk)
+        self._state: dict[str, object] = {"kind": "none"}
+        self._jobs = Jobs(self._publish_failure, lock)
+        desk.on_replace.append(self._forget)
 
-    def show(self, data: dict[str, Any]) -> dict[str, Any]:
+    @answers("workspace.show", "kind")
+    def show(self, fields: Fields) -> None:
         """Draw points that the tool reaches, or those in the vertical plane that it is in now."""
-        kind = Fields("workspace.show", data, ["kind"]).choice("kind", ("none", "points", "slice"))
+        kind = fields.choice("kind", ("none", "points", "slice"))
         self._jobs.cancel()
         if kind == "none":
             self.desk.view.points(None)
-            self._tell(kind="none", count=0, progress=None)
-            return {}
+            self._publish(kind="none", count=0, progress=None)
+            return
         arm, tool = self.desk.arm, self.desk.arm.fk(self.desk.q)[:3, 3]
-        self._tell(kind=kind, count=0, progress="sampling")
+        self._publish(kind=kind, count=0, progress="sampling")
 
-        def take(found: tuple[Array, Array, str]) -> None:
-            positions, colors, about = found
+        def take(cloud: tuple[Array, Array, str]) -> None:
+            positions, colors, about = cloud
             self.desk.view.points(positions, colors)
-            self._tell(kind=kind, count=len(positions), progress=None, about=about)
+            self._publish(kind=kind, count=len(positions), progress=None, about=about)
 
-        self._jobs.start("workspace", lambda job: _sampled(arm, tool if kind == "slice" else None, job), take)
-        return {}
+        self._jobs.start("workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take)
 
-    def read(self, data: dict[str, Any]) -> dict[str, Any]:
-        """Return how far the tool is from the boundary of what it reaches."""
+    @answers("workspace.read", "q")
+    def read(self, fields: Fields) -> JsonObject:
+        """Return how far the tool is from the boundary of its workspace."""
         arm = self.desk.arm
-        q = Fields("workspace.read", data, ["q"]).vector("q", arm.n, LARGEST_JOINT_VALUE)
-        found = boundary_distance(arm, q)
-        if found is None:
-            return {"distance": None, "boundary": None, "point": None}
-        distance, boundary, point = found
-        return {"distance": distance, "boundary": boundary, "point": point}
+        nearest = boundary_distance(arm, fields.joint_values("q", arm.n))
+        return dict(zip(("distance", "boundary", "point"), nearest or (None, None, None), strict=True))
 
     def publish(self) -> None:
-        """Tell the pages what is drawn."""
+        """Send what is drawn to the pages."""
         self.desk.view.panel("workspace", self._state)
 
     def close(self) -> None:
-        """End what runs."""
+        """End the job."""
         self._jobs.close()
 
-    def _tell(self, **state: Any) -> None:
+    def _publish(self, **state: object) -> None:
         self._state = state
         self.publish()
 
-    def _told(self, state: dict[str, Any] | None) -> None:
-        if state is not None and self._state["kind"] != "none" and state.get("error"):
-            self._tell(kind="none", count=0, progress=None, error=state["error"])
+    def _publish_failure(self, state: JobState | None) -> None:
+        if state is not None and state["error"] and self._state["kind"] != "none":
+            self._publish(kind="none", count=0, progress=None, error=state["error"])
 
-    def _replaced(self) -> None:
-        """Leave the points of another arm, which the view has taken away."""
+    def _forget(self) -> None:
+        """Forget the points of an arm that another has replaced; the view has taken them away."""
         self._jobs.cancel()
-        self._tell(kind="none", count=0, progress=None)
+        self._publish(kind="none", count=0, progress=None)
 
 
 def boundary_distance(arm: Arm, q: Array) -> tuple[float, str, str] | None:
-    """Return how far a state is from the nearest boundary of its arm's workspace, for a point that has one.
+    """Return how far a state is from the nearest boundary of its arm's workspace.
 
     Parameters
     ----------
@@ -103,75 +99,73 @@ def boundary_distance(arm: Arm, q: Array) -> tuple[float, str, str] | None:
     Returns
     -------
     tuple[float, str, str] | None
-        Distance, m; the boundary: outer, inner, shoulder, or the upper or lower end of a slide; and the point that it
-        bounds, such as ``wrist centre``.
-        None where the boundaries are not known in closed form. Limits of turning joints do not count.
+        The distance, m; the boundary: outer, inner, shoulder, or the upper or lower end of a slide; and the point that
+        it bounds, such as ``wrist centre``. None where the boundaries are not known in closed form. Limits of turning
+        joints do not count.
     """
-    found = _sections(arm.description)
-    if not found:
+    sections = _sections(arm.description)
+    if not sections:
         return None
-    axis, sections = found
-    frames = arm.frames(q)
-    best: tuple[float, str, str] | None = None
+    axis, frames, tool = first_axis(arm.description), arm.frames(q), arm.fk(q)
+    candidates: list[tuple[float, str, str]] = []
     for name, point, section in sections:
-        position = arm.fk(q)[:3, 3] if point == "tool" else frames[min(WRIST, arm.n), :3, 3]
-        place = _turned_in(position[None], axis)[0]
-        candidates = [(_from_line(place, section), name)]
-        heights = section[np.isfinite(section).all(axis=1)]
-        if len(heights) > 1 and np.ptp(heights[:, 0]) < SAME and np.ptp(heights[:, 1]) > SAME:
+        T = tool if point == "tool" else frames[min(WRIST_FRAME, arm.n)]
+        place = _about_axis(T[None, :3, 3], axis)[0]
+        candidates.append((_distance_from_line(place, section), name, point))
+        known = section[np.isfinite(section).all(axis=1)]
+        if len(known) > 1 and np.ptp(known[:, 0]) < SAME_PLACE and np.ptp(known[:, 1]) > SAME_PLACE:
             # The wall of a tube that a slide along axis 1 makes: it ends above and below.
-            ends = ((heights[:, 1].max(), "upper"), (heights[:, 1].min(), "lower"))
-            candidates += [(abs(place[1] - height), end) for height, end in ends]
-        for distance, boundary in candidates:
-            if np.isfinite(distance) and (best is None or distance < best[0]):
-                best = float(distance), boundary, point
-    return best
+            for height, end in ((known[:, 1].max(), "upper"), (known[:, 1].min(), "lower")):
+                candidates.append((float(abs(place[1] - height)), end, point))
+    return min((c for c in candidates if np.isfinite(c[0])), key=lambda c: c[0], default=None)
 
 
 @lru_cache(maxsize=8)
-def _sections(description: Description) -> tuple[Array, tuple[tuple[str, str, Array], ...]] | None:
-    """Return axis 1 and the boundaries as lines in a half-plane through it: distance from it and height, m."""
+def _sections(description: Description) -> tuple[tuple[str, str, Array], ...]:
+    """Return the name, the point and the section of each boundary; the section as distances from axis 1 and heights."""
     axis = first_axis(description)
-    lines = tuple((b.name, b.point, _turned_in(b.section, axis)) for b in boundaries(description))
-    return (axis, lines) if lines else None
+    return tuple((b.name, b.point, _about_axis(b.section, axis)) for b in boundaries(description))
 
 
-def _turned_in(points: Array, axis: Array) -> Array:
-    """Return the distance from an axis and the height along it of points, shape (k, 3), as shape (k, 2)."""
+def _about_axis(points: Array, axis: Array) -> Array:
+    """Return the distance from an axis and the height along it, shape (k, 2), m, of points, shape (k, 3), m."""
     local = (points - axis[:3, 3]) @ axis[:3, :3]
     return np.stack([np.hypot(local[:, 0], local[:, 1]), local[:, 2]], axis=1)
 
 
-def _from_line(point: Array, line: Array) -> float:
+def _distance_from_line(point: Array, line: Array) -> float:
     """Return the distance of a point, shape (2,), from a line through points, shape (k, 2), NaN between its pieces."""
     if len(line) == 0:
         return np.inf
     if len(line) == 1:
         return float(np.linalg.norm(point - line[0]))
-    start, way = line[:-1], np.diff(line, axis=0)
-    length = np.einsum("ij,ij->i", way, way)
+    start, segment = line[:-1], np.diff(line, axis=0)
+    length = np.einsum("ij,ij->i", segment, segment)
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.clip(np.where(length > 0, np.einsum("ij,ij->i", point - start, way) / length, 0.0), 0.0, 1.0)
-    distances = np.linalg.norm(start + share[:, None] * way - point, axis=1)
+        share = np.where(length > 0, np.einsum("ij,ij->i", point - start, segment) / length, 0.0)
+    distances = np.linalg.norm(start + np.clip(share, 0.0, 1.0)[:, None] * segment - point, axis=1)
     return float(np.nanmin(distances)) if np.isfinite(distances).any() else np.inf
 
 
-def _sampled(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, str]:
-    """Return points, colors and what they are: of all that is reached, or of the plane of axis 1 and a point."""
+def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, str]:
+    """Return positions, shape (N, 3), m, colors, shape (N, 3), and a remark: of points that the tool reaches.
 
-    def told(done: int, whole: int) -> None:
+    With ``through``, shape (3,), m, only points in the plane of axis 1 and that point are returned.
+    """
+
+    def report(done: int, whole: int) -> None:
         job.progress(f"{round(100 * done / whole)} %")
 
-    count = SHOWN if through is None else SAMPLES
-    space = workspace(arm.description, samples=count, progress=told)
-    shown = np.arange(len(space.positions))
+    count = MAX_POINTS if through is None else SLICE_SAMPLES
+    space = workspace(arm.description, samples=count, progress=report)
+    chosen = np.arange(len(space.positions))
     if through is not None:
         axis = first_axis(arm.description)
         local, towards = (space.positions - axis[:3, 3]) @ axis[:3, :3], (through - axis[:3, 3]) @ axis[:3, :3]
         angle = np.arctan2(towards[1], towards[0])
-        across = -np.sin(angle) * local[:, 0] + np.cos(angle) * local[:, 1]
-        shown = np.flatnonzero(np.abs(across) < THIN * max(arm.description.reach, 1e-9))[:SHOWN]
+        offset = -np.sin(angle) * local[:, 0] + np.cos(angle) * local[:, 1]
+        chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[:MAX_POINTS]
     about = "brighter: the tool moves more easily there"
     if space.assumed:
         about += "; assumed: " + ", ".join(space.assumed)
-    return space.positions[shown], heat_colors(space.manipulability[shown]), about
+    return space.positions[chosen], heat_colors(space.manipulability[chosen]), about

@@ -1,16 +1,15 @@
 """CAD assemblies as robots: parts exported in the READY pose, moved into the DH frames of their links.
 
-The export knows where every part stands in the assembly, and the table where every frame stands in that pose. So a
-vertex v of link i in assembly coordinates is (T_i^0)^-1 v in frame i (Cao 2011, steps 1, 2 and 4).
+The export gives the position of every part in the assembly, and the table the pose of every frame in the READY pose. So
+a vertex v of link i in assembly coordinates is (T_i^0)^-1 v in frame i (Cao 2011, steps 1, 2 and 4).
 """
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +19,6 @@ from dhkit.description import (
     Base,
     Description,
     Joint,
-    JointType,
     Mesh,
     Robot,
     Shape,
@@ -36,15 +34,16 @@ from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
-from dhkit.model.cad_units import UNITS, check_positions, check_size, far_from_axes, size_of, unit_of
+from dhkit.model.cad_units import UNITS, Assembly, check_positions, check_size, distant_part_warnings, unit_of
+from dhkit.model.robot_folder import MESHES, copy_files, mesh_paths, model_errors
 from dhkit.model.shape_inertia import convex_hull
 from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 from dhkit.model.urdf import urdf_text
 
-ROBOT, URDF, MESHES = "robot.toml", "robot.urdf", "meshes"
-FOREIGN_SIZE = (0.1, 20.0)
-"""Size of an assembly as a share of the arm's length, beyond which a stated unit is probably wrong."""
+ROBOT_FILE, URDF_FILE = "robot.toml", "robot.urdf"
+USUAL_SIZES = (0.1, 20.0)
+"""Size of an assembly as a share of the arm's length, outside of which a stated unit is probably wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,45 +51,43 @@ class CadImport:
     """An arm with the shapes of its CAD parts."""
 
     description: Description
-    """The table as it was, with the parts as shapes and what was stated of their masses as bodies."""
+    """The table as it was, with the parts as shapes and with bodies from the stated masses."""
     meshes: Mapping[int, TriangleMesh]
     """By link, in its DH frame, m; link 0 is the base, in frame 0."""
     notes: tuple[str, ...]
-    """What was found, chosen and changed, a line each."""
+    """Findings, choices and changes, a line each."""
 
     def write(self, directory: str | Path) -> tuple[Path, ...]:
         """Write ``robot.toml``, ``robot.urdf`` and ``meshes/``, all or nothing; return the files.
 
-        ``meshes/linkN.stl`` is what is seen, in single precision, ``meshes/linkN_hull.stl`` its convex hull, which the
-        URDF names for collisions.
+        ``meshes/linkN.stl`` is the visible shape, in single precision, ``meshes/linkN_hull.stl`` its convex hull,
+        which the URDF names for collisions.
 
         Raises
         ------
         ModelError
             The folder has content already, or cannot be written.
         """
-        target = Path(directory)
-        try:
-            if target.exists() and (not target.is_dir() or any(target.iterdir())):
-                what = "is not empty" if target.is_dir() else "is not a folder"
-                raise ModelError(f"{target} {what}; expected a new folder")
-            target.absolute().parent.mkdir(parents=True, exist_ok=True)
-            # Written beside it under another name and renamed: a folder that is there is whole.
-            with tempfile.TemporaryDirectory(dir=target.absolute().parent, prefix=f".{target.name}.") as holder:
-                made = Path(holder) / "made"
-                made.mkdir()
-                names = self._write_all(made)
-                if target.exists():
-                    target.rmdir()
-                made.replace(target)
-        except OSError as error:
-            raise ModelError(f"{error.filename or target}: {error.strerror or error}") from None
-        return tuple(target / name for name in names)
+        folder = Path(directory)
+        with model_errors(folder):
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                fault = "is not empty" if folder.is_dir() else "is not a folder"
+                raise ModelError(f"{folder} {fault}; expected a new folder")
+            folder.absolute().parent.mkdir(parents=True, exist_ok=True)
+            # Written under another name and renamed: a folder of this name is complete.
+            with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=f".{folder.name}.") as holder:
+                complete = Path(holder) / "made"
+                complete.mkdir()
+                names = self._write_files(complete)
+                if folder.exists():
+                    folder.rmdir()
+                complete.replace(folder)
+        return tuple(folder / name for name in names)
 
     def __repr__(self) -> str:
         triangles = sum(len(mesh.faces) for mesh in self.meshes.values())
-        said = f"shapes of {counted(len(self.meshes), 'link')}, {triangles} triangles"
-        return repr_line("CadImport", self.description.name, said)
+        text = f"shapes of {counted(len(self.meshes), 'link')}, {triangles} triangles"
+        return repr_line("CadImport", self.description.name, text)
 
     def _repr_html_(self) -> str:
         rows = [
@@ -100,50 +97,34 @@ class CadImport:
         table = html_table(("link", "triangles", "box around it [m]"), rows, align="rrl")
         return html_block(f"{self.description.name} from CAD", table, html_lines(self.notes))
 
-    def _write_all(self, folder: Path) -> list[str]:
-        (folder / MESHES).mkdir()
-        names, hulls = [ROBOT, URDF], {}
+    def _write_files(self, folder: Path) -> list[str]:
+        """Write all files; return their names. Meshes that the table had before, such as the tool's, are copied."""
+        description, hulls = self.description, dict[str, str]()
+        files: dict[str, bytes] = {}
         for link, mesh in self.meshes.items():
             name = _mesh_path(link)
-            write_atomically(
-                folder / name, binary_stl(f"link {link} of {self.description.name}, m, dhkit", mesh.corners)
-            )
-            names.append(name)
+            files[name] = binary_stl(f"link {link} of {description.name}, m, dhkit", mesh.corners)
             try:
                 hull = convex_hull(mesh)
-            except ModelError:  # flat: nothing that could be hit from the side
+            except ModelError:  # flat: collisions use the mesh itself
                 continue
             hulls[name] = name.replace(".stl", "_hull.stl")
-            content = binary_stl(f"hull of link {link} of {self.description.name}, m, dhkit", hull.corners)
-            write_atomically(folder / hulls[name], content)
-            names.append(hulls[name])
-        names += self._copy_others(folder, names)
-        write_robot(self.description, folder / ROBOT)
-        again = read_robot(folder / ROBOT)
-        text = urdf_text(again, mesh_path=lambda path: path, collision_path=lambda path: hulls.get(path, path))
-        write_atomically(folder / URDF, text)
-        return names
-
-    def _copy_others(self, folder: Path, taken: Sequence[str]) -> list[str]:
-        """Copy meshes that the table had before, such as the tool's, and that no part has replaced."""
-        description = self.description
-        shapes = [
-            *description.base.shapes,
-            *description.tool.shapes,
-            *(s for j in description.joints for s in j.shapes),
-        ]
-        copied: list[str] = []
-        for shape in shapes:
-            if not isinstance(shape.geometry, Mesh) or shape.geometry.path in (*taken, *copied):
-                continue
-            path = shape.geometry.path
-            source = inside(description.mesh_folder, path, "shape")
-            if source is not None and source.is_file():
-                place = folder / PurePosixPath(path)
-                place.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(source, place)
-                copied.append(path)
-        return copied
+            files[hulls[name]] = binary_stl(f"hull of link {link} of {description.name}, m, dhkit", hull.corners)
+        (folder / MESHES).mkdir()
+        for name, content in files.items():
+            write_atomically(folder / name, content)
+        others = {
+            path: inside(description.mesh_folder, path, "shape.mesh")
+            for path in mesh_paths(description)
+            if path not in files
+        }
+        copies = {path: file for path, file in others.items() if file is not None and file.is_file()}
+        copy_files(copies, folder)
+        write_robot(description, folder / ROBOT_FILE)
+        written = read_robot(folder / ROBOT_FILE)
+        text = urdf_text(written, mesh_path=lambda path: path, collision_path=lambda path: hulls.get(path, path))
+        write_atomically(folder / URDF_FILE, text)
+        return [ROBOT_FILE, URDF_FILE, *files, *copies]
 
 
 def import_cad(
@@ -187,26 +168,25 @@ def import_cad(
     Raises
     ------
     ModelError
-        A part that is missing, cannot be told or read, was moved on export, or whose unit is not clear: one line.
+        A part that is missing, cannot be assigned or read, was moved on export, or whose unit is not clear: one line.
     """
     folder, description = Path(folder), description_of(description)
     if unit is not None and unit not in UNITS:
         raise ModelError(f"unit is {unit[:20]!r}; expected one of {', '.join(UNITS)}")
     stated = StatedMasses.of(description.n, density, mass, [Path(report) for report in reports])
-    pose, pose_note = _pose(description, q)
-    frames = world_to_frames(description, pose)
-    parts, found_notes = cad_parts(folder, description.n, files=files, simplify=simplify)
+    pose, pose_note = _export_pose(description, q)
+    parts, parts_note = cad_parts(folder, description.n, files=files, simplify=simplify)
     check_positions({part.name: part.mesh for several in parts.values() for part in several}, str(folder))
-    standing, unit_note = _in_metres(folder, description, frames, parts, unit)
-    notes = [*found_notes, pose_note, unit_note, *stated.notes]
-
-    notes += far_from_axes(description, frames, standing)
+    assembly, unit_note, is_usual = _in_metres(folder, description, world_to_frames(description, pose), parts, unit)
+    notes = [parts_note, pose_note, unit_note if is_usual else f"warning: {unit_note}", *stated.notes]
+    notes += distant_part_warnings(assembly)
 
     meshes, bodies = {}, {}
+    to_frames, placed_meshes = [_rigid_inverse(T) for T in assembly.frames], dict(assembly.meshes)
+    del assembly  # frees the memory of each mesh once it is moved
     for link, several in parts.items():
-        T_frame_world = _inverse(frames[link])
-        own = [mesh.moved(T_frame_world) for mesh in standing.pop(link)]
-        bodies[link] = stated.body(link, own, T_frame_world)
+        own = [mesh.moved(to_frames[link]) for mesh in placed_meshes.pop(link)]
+        bodies[link] = stated.body(link, own, to_frames[link])
         if simplify is not None:
             own = [simplified(mesh, simplify, part.name) for mesh, part in zip(own, several, strict=True)]
         meshes[link] = joined_meshes(own)
@@ -214,31 +194,29 @@ def import_cad(
     for link in sorted((set(stated.masses) | set(stated.reports)) - set(parts)):
         if link in stated.masses:
             raise ModelError(f"{folder}: a mass of link {link}, which has no part")
-        bodies[link] = stated.body(link, [], _inverse(frames[link]))
+        bodies[link] = stated.body(link, [], to_frames[link])
     try:
-        made = _with_parts(description, meshes, bodies)
+        with_parts = _with_parts(description, meshes, bodies)
     except DescriptionError as error:
-        raise ModelError(f"{folder}: {error} ({unit_note.removeprefix('warning: ')})") from None
-    return CadImport(made, meshes, tuple(notes))
+        raise ModelError(f"{folder}: {error} ({unit_note})") from None
+    return CadImport(with_parts, meshes, tuple(notes))
 
 
-def _pose(description: Description, q: ArrayLike | None) -> tuple[Array, str]:
-    if q is not None:
-        given = joint_vector(description, q)
-        return given, f"pose of the export: as given{_joint_values(description, given)}"
+def _export_pose(description: Description, q: ArrayLike | None) -> tuple[Array, str]:
+    """Return the joint values in the pose of the export, shape (n,), and a note on their source."""
     ready = description.numbers.configurations.get("ready")
-    if ready is not None:
-        return ready, f"pose of the export: the configuration ready{_joint_values(description, ready)}"
-    return np.zeros(description.n), "pose of the export: all joint values 0 (the table has no configuration ready)"
+    if q is not None:
+        pose, source = joint_vector(description, q), "as given"
+    elif ready is not None:
+        pose, source = ready, "the configuration ready"
+    else:
+        return np.zeros(description.n), "pose of the export: all joint values 0 (the table has no configuration ready)"
+    joints = zip(description.joints, pose.tolist(), strict=True)
+    values = ", ".join(f"{x:.4g}" if joint.is_revolute else f"{x:.4g} m" for joint, x in joints)
+    return pose, f"pose of the export: {source}: q = {values}"
 
 
-def _joint_values(description: Description, q: Array) -> str:
-    kinds = zip(description.joints, q.tolist(), strict=True)
-    values = ", ".join(f"{x:.4g} m" if joint.type is JointType.PRISMATIC else f"{x:.4g}" for joint, x in kinds)
-    return f": q = {values}"
-
-
-def _inverse(T: Array) -> Array:
+def _rigid_inverse(T: Array) -> Array:
     inverse = np.eye(4)
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
@@ -246,42 +224,36 @@ def _inverse(T: Array) -> Array:
 
 
 def _in_metres(
-    folder: Path,
-    description: Description,
-    frames: Array,
-    parts: Mapping[int, Sequence[CadPart]],
-    unit: str | None,
-) -> tuple[dict[int, list[TriangleMesh]], str]:
-    """Return the meshes of each link in m, where they stand, and how their unit was found."""
-    without = {i: [part.mesh for part in several if part.unit is None] for i, several in parts.items()}
-    without = {i: meshes for i, meshes in without.items() if meshes}
-    stated = sorted({part.unit for several in parts.values() for part in several if part.unit is not None})
-    found = unit or (unit_of(description, frames, without, str(folder)) if without else "m")
-    standing = {i: [part.metres(unit, UNITS[found]) for part in several] for i, several in parts.items()}
-    listed = " and ".join(f"{one:g} m" for one in stated)
-    if unit is None and stated:
-        across = check_size(description, frames, standing, str(folder))
-        others = f"; {found} for the other files, found by size" if without else ""
-        return standing, f"unit: {listed}, as the files state it{others}: {across}"
-    size = size_of(standing)
-    across = f"the assembly is {size:.4g} m across, the arm {description.reach:.4g} m long"
+    folder: Path, description: Description, frames: Array, parts: Mapping[int, Sequence[CadPart]], unit: str | None
+) -> tuple[Assembly, str, bool]:
+    """Return the assembly with meshes in m, a note how their unit was found, and whether its size is usual."""
+    without_unit = {i: [part.mesh for part in several if part.unit is None] for i, several in parts.items()}
+    without_unit = {i: meshes for i, meshes in without_unit.items() if meshes}
+    file_units = sorted({part.unit for several in parts.values() for part in several if part.unit is not None})
+    found = unit or (unit_of(Assembly(description, frames, without_unit, str(folder))) if without_unit else "m")
+    meshes = {i: [part.in_metres(unit, found) for part in several] for i, several in parts.items()}
+    assembly = Assembly(description, frames, meshes, str(folder))
+    listed = " and ".join(f"{file_unit:g} m" for file_unit in file_units)
+    if unit is None and file_units:
+        check_size(assembly)
+        others = f"; {found} for the other files, found by size" if without_unit else ""
+        return assembly, f"unit: {listed}, as the files state it{others}: {assembly.sizes_text}", True
+    size, length = assembly.size, description.reach
+    sizes = f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
     if unit is None:
-        return standing, f"unit: {found}, found by size: {across}"
-    low, high = (share * description.reach for share in FOREIGN_SIZE)
-    odd = "" if low <= size <= high else "warning: "
-    over = f", for all files in place of the {listed} that files state" if any(o != UNITS[unit] for o in stated) else ""
-    return standing, f"{odd}unit: {unit}, as stated{over}: {across}"
+        return assembly, f"unit: {found}, found by size: {sizes}", True
+    is_usual = USUAL_SIZES[0] * length <= size <= USUAL_SIZES[1] * length
+    is_overridden = any(file_unit != UNITS[unit] for file_unit in file_units)
+    override = f", for all files in place of the {listed} that files state" if is_overridden else ""
+    return assembly, f"unit: {unit}, as stated{override}: {sizes}", is_usual
 
 
 def _link_note(link: int, parts: Sequence[CadPart], mesh: TriangleMesh, body: LinkBody | None) -> str:
-    names = ", ".join(part.name for part in parts)
-    said = f"link {link}: {names}, {len(mesh.faces)} triangles"
-    before = sum(len(part.mesh.faces) for part in parts)
-    if before > len(mesh.faces):
-        said += f" of {before}"
-    if body is None:
-        return said
-    return f"{said}, {body.properties.mass:.6g} kg; " + "; ".join(body.notes)
+    note = f"link {link}: {', '.join(part.name for part in parts)}, {len(mesh.faces)} triangles"
+    original = sum(len(part.mesh.faces) for part in parts)
+    if original > len(mesh.faces):
+        note += f" of {original}"
+    return note if body is None else f"{note}, {body.properties.mass:.6g} kg; {'; '.join(body.notes)}"
 
 
 def _mesh_path(link: int) -> str:
@@ -289,30 +261,30 @@ def _mesh_path(link: int) -> str:
 
 
 def _with_parts(
-    description: Description, meshes: Mapping[int, TriangleMesh], bodies: Mapping[int, LinkBody | None]
+    description: Description, meshes: Mapping[int, TriangleMesh], link_bodies: Mapping[int, LinkBody | None]
 ) -> Description:
-    """Return the description with new shapes and bodies; its numbers stay the expressions that they were."""
+    """Return the description with new shapes and bodies; the table keeps its expressions."""
     shapes = {i: (Shape(Mesh(_mesh_path(i)), color=mesh.colour),) for i, mesh in meshes.items()}
-    made = {i: body.properties.body() for i, body in bodies.items() if body is not None}
+    bodies = {i: body.properties.body() for i, body in link_bodies.items() if body is not None}
 
-    def changed(i: int, joint: Joint) -> Joint:
-        replaced = ({"shape"} if i in shapes else set()) | ({"body"} if i in made else set())
+    def with_part(i: int, joint: Joint) -> Joint:
+        replaced = {key for key, links in (("shape", shapes.keys()), ("body", bodies.keys())) if i in links}
         return replace(
             joint,
             shapes=shapes.get(i, joint.shapes),
-            bodies=(made[i],) if i in made else joint.bodies,
+            bodies=(bodies[i],) if i in bodies else joint.bodies,
             assumed=tuple(key for key in joint.assumed if key not in replaced),
         )
 
     old = description.base
-    base = Base(old.placement, shapes.get(0, old.shapes), made.get(0, old.body))
-    joints = tuple(changed(i, joint) for i, joint in enumerate(description.joints, start=1))
-    said = f"Shapes of links {_listed(shapes)}"
-    if made:
-        said += f" and bodies of links {_listed(made)}"
-    notes = "\n".join(text for text in (description.notes, f"{said} are from CAD parts (dhkit import-cad).") if text)
+    base = Base(old.placement, shapes.get(0, old.shapes), bodies.get(0, old.body))
+    joints = tuple(with_part(i, joint) for i, joint in enumerate(description.joints, start=1))
+    source = f"Shapes of links {_link_list(shapes)}"
+    if bodies:
+        source += f" and bodies of links {_link_list(bodies)}"
+    notes = "\n".join(text for text in (description.notes, f"{source} are from CAD parts (dhkit import-cad).") if text)
     return replace(description, joints=joints, base=base, notes=notes)
 
 
-def _listed(links: Iterable[int]) -> str:
+def _link_list(links: Iterable[int]) -> str:
     return ", ".join(map(str, sorted(links)))

@@ -1,4 +1,4 @@
-"""Which file of a CAD export belongs to which link: by the number in its name, or as the user states it."""
+"""Assignment of a CAD export's files to links: by the number in a file's name, or as the user states it."""
 
 from __future__ import annotations
 
@@ -6,118 +6,116 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.errors import DescriptionError, ModelError
 
 LEFT_OUT = -1
-"""The link that stands for none, where parts are mapped."""
-MOST_FILES = 500
-SHOWN = 12
-"""Names that a message lists."""
+"""Key of a mapping from links to parts for the parts that belong to no link."""
+MAX_FILES = 500
+MAX_LISTED_NAMES = 12
+"""Largest number of names that a message lists."""
 BASE = re.compile(r"(?<![a-z])(base|pedestal|foot|fixed)(?![a-z])", re.IGNORECASE)
-NUMBERED = re.compile(r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE)
+NUMBERED_LINK = re.compile(r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE)
 NUMBER = re.compile(r"(?<!\d)\d{1,3}(?!\d)")
 INSTANCE = re.compile(r"-\d+$")
-"""SolidWorks numbers the instances of a part: "Assem1 - Part2-1" is the first instance of Part2."""
+"""Number of an instance of a part in SolidWorks: "Assem1 - Part2-1" is the first instance of Part2."""
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """The names of parts for each link, 0 (the base) to n, and how they were found."""
+    """The names of parts for each link, 0 (the base) to n, and a note how they were assigned."""
 
     parts: Mapping[int, tuple[str, ...]]
     note: str
 
 
-def mesh_files(folder: Path) -> tuple[str, ...]:
-    """Return the names of a folder's mesh files, sorted; hidden files and folders within are not looked at.
+def mesh_file_names(folder: Path) -> tuple[str, ...]:
+    """Return the names of a folder's mesh files, sorted; hidden files and folders within are skipped.
 
     Raises
     ------
     ModelError
-        No such folder, more files than :data:`MOST_FILES`, or a link that leaves the folder.
+        No such folder, more files than :data:`MAX_FILES`, or a link that leaves the folder.
     """
     try:
         if not folder.is_dir():
             raise ModelError(f"{folder}: {'not a folder' if folder.exists() else 'no such folder'}")
-        names = sorted(path.name for path in folder.iterdir() if _is_seen(path) and path.suffix.lower() in MESH_FORMATS)
+        names = _visible_names(folder, MESH_FORMATS)
     except OSError as error:
         raise ModelError(f"{folder}: {error.strerror or error}") from None
-    if len(names) > MOST_FILES:
-        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {MOST_FILES}")
+    if len(names) > MAX_FILES:
+        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {MAX_FILES}")
     for name in names:
         file_inside(folder, name)
-    return tuple(names)
+    return names
 
 
-def _is_seen(path: Path) -> bool:
-    """Return whether a file is not hidden: macOS writes ._link1.stl beside link1.stl on foreign disks."""
-    return not path.name.startswith(".")
+def _visible_names(folder: Path, suffixes: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of a folder's files by suffix; macOS writes hidden ._link1.stl beside link1.stl."""
+    names = (path.name for path in folder.iterdir() if path.suffix.lower() in suffixes)
+    return tuple(sorted(name for name in names if not name.startswith(".")))
 
 
 def mat_file(folder: Path) -> Path | None:
-    """Return the only MAT file of a folder that has no mesh files; None where there is none or several.
+    """Return the only MAT file of a folder that has no mesh files; None if there is none or several.
 
     Raises
     ------
     ModelError
         A link that leaves the folder.
     """
-    if not folder.is_dir() or mesh_files(folder):
+    if not folder.is_dir() or mesh_file_names(folder):
         return None
-    found = sorted(path for path in folder.iterdir() if _is_seen(path) and path.suffix.lower() == ".mat")
-    return file_inside(folder, found[0].name) if len(found) == 1 else None
+    names = _visible_names(folder, [".mat"])
+    return file_inside(folder, names[0]) if len(names) == 1 else None
 
 
 def file_inside(folder: Path, name: str) -> Path:
-    """Return the file that a name means inside a folder.
+    """Return the file of a name inside a folder.
 
     Raises
     ------
     ModelError
-        The name is absolute, a URL, or leaves the folder, by a link too.
+        The name is absolute, a URL, or leaves the folder, also by a symbolic link.
     """
     try:
-        file = inside(folder, name, "part")
+        return cast("Path", inside(folder, name, "a part", "the folder"))
     except DescriptionError as error:
-        raise ModelError(
-            f"{folder}: {error}".replace("part.mesh", "a part").replace("robot's folder", "folder")
-        ) from None
-    if file is None:
-        raise ModelError(f"{folder}: no folder")
-    return file
+        raise ModelError(f"{folder}: {error}") from None
 
 
 def link_number(name: str) -> int | None:
-    """Return the number that a part's name carries, 0 for a base, None where there is none or several.
+    """Return the link's number in a part's name, 0 for a base, None if there is none or several.
 
     Examples
     --------
     >>> link_number("PUMA560 assembly - link3-1"), link_number("base"), link_number("part 4"), link_number("arm")
     (3, 0, 4, None)
     """
-    last = name.rsplit(" - ", 1)[-1]
-    if NUMBER.search(INSTANCE.sub("", last)) or BASE.search(INSTANCE.sub("", last)):
-        last = INSTANCE.sub("", last)
-    if BASE.search(last.replace("_", " ")):
+    name = name.rsplit(" - ", 1)[-1]
+    without_instance = INSTANCE.sub("", name)
+    if NUMBER.search(without_instance) or BASE.search(without_instance):
+        name = without_instance
+    if BASE.search(name.replace("_", " ")):
         return 0
-    named = {int(number) for number in NUMBERED.findall(last)} or {int(number) for number in NUMBER.findall(last)}
-    return named.pop() if len(named) == 1 else None
+    numbers = set(map(int, NUMBERED_LINK.findall(name))) or set(map(int, NUMBER.findall(name)))
+    return numbers.pop() if len(numbers) == 1 else None
 
 
-def assigned(
+def assign_parts(
     names: Sequence[str], links: int, stated: Mapping[int, Sequence[str]] | None, where: str, *, suffixes: bool = True
 ) -> Assignment:
     """Return the parts of each link, 0 to ``links``.
 
-    Numbers are those of the table, 0 or "base" for the part that stands still. Where there is none, n + 1 parts that
-    are numbered 1 to n + 1 are taken as the course does: part 1 is the base.
+    Numbers are those of the table, 0 or "base" for the part that does not move. If no part has number 0, n + 1 parts
+    that are numbered 1 to n + 1 are taken as in the course: part 1 is the base.
 
     Parameters
     ----------
     names
-        What there is: files' or variables' names.
+        Names of the files or variables.
     links
         Number of joints n.
     stated
@@ -131,53 +129,49 @@ def assigned(
     Raises
     ------
     ModelError
-        A name without a number, two of one number, or a link without a part; lists what was found.
+        A name without a number, two of one number, or a link without a part; lists the names.
     """
     stated = dict(stated or {})
     _check_stated(stated, names, links, where)
     left_out = tuple(stated.pop(LEFT_OUT, ()))
     names = [name for name in names if name not in left_out]
-    taken = {name for several in stated.values() for name in several}
-    numbers: dict[int, list[str]] = {}
-    nameless = []
-    for name in names:
-        if name in taken:
-            continue
-        number = link_number(Path(name).stem if suffixes else name)
-        if number is None:
-            nameless.append(name)
-        else:
-            numbers.setdefault(number, []).append(name)
+    mapped = {name for several in stated.values() for name in several}
+    numbers = {name: link_number(Path(name).stem if suffixes else name) for name in names if name not in mapped}
     first = names[0] if names else "forearm.stl"
-    found_names = f"; found {_listed(names)}; "
-    hint = f'{found_names}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
-    if nameless:
-        raise ModelError(f"{where}: no single link number in {_listed(nameless)}{hint}")
-    for number, doubled in numbers.items():
-        if len(doubled) > 1:
+    found = f"; found {_name_list(names)}; "
+    hint = f'{found}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
+    if without_number := [name for name, number in numbers.items() if number is None]:
+        raise ModelError(f"{where}: no single link number in {_name_list(without_number)}{hint}")
+    parts: dict[int, tuple[str, ...]] = {}
+    for name, number in numbers.items():
+        if number is not None:
+            parts[number] = (*parts.get(number, ()), name)
+    for number, several in parts.items():
+        if len(several) > 1:
             raise ModelError(
-                f"{where}: {_listed(doubled)} have the same link number{found_names}if all are of that link, "
-                f'--map "{number}={",".join(doubled[:SHOWN])}"; --map "-={doubled[-1]}" leaves a part out'
+                f"{where}: {_name_list(several)} have the same link number{found}if all are of that link, "
+                f'--map "{number}={",".join(several[:MAX_LISTED_NAMES])}"; --map "-={several[-1]}" leaves a part out'
             )
     note = "parts by the numbers in their names"
-    if 0 not in numbers and not stated and set(numbers) == set(range(1, links + 2)):
-        numbers = {number - 1: several for number, several in numbers.items()}
+    if 0 not in parts and not stated and set(parts) == set(range(1, links + 2)):
+        parts = {number - 1: several for number, several in parts.items()}
         note = f"parts numbered 1 to {links + 1}: part 1 is the base, part 2 link 1, and so on"
-    found = {number: tuple(several) for number, several in numbers.items()}
-    if clash := sorted(set(found) & set(stated)):
-        raise ModelError(f"{where}: link {clash[0]} is mapped, and {_listed(found[clash[0]])} has its number too{hint}")
-    found |= {number: tuple(several) for number, several in stated.items()}
-    if beyond := sorted(number for number in found if not 0 <= number <= links):
+    if both := sorted(set(parts) & set(stated)):
         raise ModelError(
-            f"{where}: {_listed(found[beyond[0]])} for link {beyond[0]}; the table has links 0 to {links}{hint}"
+            f"{where}: link {both[0]} is mapped, and {_name_list(parts[both[0]])} has its number too{hint}"
         )
-    if missing := [number for number in range(1, links + 1) if number not in found]:
+    parts |= {number: tuple(several) for number, several in stated.items()}
+    if beyond := sorted(number for number in parts if not 0 <= number <= links):
+        raise ModelError(
+            f"{where}: {_name_list(parts[beyond[0]])} for link {beyond[0]}; the table has links 0 to {links}{hint}"
+        )
+    if missing := [number for number in range(1, links + 1) if number not in parts]:
         raise ModelError(f"{where}: no part for link{'s' * (len(missing) > 1)} {', '.join(map(str, missing))}{hint}")
-    if not found.get(0):
+    if not parts.get(0):
         note += "; no base part"
     if left_out:
-        note += f"; left out: {_listed(left_out)}"
-    return Assignment({number: parts for number, parts in sorted(found.items()) if parts}, note)
+        note += f"; left out: {_name_list(left_out)}"
+    return Assignment({number: several for number, several in sorted(parts.items()) if several}, note)
 
 
 def _check_stated(stated: Mapping[int, Sequence[str]], names: Sequence[str], links: int, where: str) -> None:
@@ -187,13 +181,12 @@ def _check_stated(stated: Mapping[int, Sequence[str]], names: Sequence[str], lin
             raise ModelError(f"{where}: the mapping names link {number}; the table has links 0 to {links}")
         for name in several:
             if name not in names:
-                raise ModelError(f"{where}: the mapping names {name[:80]!r}; found {_listed(names)}")
+                raise ModelError(f"{where}: the mapping names {name[:80]!r}; found {_name_list(names)}")
             if name in seen:
                 raise ModelError(f"{where}: the mapping names {name[:80]!r} twice")
             seen.add(name)
 
 
-def _listed(names: Iterable[str]) -> str:
-    listed = [name[:60] for name in names]
-    more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
-    return (", ".join(listed[:SHOWN]) + more) or "nothing"
+def _name_list(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+    return (", ".join(name[:60] for name in names[:MAX_LISTED_NAMES]) + more) or "nothing"

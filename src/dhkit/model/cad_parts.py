@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.errors import ModelError
-from dhkit.model.cad_files import assigned, file_inside, mat_file, mesh_files
+from dhkit.model.cad_files import assign_parts, file_inside, mat_file, mesh_file_names
 from dhkit.model.cad_units import UNITS
 from dhkit.model.collada import collada_unit
 from dhkit.model.mat_parts import mat_parts
@@ -19,11 +19,13 @@ from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
 
 MAX_CAD_BYTES = 600_000_000
+"""Largest file of a part, in bytes."""
 MAX_CAD_TRIANGLES = 200_000
-"""Of a file without ``simplify``: seven of them are drawn well by a browser."""
+"""Largest number of triangles of a part without ``simplify``: a browser draws seven such parts well."""
 MAX_READ_TRIANGLES = 6_000_000
-"""Of a file that is simplified."""
-FEWEST = 4
+"""Largest number of triangles of a part that is simplified."""
+MIN_TRIANGLES = 4
+"""Smallest number of triangles that a part may be simplified to."""
 
 log = logging.getLogger(__name__)
 
@@ -33,21 +35,21 @@ class CadPart:
     """A mesh of a link as it was exported."""
 
     name: str
-    """The file's, or the variable's of a MAT file."""
+    """The file's name, or the variable's of a MAT file."""
     mesh: TriangleMesh
     unit: float | None = None
-    """What its file states as its unit, m, as COLLADA files can; then the mesh is in m. None: in the file's unit."""
+    """The unit that its file states, m, as COLLADA files can; then the mesh is in m. None: in the file's unit."""
 
-    def metres(self, unit: str | None, found: float) -> TriangleMesh:
+    def in_metres(self, stated_unit: str | None, found_unit: str) -> TriangleMesh:
         """Return the mesh in m: by the unit that the user states for all files, by its own, or by the one found."""
-        if unit is not None:
-            return self.mesh.scaled(UNITS[unit] / (self.unit or 1.0))
-        return self.mesh.scaled(found if self.unit is None else 1.0)
+        if stated_unit is not None:
+            return self.mesh.scaled(UNITS[stated_unit] / (self.unit or 1.0))
+        return self.mesh.scaled(UNITS[found_unit] if self.unit is None else 1.0)
 
 
 def cad_parts(
     folder: Path, links: int, *, files: Mapping[int, Sequence[str]] | None = None, simplify: int | None = None
-) -> tuple[dict[int, tuple[CadPart, ...]], tuple[str, ...]]:
+) -> tuple[dict[int, tuple[CadPart, ...]], str]:
     """Read the parts of an assembly.
 
     Parameters
@@ -57,45 +59,45 @@ def cad_parts(
     links
         Number of joints n.
     files
-        Names of files by link; those that are not named here are found by the numbers in their names.
+        Names of files by link; other files are assigned by the numbers in their names.
     simplify
         Whether files over :data:`MAX_CAD_TRIANGLES` are read at all; they are reduced later, by :func:`simplified`.
 
     Returns
     -------
     tuple
-        Parts by link, 0 to n, and notes on how they were found.
+        Parts by link, 0 to n, and a note how they were assigned.
 
     Raises
     ------
     ModelError
-        See :func:`dhkit.model.cad_files.assigned` and :func:`dhkit.model.mesh_reader.read_mesh`; a file with too many
-        triangles, which is told from its header.
+        See :func:`dhkit.model.cad_files.assign_parts` and :func:`dhkit.model.mesh_reader.read_mesh`; a file with too
+        many triangles, judged by its header.
     """
-    if simplify is not None and simplify < FEWEST:
-        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {FEWEST} at least")
-    named = folder.suffix.lower() == ".mat" and not folder.is_dir()
-    mat = folder if named else mat_file(folder)
+    if simplify is not None and simplify < MIN_TRIANGLES:
+        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {MIN_TRIANGLES} at least")
+    is_mat = folder.suffix.lower() == ".mat" and not folder.is_dir()
+    mat = folder if is_mat else mat_file(folder)
     if mat is not None:
         meshes = mat_parts(mat)
-        found = assigned(tuple(meshes), links, files, str(mat), suffixes=False)
+        assignment = assign_parts(tuple(meshes), links, files, str(mat), suffixes=False)
         for name, mesh in meshes.items():
-            _check_budget(f"{mat}: {name}", len(mesh.faces), simplify)
-        parts = {i: tuple(CadPart(name, meshes[name]) for name in names) for i, names in found.parts.items()}
-        return parts, (found.note,)
-    names = mesh_files(folder)
-    if not names:
-        raise ModelError(f"{folder}: no mesh files; expected .stl, .obj, .ply or .dae files, or one .mat file")
-    found = assigned(names, links, files, str(folder))
-    chosen = {name: file_inside(folder, name) for several in found.parts.values() for name in several}
-    for path in chosen.values():  # all headers before the first file is read
-        _check_budget(str(path), mesh_header(path, MAX_CAD_BYTES).triangles or 0, simplify)
-    most = MAX_CAD_TRIANGLES if simplify is None else MAX_READ_TRIANGLES
-    read = {name: CadPart(name, _read(path, most), _unit(path)) for name, path in chosen.items()}
-    return {i: tuple(read[name] for name in several) for i, several in found.parts.items()}, (found.note,)
+            _check_count(f"{mat}: {name}", len(mesh.faces), simplify)
+        parts = {name: CadPart(name, mesh) for name, mesh in meshes.items()}
+    else:
+        names = mesh_file_names(folder)
+        if not names:
+            raise ModelError(f"{folder}: no mesh files; expected .stl, .obj, .ply or .dae files, or one .mat file")
+        assignment = assign_parts(names, links, files, str(folder))
+        paths = {name: file_inside(folder, name) for several in assignment.parts.values() for name in several}
+        for path in paths.values():  # all headers before the first file is read
+            _check_count(str(path), mesh_header(path, MAX_CAD_BYTES).triangles or 0, simplify)
+        max_triangles = MAX_CAD_TRIANGLES if simplify is None else MAX_READ_TRIANGLES
+        parts = {name: _read_part(name, path, max_triangles) for name, path in paths.items()}
+    return {i: tuple(parts[name] for name in several) for i, several in assignment.parts.items()}, assignment.note
 
 
-def _check_budget(where: str, count: int, simplify: int | None) -> None:
+def _check_count(where: str, count: int, simplify: int | None) -> None:
     if simplify is None and count > MAX_CAD_TRIANGLES:
         raise ModelError(
             f"{where}: {count} triangles; expected at most {MAX_CAD_TRIANGLES}; export it more coarsely, or reduce "
@@ -105,19 +107,15 @@ def _check_budget(where: str, count: int, simplify: int | None) -> None:
         raise ModelError(f"{where}: {count} triangles; expected at most {MAX_READ_TRIANGLES}, even to simplify")
 
 
-def _unit(path: Path) -> float | None:
-    """Return the unit that a file which was read states, m; of all formats only COLLADA can."""
-    return collada_unit(path.read_bytes()) if path.suffix.lower() == ".dae" else None
-
-
-def _read(path: Path, most: int) -> TriangleMesh:
+def _read_part(name: str, path: Path, max_triangles: int) -> CadPart:
     started = time.perf_counter()
-    mesh = read_mesh(path, max_triangles=most, max_bytes=MAX_CAD_BYTES).merged()
+    mesh = read_mesh(path, max_triangles=max_triangles, max_bytes=MAX_CAD_BYTES).merged()
     if not len(mesh.faces):
         raise ModelError(f"{path}: no triangles with three different corners")
-    if (took := time.perf_counter() - started) > 1:
-        log.info("read %s: %d triangles, %.1f s", path.name, len(mesh.faces), took)
-    return mesh
+    if (duration := time.perf_counter() - started) > 1:
+        log.info("read %s: %d triangles, %.1f s", path.name, len(mesh.faces), duration)
+    # Of all formats only COLLADA states its unit.
+    return CadPart(name, mesh, collada_unit(path.read_bytes()) if path.suffix.lower() == ".dae" else None)
 
 
 def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
@@ -136,7 +134,7 @@ def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
         raise ModelError(f"simplifying needs fast-simplification ({error}); pip install fast-simplification") from None
     started = time.perf_counter()
     log.info("simplifying %s: %d triangles to %d ...", name, len(mesh.faces), count)
-    # In shares of the size: collapses are ordered by distances in single precision.
+    # Relative to the mesh's size: collapses are ordered by distances in single precision.
     size, middle = mesh.size or 1.0, mesh.bounds.mean(axis=0)
     points = ((mesh.vertices - middle) / size).astype(np.float32)
     vertices, faces = fast_simplification.simplify(points, mesh.faces.astype(np.int32), target_count=count)

@@ -1,43 +1,110 @@
-"""What coordinates of a CAD export mean: their unit, found by size, and whether each part was moved on export."""
+"""Coordinates of a CAD export: their unit, chosen by size, and whether each part was moved on export."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.description.frames import carrying
 from dhkit.errors import ModelError
-from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.model.triangle_mesh import TriangleMesh, common_bounds
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-SMALLEST, LARGEST = 0.25, 6.0
-"""Diagonal of the box around an arm in its READY pose, as a share of its length, the sum of |a| and |d|."""
-AT_ORIGIN = 1e-5
-"""Distance from the origin to the corner of a part that was moved there, share of its size: texts have six digits."""
-NEAR = 0.05
-"""How far the axes of the joints pass the boxes around their links, on average, as a share of the arm's length."""
-CLEARER = 2.0
-"""The second best unit must miss the axes by this factor more."""
-WIDEST = (0.05, 40.0)
-"""Sizes as for SMALLEST and LARGEST, of a small arm on a large base too, at which the axes can speak for a unit."""
-FAR = 0.1
-"""How far a joint's axis may pass the box around a link of it without a warning, as a share of the arm's length."""
-FEWEST_AXES = 2
-"""Joints from which on axes decide: one axis through the origin passes a part of any size."""
+"""Length units by name, m."""
+SIZE_RANGE = (0.25, 6.0)
+"""Smallest and largest plausible size of an assembly, as a share of the arm's length.
+
+The size is the diagonal of the box around the assembly in the pose of the export; the length sums |a| and |d|."""
+WIDE_SIZE_RANGE = (0.05, 40.0)
+"""Sizes, likewise, of a small arm on a large base, at which the joints' axes can still decide for a unit."""
+CORNER_TOLERANCE = 1e-5
+"""Distance of a part's lowest corner from the origin, as a share of its size, if it was moved there on export.
+
+Text files have six digits."""
+MAX_MEAN_AXIS_DISTANCE = 0.05
+"""Largest mean distance of the joints' axes from their links' boxes in the right unit, as a share of the arm's length."""
+MIN_DISTANCE_RATIO = 2.0
+"""In the second best unit the axes must be this many times farther from the boxes than in the best."""
+MAX_AXIS_DISTANCE = 0.1
+"""Largest distance of an axis from a link's box without a warning, as a share of the arm's length."""
+MIN_DECISIVE_AXES = 2
+"""Joints that are needed to decide by axes: one axis through the origin passes through a part of any size."""
 AXIS_POINTS = 401
+"""Number of points of an axis whose distances from a box are computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """An arm in the pose of the export, and the meshes of its links in assembly coordinates.
+
+    Attributes
+    ----------
+    description
+        The arm.
+    frames
+        DH frames 0 to n in the world, shape (n + 1, 4, 4), m.
+    meshes
+        Meshes of each link, all in one unit.
+    where
+        Folder, for messages.
+    """
+
+    description: Description
+    frames: Array
+    meshes: Mapping[int, Sequence[TriangleMesh]]
+    where: str
+
+    @property
+    def arm_length(self) -> float:
+        """The arm's length in this pose, m; a prismatic joint without limits may be extended far beyond the reach."""
+        steps = np.linalg.norm(np.diff(self.frames[:, :3, 3], axis=0), axis=1)
+        return max(self.description.reach, float(steps.sum()))
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the box around all meshes, in their unit."""
+        low, high = common_bounds(mesh for meshes in self.meshes.values() for mesh in meshes)
+        return float(np.linalg.norm(high - low))
+
+    @property
+    def sizes_text(self) -> str:
+        """The sizes of assembly and arm, for meshes in m."""
+        return f"the assembly is {self.size:.4g} m across, the arm {self.arm_length:.4g} m long"
+
+    def axis_distances(self, metres: float) -> dict[tuple[int, int], float]:
+        """Return the distance of each joint's axis from the boxes of its two links, m, by joint and link.
+
+        ``metres`` is the meshes' unit, m.
+        """
+        along = np.linspace(-2, 2, AXIS_POINTS) * self.description.reach
+        distances = {}
+        for joint, frame in enumerate(carrying(self.description.convention, self.frames), start=1):
+            points = frame[:3, 3] + along[:, None] * frame[:3, 2]
+            for link in (joint - 1, joint):
+                if meshes := self.meshes.get(link):
+                    low, high = (metres * bound for bound in common_bounds(meshes))
+                    outside = np.maximum(np.maximum(low - points, points - high), 0)
+                    distances[joint, link] = float(np.linalg.norm(outside, axis=1).min())
+        return distances
+
+    def mean_axis_distance(self, metres: float) -> float:
+        """Return the mean of :meth:`axis_distances`, m; infinite if there are none."""
+        distances = self.axis_distances(metres)
+        return float(np.mean(list(distances.values()))) if distances else np.inf
 
 
 def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
-    """Refuse parts that were each moved into positive space, so that their places in the assembly are lost.
+    """Refuse parts that were each moved into positive space, which loses their positions in the assembly.
 
     Raises
     ------
     ModelError
         All parts but one, and two at least, have their own lowest corner at the origin.
     """
-    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= AT_ORIGIN * part.size]
+    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= CORNER_TOLERANCE * part.size]
     if len(moved) >= max(2, len(parts) - 1):
         raise ModelError(
             f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into "
@@ -46,141 +113,84 @@ def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
         )
 
 
-def unit_of(description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], where: str) -> str:
+def unit_of(assembly: Assembly) -> str:
     """Return the unit of an assembly's coordinates: m, cm, mm or in.
 
-    The assembly must be about as large as the arm. Where two units pass, which only cm and in and their neighbours
+    The assembly must be about as large as the arm. If two units pass, which only cm and in and their neighbours
     can, the boxes around the links decide: the axis of each joint passes those of the two links that it joins.
-
-    Parameters
-    ----------
-    description
-        The arm.
-    frames
-        DH frames 0 to n in the world in the pose of the export, shape (n + 1, 4, 4).
-    links
-        Meshes of each link in assembly coordinates.
-    where
-        Folder, for messages.
 
     Raises
     ------
     ModelError
         No unit fits, or more than one; names the option that states it.
     """
-    length, size = arm_length(description, frames), size_of(links)
+    where, length, size = assembly.where, assembly.arm_length, assembly.size
     if length == 0:
         raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
-    fitting = [unit for unit, metres in UNITS.items() if SMALLEST <= size * metres / length <= LARGEST]
-    found = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
+    fitting = [unit for unit, metres in UNITS.items() if SIZE_RANGE[0] <= size * metres / length <= SIZE_RANGE[1]]
+    sizes = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
     if len(fitting) == 1:
-        _check_others(description, frames, links, fitting[0], f"{where}: {found}")
+        _check_other_units(assembly, fitting[0], f"{where}: {sizes}")
         return fitting[0]
     if not fitting:
-        raise ModelError(f"{where}: {found}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
-    missed = {unit: _missed(description, frames, links, UNITS[unit]) / length for unit in fitting}
-    best, second = sorted(missed, key=missed.__getitem__)[:2]
-    if missed[best] > NEAR:
+        raise ModelError(f"{where}: {sizes}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
+    distances = {unit: assembly.mean_axis_distance(UNITS[unit]) / length for unit in fitting}
+    best, second = sorted(distances, key=distances.__getitem__)[:2]
+    if distances[best] > MAX_MEAN_AXIS_DISTANCE:
         raise ModelError(
-            f"{where}: {found}: {' and '.join(fitting)} fit, but in all of them the parts lie beside the joints' axes; "
+            f"{where}: {sizes}: {' and '.join(fitting)} fit, but in all of them the parts lie beside the joints' axes; "
             "is the pose of the export the table's? else state the unit, such as --unit mm"
         )
-    if description.n < FEWEST_AXES or missed[second] < CLEARER * missed[best] + NEAR / 5:
-        raise ModelError(f"{where}: {found}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
+    clear_distance = MIN_DISTANCE_RATIO * distances[best] + MAX_MEAN_AXIS_DISTANCE / 5
+    if assembly.description.n < MIN_DECISIVE_AXES or distances[second] < clear_distance:
+        raise ModelError(f"{where}: {sizes}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
     return best
 
 
-def _check_others(
-    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], unit: str, found: str
-) -> None:
-    """Refuse the only unit that fits by size where the parts lie beside the axes in it, and not in another one.
+def _check_other_units(assembly: Assembly, unit: str, sizes: str) -> None:
+    """Refuse the only unit that fits by size if the parts lie beside the axes in it, and not in another one.
 
-    So it is with a small arm on a large base, or with a large tool, which is taken for a large arm in a smaller unit.
+    This happens with a small arm on a large base, or with a large tool: it seems a large arm in a smaller unit.
     """
-    length, size = arm_length(description, frames), size_of(links)
-    if description.n < FEWEST_AXES or _missed(description, frames, links, UNITS[unit]) <= NEAR * length:
+    length, size = assembly.arm_length, assembly.size
+    allowed = MAX_MEAN_AXIS_DISTANCE * length
+    if assembly.description.n < MIN_DECISIVE_AXES or assembly.mean_axis_distance(UNITS[unit]) <= allowed:
         return
-    possible = [u for u in UNITS if u != unit and WIDEST[0] <= size * UNITS[u] / length <= WIDEST[1]]
-    others = [u for u in possible if _missed(description, frames, links, UNITS[u]) <= NEAR * length]
+    low, high = WIDE_SIZE_RANGE
+    possible = [other for other in UNITS if other != unit and low <= size * UNITS[other] / length <= high]
+    others = [other for other in possible if assembly.mean_axis_distance(UNITS[other]) <= allowed]
     if others:
         raise ModelError(
-            f"{found}: {unit} fits by size, but in it the parts lie beside the joints' axes, and in "
+            f"{sizes}: {unit} fits by size, but in it the parts lie beside the joints' axes, and in "
             f"{' and '.join(others)} they do not; state the unit, such as --unit {others[0]}"
         )
 
 
-def arm_length(description: Description, frames: Array) -> float:
-    """Return the length of an arm in a pose, m; a sliding joint without limits may stand far beyond the reach."""
-    return max(description.reach, float(np.linalg.norm(np.diff(frames[:, :3, 3], axis=0), axis=1).sum()))
-
-
-def size_of(links: Mapping[int, Sequence[TriangleMesh]]) -> float:
-    """Return the diagonal of the box around all meshes, in their unit."""
-    bounds = np.array([mesh.bounds for meshes in links.values() for mesh in meshes])
-    return float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
-
-
-def check_size(description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], where: str) -> str:
-    """Return the sizes of an assembly whose files state their unit, meshes in m, and of the arm, in words.
+def check_size(assembly: Assembly) -> None:
+    """Refuse an assembly, meshes in m as their files state, that is far smaller or larger than the arm.
 
     Raises
     ------
     ModelError
-        The assembly is far smaller or larger than the arm; names the option that states the unit.
+        Names the option that states the unit.
     """
-    length, size = arm_length(description, frames), size_of(links)
-    if length and not SMALLEST <= size / length <= LARGEST:
+    length, size = assembly.arm_length, assembly.size
+    if length and not SIZE_RANGE[0] <= size / length <= SIZE_RANGE[1]:
         raise ModelError(
-            f"{where}: by the unit that the files state the assembly is {size:.4g} m across, the arm of the table "
-            f"{length:.4g} m long; is it the same arm? else state the unit of all files, such as --unit mm"
+            f"{assembly.where}: by the unit that the files state the assembly is {size:.4g} m across, the arm of the "
+            f"table {length:.4g} m long; is it the same arm? else state the unit of all files, such as --unit mm"
         )
-    return f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
 
 
-def far_from_axes(
-    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]]
-) -> tuple[str, ...]:
-    """Return a warning for each link whose parts lie far from the axis of a joint that it is joined by.
+def distant_part_warnings(assembly: Assembly) -> tuple[str, ...]:
+    """Return a warning for each link, meshes in m, whose parts lie far from the axis of one of its joints.
 
-    So a part in a wrong place shows: a pose that is not that of the export, another origin, or a CAD program that has
-    lost a placement.
-
-    Parameters
-    ----------
-    description, frames
-        As for :func:`unit_of`.
-    links
-        Meshes of each link in the world, m.
+    Causes are a pose that is not that of the export, another origin, or a lost placement in the CAD program.
     """
-    allowed = FAR * description.reach
-    missed = {key: miss for key, miss in _misses(description, frames, links, 1.0).items() if miss > allowed}
+    allowed = MAX_AXIS_DISTANCE * assembly.description.reach
     return tuple(
-        f"warning: link {link}: its part lies {miss:.3g} m beside the axis of joint {joint}; is the pose of the export "
-        "the table's, the assembly's origin frame 0, and the unit right?"
-        for (joint, link), miss in missed.items()
+        f"warning: link {link}: its part lies {distance:.3g} m beside the axis of joint {joint}; is the pose of the "
+        "export the table's, the assembly's origin frame 0, and the unit right?"
+        for (joint, link), distance in assembly.axis_distances(1.0).items()
+        if distance > allowed
     )
-
-
-def _missed(
-    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], metres: float
-) -> float:
-    """Return how far the joints' axes pass the boxes around the links that they join, on average, m."""
-    missed = _misses(description, frames, links, metres)
-    return float(np.mean(list(missed.values()))) if missed else np.inf
-
-
-def _misses(
-    description: Description, frames: Array, links: Mapping[int, Sequence[TriangleMesh]], metres: float
-) -> dict[tuple[int, int], float]:
-    """Return how far each joint's axis passes the box around each of its two links, m, by joint and link."""
-    along = np.linspace(-2, 2, AXIS_POINTS) * description.reach
-    missed = {}
-    for joint, frame in enumerate(carrying(description.convention, frames), start=1):
-        points = frame[:3, 3] + along[:, None] * frame[:3, 2]
-        for link in (joint - 1, joint):
-            if meshes := links.get(link):
-                low = metres * np.min([mesh.bounds[0] for mesh in meshes], axis=0)
-                high = metres * np.max([mesh.bounds[1] for mesh in meshes], axis=0)
-                outside = np.maximum(np.maximum(low - points, points - high), 0)
-                missed[joint, link] = float(np.linalg.norm(outside, axis=1).min())
-    return missed

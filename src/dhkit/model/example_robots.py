@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,10 +17,10 @@ from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 
 PACKAGE = "example-robot-data"
 PREFIX = "example:"
-LONG = 7
-"""Joints of an arm; chains with more go through a trunk."""
-ENDINGS = ("_robot", "_description", "_data")
-"""What names of files and folders have that names of robots do not."""
+MAX_ARM_JOINTS = 7
+"""Largest number of joints of an arm; longer chains go through a trunk."""
+NAME_ENDINGS = ("_robot", "_description", "_data")
+"""Endings of names of files and folders that are left out of names of robots."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class ExampleChain:
     Attributes
     ----------
     name
-        What ``Arm.load`` takes: ``example:ur5``, or ``example:allegro_left_hand#link_3_tip`` where there are several.
+        The name for ``Arm.load``: ``example:ur5``, or ``example:allegro_left_hand#link_3_tip`` where there are several.
     path, base, tip
         The URDF, and the chain's first and last link; the root if ``base`` is None.
     joints
@@ -43,7 +44,7 @@ class ExampleChain:
     joints: tuple[str, ...]
 
     def __repr__(self) -> str:
-        return repr_line(f"ExampleChain {self.name}", said=f"{counted(len(self.joints), 'joint')} to {self.tip}")
+        return repr_line(f"ExampleChain {self.name}", "", f"{counted(len(self.joints), 'joint')} to {self.tip}")
 
 
 @lru_cache(maxsize=1)
@@ -85,7 +86,7 @@ def example_urdf(name: str) -> Path:
 
 
 def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
-    """Return the file, base and tip that a name stands for.
+    """Return the file, base and tip of a name.
 
     A name is a path, or ``example:`` and the name of an example robot; after it ``#TIP`` or ``#BASE..TIP`` may name
     the links between which the chain lies. A file that exists under the whole name is that file.
@@ -106,9 +107,8 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
 def example_chains() -> Iterator[ExampleChain]:
     """Return the chains from root to leaf of every example robot: arms, legs, fingers.
 
-    Where they have more than seven joints, the limb from the last branching on is listed too. Chains with joints that
-    follow others are left out. Of frames behind the same joint the tool's
-    is taken, else the first.
+    Of chains with more than seven joints, the limb behind the last branching is listed too. Chains with joints that
+    follow others are left out. Of frames behind the same joint the tool's is taken, or the first.
     """
     for name, path in example_robots().items():
         tree = read_urdf(path)
@@ -117,7 +117,7 @@ def example_chains() -> Iterator[ExampleChain]:
             tip = tool_frame(leaves) or leaves[0]
             ending = "" if tip == only_tip(tree, tree.root) else f"#{tip}"
             yield ExampleChain(f"{PREFIX}{name}{ending}", path, None, tip, joints)
-            limb = _limb(tree, tip) if len(joints) > LONG else ()
+            limb = _limb(tree, tip) if len(joints) > MAX_ARM_JOINTS else ()
             if 0 < len(limb) < len(joints):
                 base = limb[0].parent
                 limb_joints = tuple(joint.name for joint in limb)
@@ -125,28 +125,26 @@ def example_chains() -> Iterator[ExampleChain]:
 
 
 def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
-    """Return the moving joints behind the last link on the way to a tip from which several joints go on."""
+    """Return the moving joints to a tip behind the last link on which several moving joints hang."""
 
     def carrier(link: str) -> str:
         """Return the first of the links that a link is fixed to."""
-        while (joint := tree.parent_joint.get(link)) is not None and joint.kind == "fixed":
+        while (joint := tree.parent_joint.get(link)) is not None and joint.is_fixed:
             link = joint.parent
         return link
 
-    moving = [joint for joint in tree.joints.values() if joint.kind != "fixed"]
-    way = [joint for joint in tree.joints_to(tip) or () if joint.kind != "fixed"]
-    for k in range(len(way) - 1, -1, -1):
-        if sum(carrier(joint.parent) == carrier(way[k].parent) for joint in moving) > 1:
-            return tuple(way[k:])
-    return tuple(way)
+    carriers = Counter(carrier(joint.parent) for joint in tree.joints.values() if not joint.is_fixed)
+    chain = [joint for joint in tree.joints_to(tip) or () if not joint.is_fixed]
+    branchings = [k for k, joint in enumerate(chain) if carriers[carrier(joint.parent)] > 1]
+    return tuple(chain[max(branchings, default=0) :])
 
 
 def _without_ending(name: str) -> str:
-    for ending in ENDINGS:
+    for ending in NAME_ENDINGS:
         name = name.removesuffix(ending)
     return name
 
 
 def _robot_folder(path: Path) -> str:
     """Return the name of a robot's folder in the package: the one that holds urdf/ or robots/."""
-    return next((parent.name for parent in path.parents if parent.name.endswith(ENDINGS)), path.parent.name)
+    return next((parent.name for parent in path.parents if parent.name.endswith(NAME_ENDINGS)), path.parent.name)

@@ -1,4 +1,4 @@
-"""The one reader of mesh files: through the gate, and then as triangles that are checked.
+"""The reader of all mesh files: a file is checked first and then read as triangles, which are checked too.
 
 STL, OBJ and COLLADA are read by dhkit itself, PLY by trimesh. trimesh ignores COLLADA's unit and up axis, drops
 vertices that are not numbers, and takes truncated STL files for empty scenes.
@@ -7,27 +7,31 @@ vertices that are not numbers, and takes truncated STL files for empty scenes.
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
 
 from dhkit.description import Mesh
-from dhkit.description.mesh_files import MAX_MESH_BYTES, MeshHeader, check_mesh_file
-from dhkit.errors import DescriptionError, ModelError
+from dhkit.description.mesh_files import MAX_MESH_BYTES, MeshFileError, MeshHeader, check_mesh_file
+from dhkit.errors import ModelError
 from dhkit.model.collada import collada_mesh
-from dhkit.model.obj import obj_mesh
+from dhkit.model.polygons import triangles_of
 from dhkit.model.shapes import Part
 from dhkit.model.stl import ascii_corners, binary_corners
 from dhkit.model.triangle_mesh import TriangleMesh
 
 MAX_TRIANGLES = 2_000_000
-"""Of a file that is drawn or measured, more than 50 MB of binary STL hold."""
-LARGEST_COORDINATE = 1e12
-"""In a file's units: squares and cubes of coordinates stay far from the range of a double."""
+"""Largest number of triangles of a file that is drawn or measured; 50 MB of binary STL hold a million."""
+MAX_COORDINATE = 1e12
+"""Largest absolute value of a coordinate, in a file's units: squares and cubes of it are finite doubles."""
+MAX_POLYGON_CORNERS = 1_000
+OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
 
 
-def mesh_header(path: Path, most: int = MAX_MESH_BYTES) -> MeshHeader:
-    """Return what a mesh file says of itself; see :func:`dhkit.description.mesh_files.check_mesh_file`.
+def mesh_header(path: Path, max_bytes: int = MAX_MESH_BYTES) -> MeshHeader:
+    """Return a mesh file's header; see :func:`dhkit.description.mesh_files.check_mesh_file`.
 
     Raises
     ------
@@ -35,18 +39,18 @@ def mesh_header(path: Path, most: int = MAX_MESH_BYTES) -> MeshHeader:
         It can be no mesh: one line that begins with the path.
     """
     try:
-        return check_mesh_file(path, most)
-    except DescriptionError as error:
-        raise ModelError(f"{error}{_mark(path)}") from None
+        return check_mesh_file(path, max_bytes)
+    except MeshFileError as error:
+        raise ModelError(f"{error}{_byte_order_mark_hint(path)}") from None
 
 
-def _mark(path: Path) -> str:
-    """Return a hint where a refused STL begins with a byte order mark."""
+def _byte_order_mark_hint(path: Path) -> str:
+    """Return a hint if a refused STL file begins with a byte order mark."""
     if path.suffix.lower() != ".stl" or not path.is_file():
         return ""
     with path.open("rb") as file:
-        marked = file.read(3)
-    if not marked.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
+        beginning = file.read(3)
+    if not beginning.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
         return ""
     return "; it begins with a byte order mark: save the text as ASCII, or as UTF-8 without BOM"
 
@@ -62,7 +66,7 @@ def read_mesh(path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes
     path
         The file.
     max_triangles, max_bytes
-        What it may have at most; a binary file with more triangles is refused from its header.
+        Largest number of triangles and of bytes; a binary file with more triangles is refused from its header.
 
     Raises
     ------
@@ -72,33 +76,41 @@ def read_mesh(path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes
     """
     path = Path(path)
     header = mesh_header(path, max_bytes)
-    if header.triangles is not None:
-        _check_count(path, header.triangles, max_triangles)
     try:
-        mesh = _read(path.read_bytes(), header)
+        _check_count(header.triangles or 0, max_triangles)
+        mesh = _read_content(path.read_bytes(), header)
+        if not len(mesh.faces):
+            raise ModelError("no triangles")
+        _check_count(len(mesh.faces), max_triangles)
+        if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+            raise ModelError(f"a face with vertex {mesh.faces.max()} of {len(mesh.vertices)}, counted from 0")
+        check_coordinates(mesh)
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror or error}") from None
-    if not len(mesh.faces):
-        raise ModelError(f"{path}: no triangles")
-    _check_count(path, len(mesh.faces), max_triangles)
-    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        raise ModelError(f"{path}: a face with vertex {mesh.faces.max()} of {len(mesh.vertices)}, counted from 0")
-    if wrong := odd_coordinates(mesh):
-        raise ModelError(f"{path}: {wrong}")
     return mesh
 
 
-def odd_coordinates(mesh: TriangleMesh) -> str:
-    """Return which vertex of a mesh has coordinates that are not finite or beyond all sizes; empty where none has."""
+def _check_count(count: int, max_triangles: int) -> None:
+    if count > max_triangles:
+        raise ModelError(f"{count} triangles; expected at most {max_triangles}")
+
+
+def check_coordinates(mesh: TriangleMesh, where: str = "") -> None:
+    """Refuse a mesh with a coordinate that is not finite or larger than :data:`MAX_COORDINATE`.
+
+    Raises
+    ------
+    ModelError
+        Names the first such vertex; begins with ``where``.
+    """
     with np.errstate(invalid="ignore"):
-        odd = ~(np.abs(mesh.vertices) <= LARGEST_COORDINATE).all(axis=1)
-    if not odd.any():
-        return ""
-    number = int(np.argmax(odd))
-    what = "not finite" if not np.isfinite(mesh.vertices[number]).all() else f"beyond {LARGEST_COORDINATE:g}"
-    return f"vertex {number} (from 0) has coordinates that are {what}"
+        is_odd = ~(np.abs(mesh.vertices) <= MAX_COORDINATE).all(axis=1)
+    if is_odd.any():
+        number = int(np.argmax(is_odd))
+        fault = "not finite" if not np.isfinite(mesh.vertices[number]).all() else f"beyond {MAX_COORDINATE:g}"
+        raise ModelError(f"{where}vertex {number} (from 0) has coordinates that are {fault}")
 
 
 def read_part(part: Part) -> TriangleMesh:
@@ -121,35 +133,65 @@ def read_part(part: Part) -> TriangleMesh:
     return mesh.scaled([float(factor) for factor in geometry.scale])
 
 
-def _check_count(path: Path, count: int, most: int) -> None:
-    if count > most:
-        raise ModelError(f"{path}: {count} triangles; expected at most {most}")
+def _read_content(content: bytes, header: MeshHeader) -> TriangleMesh:
+    match header.format:
+        case "stl":
+            return TriangleMesh.of_corners(binary_corners(content))
+        case "stl_ascii":
+            return TriangleMesh.of_corners(ascii_corners(content))
+        case "obj":
+            return _obj_mesh(content)
+        case "dae":
+            return collada_mesh(content)
+    return _ply_mesh(content, header.triangles or 0)
 
 
-def _read(content: bytes, header: MeshHeader) -> TriangleMesh:
-    if header.format == "stl":
-        return TriangleMesh.of_corners(binary_corners(content))
-    if header.format == "stl_ascii":
-        return TriangleMesh.of_corners(ascii_corners(content))
-    if header.format == "obj":
-        return obj_mesh(content)
-    if header.format == "dae":
-        return collada_mesh(content)
-    return _ply(content, header)
+def _obj_mesh(content: bytes) -> TriangleMesh:
+    """Return an OBJ file's faces as triangles, in the file's units; a material file that it names is not opened."""
+    content = content.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
+    try:
+        vertices = np.array(OBJ_VERTEX.findall(content), dtype="S40").astype(np.float64).reshape(-1, 3)
+        polygons = _obj_polygons(content, len(vertices))
+    except ValueError as error:
+        raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
+    corners = np.array([corner for polygon in polygons for corner in polygon], dtype=np.intp)
+    counts = np.array([len(polygon) for polygon in polygons], dtype=np.intp)
+    return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
 
-def _ply(content: bytes, header: MeshHeader) -> TriangleMesh:
+def _obj_polygons(content: bytes, count: int) -> list[list[int]]:
+    """Return the vertices of each face, from 0; a negative index counts back from the vertices above the face."""
+    polygons: list[list[int]] = []
+    vertices_above = 0
+    for line in OBJ_FACE_OR_VERTEX.finditer(content):
+        if line.group().lstrip().startswith(b"v"):
+            vertices_above += 1
+            continue
+        words = line[1].split(b"#")[0].split()
+        if not 3 <= len(words) <= MAX_POLYGON_CORNERS:
+            raise ModelError(f"a face of {len(words)} corners; expected 3 to {MAX_POLYGON_CORNERS}")
+        indices = [int(word.partition(b"/")[0]) for word in words]
+        corners = [index - 1 if index > 0 else vertices_above + index for index in indices]
+        for index, corner in zip(indices, corners, strict=True):
+            if index == 0 or not 0 <= corner < count:
+                raise ModelError(f"a face with vertex {index}; the file has vertices 1 to {count}")
+        polygons.append(corners)
+    return polygons
+
+
+def _ply_mesh(content: bytes, count: int) -> TriangleMesh:
+    """Return a PLY file's triangles, at least ``count`` of them."""
     import trimesh
 
     try:
-        # From memory and without a resolver: a texture that the file names is not looked for.
+        # From memory and without a resolver, so that no texture file is opened.
         mesh = trimesh.load_scene(io.BytesIO(content), file_type="ply", process=False).to_mesh()
         vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(mesh.faces, dtype=np.intp).reshape(-1, 3)
         kind = mesh.visual.kind if len(faces) else None
         colours = np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8) if kind in ("face", "vertex") else None
-    except Exception as error:  # trimesh raises what its parsers raise
+    except Exception as error:  # trimesh passes on any exception of its parsers
         raise ModelError(f"no PLY: {' '.join(str(error).split())[:100]}") from None
-    if len(faces) < (header.triangles or 0):
-        raise ModelError(f"{len(faces)} faces; its header counts {header.triangles} (truncated, or a lying count)")
+    if len(faces) < count:
+        raise ModelError(f"{len(faces)} faces; its header counts {count} (truncated, or a lying count)")
     return TriangleMesh(vertices, faces, colours)

@@ -1,4 +1,4 @@
-"""Polygons as triangles: fans where they are convex, and by manifold3d's triangulation where they are not."""
+"""Polygons as triangles: fans where they are convex, manifold3d's triangulation where they are not."""
 
 from __future__ import annotations
 
@@ -7,34 +7,35 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-STRAIGHT = 1e-9
-"""A corner turns inwards where the sine of its turn, the longest edges' product as measure, is below minus this."""
+CONCAVE_SINE = 1e-9
+"""A corner is concave if its turn, relative to the squared length of the longest edge, is below minus this number."""
 
 
 def triangles_of(vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return polygons as triangles of vertex numbers, shape (m, 3), k - 2 of a polygon of k corners, in their order.
+    """Return polygons as triangles of vertex indices, shape (m, 3), k - 2 for a polygon of k corners, in their order.
 
     Parameters
     ----------
     vertices
-        Shape (v, 3).
+        Shape (v, 3), any unit.
     corners
-        The vertices of all polygons, one after the other, each from 0 to v - 1.
+        The vertex indices of all polygons, one after the other, from 0 to v - 1, shape (sum of counts,).
     counts
-        How many corners each polygon has; those with fewer than three are left out.
+        The number of corners of each polygon, shape (p,); polygons with fewer than three are left out.
     """
-    starts, fans = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
-    at = np.cumsum(fans) - fans
-    first = np.repeat(starts, fans)
-    step = np.arange(int(fans.sum())) - np.repeat(at, fans)
+    starts, sizes = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    first_triangles = np.cumsum(sizes) - sizes
+    first = np.repeat(starts, sizes)
+    step = np.arange(int(sizes.sum())) - np.repeat(first_triangles, sizes)
     triangles: NDArray[np.intp] = corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
     for k in np.unique(counts[counts > 3]):
         chosen = np.flatnonzero(counts == k)
         rings = corners[starts[chosen][:, None] + np.arange(k)]
         for i in np.flatnonzero(_is_concave(vertices[rings])):
-            cut = _cut(vertices[rings[i]])
-            if len(cut) == k - 2:
-                triangles[at[chosen[i]] : at[chosen[i]] + k - 2] = rings[i][cut]
+            triangulation = _triangulate(vertices[rings[i]])
+            if len(triangulation) == k - 2:
+                start = first_triangles[chosen[i]]
+                triangles[start : start + k - 2] = rings[i][triangulation]
     return triangles
 
 
@@ -46,17 +47,17 @@ def _normals(points: Array) -> Array:
 
 
 def _is_concave(points: Array) -> NDArray[np.bool_]:
-    """Return which polygons, points of shape (p, k, 3), have a corner that turns inwards."""
-    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are no numbers are refused later
+    """Return which polygons, points of shape (p, k, 3), have a concave corner."""
+    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are not finite are refused later
         edges = np.roll(points, -1, axis=1) - points
         turns = np.einsum("pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points))
         longest = (edges**2).sum(axis=2).max(axis=1) * np.linalg.norm(_normals(points), axis=1)
-        concave: NDArray[np.bool_] = (turns < -STRAIGHT * longest[:, None]).any(axis=1)
+        concave: NDArray[np.bool_] = (turns < -CONCAVE_SINE * longest[:, None]).any(axis=1)
     return concave
 
 
-def _cut(points: Array) -> NDArray[np.intp]:
-    """Return a polygon's triangles by the numbers of its corners, going round as it does."""
+def _triangulate(points: Array) -> NDArray[np.intp]:
+    """Return a polygon's triangles by the indices of its corners, in the polygon's own orientation."""
     from manifold3d import triangulate
 
     normal = _normals(points[None])[0]
@@ -65,5 +66,5 @@ def _cut(points: Array) -> NDArray[np.intp]:
     u = np.cross(across, normal)
     u /= np.linalg.norm(u)
     flat = np.stack([points @ u, points @ np.cross(normal, u)], axis=1)
-    cut: NDArray[np.intp] = np.asarray(triangulate([flat - flat.mean(axis=0)])).astype(np.intp).reshape(-1, 3)
-    return cut
+    triangles = np.asarray(triangulate([flat - flat.mean(axis=0)]))
+    return triangles.astype(np.intp).reshape(-1, 3)

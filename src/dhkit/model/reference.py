@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
-
-import numpy as np
 
 from dhkit.description import Description, takes_robot
 from dhkit.errors import ModelError
@@ -22,7 +21,7 @@ class NoPinocchioError(ModelError):
     """Pinocchio is not installed; there is no wheel of it for Windows."""
 
 
-def import_pinocchio() -> Any:
+def import_pinocchio() -> ModuleType:
     """Return the module pinocchio.
 
     Raises
@@ -60,11 +59,10 @@ def pinocchio_model(description: Description) -> PinocchioModel:
     except ValueError as error:
         raise ModelError(f"{description.name}: Pinocchio refuses the URDF: {error}") from None
     numbers = description.numbers
-    model.gravity.linear = np.array(numbers.gravity)
-    model.armature = np.array(numbers.armature)
-    model.damping = np.array(numbers.viscous)
-    model.upperDryFrictionLimit = np.array(numbers.coulomb[:, 0])
-    model.lowerDryFrictionLimit = np.array(numbers.coulomb[:, 1])
-    model.effortLimit = np.array(numbers.effort)
-    model.velocityLimit = np.array(numbers.velocity)
+    model.gravity.linear = numbers.gravity.copy()
+    model.armature = numbers.armature.copy()
+    model.damping = numbers.viscous.copy()
+    model.upperDryFrictionLimit, model.lowerDryFrictionLimit = numbers.coulomb.T.copy()
+    model.effortLimit = numbers.effort.copy()
+    model.velocityLimit = numbers.velocity.copy()
     return model

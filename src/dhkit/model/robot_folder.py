@@ -1,8 +1,9 @@
-"""A robot file together with the meshes that it names, so that the folder can be moved and shared."""
+"""Robot files together with the meshes that they name, so that the folder can be moved and shared."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -10,13 +11,39 @@ from dhkit.description import Description, Mesh, Shape, takes_robot, to_toml, wr
 from dhkit.errors import DescriptionError, ModelError
 
 MESHES = "meshes"
+"""Folder for meshes, beside a robot file or URDF."""
+
+
+@contextmanager
+def model_errors(path: Path) -> Iterator[None]:
+    """Raise failed file operations, in one line that begins with the file, or ``path``, as ModelError."""
+    try:
+        yield
+    except OSError as error:
+        raise ModelError(f"{error.filename or path}: {error.strerror or error}") from None
+    except DescriptionError as error:
+        raise ModelError(str(error)) from None
+
+
+def mesh_paths(description: Description) -> tuple[str, ...]:
+    """Return the paths of a description's meshes, each once: base, links, tool."""
+    links = (description.base, *description.joints, description.tool)
+    geometries = (shape.geometry for link in links for shape in link.shapes)
+    return tuple(dict.fromkeys(geometry.path for geometry in geometries if isinstance(geometry, Mesh)))
+
+
+def copy_files(sources: Mapping[str, Path], folder: Path) -> list[Path]:
+    """Copy files to these relative paths in a folder, each whole or not at all; return the copies."""
+    for name, source in sources.items():
+        write_atomically(folder / name, source.read_bytes())
+    return [folder / name for name in sources]
 
 
 @takes_robot
 def write_robot_with_meshes(description: Description, path: str | Path) -> tuple[Path, ...]:
     """Write a robot file and copies of its meshes in ``meshes/NAME`` beside it; return the files, robot file first.
 
-    Meshes come first, so that no robot file is left that names missing ones.
+    Meshes are written first, so that no robot file is left that names missing ones.
 
     Raises
     ------
@@ -24,35 +51,20 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
         A mesh cannot be read, or a file cannot be written.
     """
     path = Path(path)
-    names, folder = _copies(description), description.mesh_folder
-    written = [path]
-    try:
-        for source, name in names.items():
-            if folder is None:
-                raise ModelError(f"{description.name}: where its mesh {source!r} lies is not known")
-            copy = path.parent / name
-            write_atomically(copy, (folder / source).read_bytes())
-            written.append(copy)
-        write_atomically(path, to_toml(_renamed(description, names)))
-    except OSError as error:
-        raise ModelError(f"{error.filename or path}: {error.strerror}") from None
-    except DescriptionError as error:
-        raise ModelError(str(error)) from None
-    return tuple(written)
+    names, folder = _copy_names(description), description.mesh_folder
+    with model_errors(path):
+        if names and folder is None:
+            raise ModelError(f"{description.name}: where its mesh {next(iter(names))!r} lies is not known")
+        sources = {} if folder is None else {name: folder / source for source, name in names.items()}
+        copies = copy_files(sources, path.parent)
+        write_atomically(path, to_toml(_with_mesh_paths(description, names.__getitem__)))
+    return (path, *copies)
 
 
-def _shapes(description: Description) -> Iterator[Shape]:
-    yield from description.base.shapes
-    for joint in description.joints:
-        yield from joint.shapes
-    yield from description.tool.shapes
-
-
-def _copies(description: Description) -> dict[str, str]:
-    """Return the path of each mesh's copy by its own path; files of one name from two folders are told apart."""
-    sources = dict.fromkeys(shape.geometry.path for shape in _shapes(description) if isinstance(shape.geometry, Mesh))
+def _copy_names(description: Description) -> dict[str, str]:
+    """Return the path of each mesh's copy by its own path; equal file names from two folders are numbered."""
     names: dict[str, str] = {}
-    for source in sources:
+    for source in mesh_paths(description):
         own = PurePosixPath(source)
         name, count = own.name, 1
         while f"{MESHES}/{description.name}/{name}" in names.values():
@@ -62,10 +74,12 @@ def _copies(description: Description) -> dict[str, str]:
     return names
 
 
-def _renamed(description: Description, names: dict[str, str]) -> Description:
-    def moved(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
+def _with_mesh_paths(description: Description, new_path: Callable[[str], str]) -> Description:
+    """Return a description without a mesh folder, its meshes named by other paths."""
+
+    def renamed(shapes: tuple[Shape, ...]) -> tuple[Shape, ...]:
         return tuple(
-            replace(shape, geometry=replace(shape.geometry, path=names[shape.geometry.path]))
+            replace(shape, geometry=replace(shape.geometry, path=new_path(shape.geometry.path)))
             if isinstance(shape.geometry, Mesh)
             else shape
             for shape in shapes
@@ -73,8 +87,8 @@ def _renamed(description: Description, names: dict[str, str]) -> Description:
 
     return replace(
         description,
-        base=replace(description.base, shapes=moved(description.base.shapes)),
-        joints=tuple(replace(joint, shapes=moved(joint.shapes)) for joint in description.joints),
-        tool=replace(description.tool, shapes=moved(description.tool.shapes)),
+        base=replace(description.base, shapes=renamed(description.base.shapes)),
+        joints=tuple(replace(joint, shapes=renamed(joint.shapes)) for joint in description.joints),
+        tool=replace(description.tool, shapes=renamed(description.tool.shapes)),
         mesh_folder=None,
     )

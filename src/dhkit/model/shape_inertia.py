@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of a link from its shape, and a density or a mass that the user states."""
+"""Mass, centre of mass and inertia of a link from its shape and a stated density or mass."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import INERTIA_PLACES, Array, Body, Inertia
+from dhkit.description import Array, Body, Inertia
 from dhkit.display import listed, repr_line
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
-from dhkit.model.closed_surface import FLAT, outwards, repaired, signed_volume, tetrahedra
+from dhkit.model.closed_surface import MIN_VOLUME, outwards, repaired, signed_volume, tetrahedra
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
 
 class InertiaMethod(Enum):
-    """What the volume of a link was taken from."""
+    """The surface that a link's volume was computed from; the last member is the roughest."""
 
     CLOSED = "the closed mesh"
     FILLED = "the mesh with its holes capped"
@@ -37,35 +37,34 @@ class MassProperties:
     """Shape (3, 3), kg m^2, about the centre of mass; products with the tensor's sign, xy = -integral of x y dm."""
 
     def moved(self, T: ArrayLike) -> MassProperties:
-        """Return them in the frame that T, shape (4, 4), a rigid transform, maps their own to."""
+        """Return the properties in the frame that a rigid transform T, shape (4, 4), m, maps their own frame to."""
         matrix = np.asarray(T, dtype=float)
         R = matrix[:3, :3]
         tensor = R @ self.inertia @ R.T
         return MassProperties(self.mass, R @ self.com + matrix[:3, 3], (tensor + tensor.T) / 2)
 
     def body(self, name: str = "") -> Body:
-        """Return them as a body of a description, in the same frame."""
+        """Return the properties as a body of a description, in the same frame."""
         x, y, z = (exact(float(entry)) for entry in self.com)
-        moments = {key: exact(float(self.inertia[place])) for key, place in INERTIA_PLACES.items()}
-        return Body(exact(float(self.mass)), (x, y, z), Inertia(**moments), name=name)
+        return Body(exact(float(self.mass)), (x, y, z), Inertia.of_tensor(self.inertia), name=name)
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, said=f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m")
+        return repr_line(type(self).__name__, "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m")
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeInertia(MassProperties):
-    """Mass properties of a homogeneous body from its shape, with what they rest on."""
+    """Mass properties of a homogeneous body from its shape, with the volume and how it was computed."""
 
     volume: float
     """m^3."""
     method: InertiaMethod
     notes: tuple[str, ...]
-    """What was changed on the mesh, in words."""
+    """Changes of the mesh, for printing."""
 
     def __repr__(self) -> str:
-        said = f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m, {self.volume:.4g} m^3 of {self.method.value}"
-        return repr_line("ShapeInertia", said=said)
+        volume = f"{self.volume:.4g} m^3 of {self.method.value}"
+        return repr_line("ShapeInertia", "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m, {volume}")
 
 
 def shape_inertia(
@@ -80,9 +79,9 @@ def shape_inertia(
     Parameters
     ----------
     mesh
-        In the frame that is asked about, m; several are parts of one body, and a part can be the inner wall of
-        another. Where one is open, its holes are capped if that adds little area, and
-        else its convex hull is taken; ``method`` and ``notes`` say so.
+        Vertices in m; the result is in their frame. Several meshes are parts of one body, and one may be the inner
+        wall of another. If a mesh is open, its holes are capped if that adds little area, and
+        otherwise its convex hull is taken; ``method`` and ``notes`` state this.
     density, mass
         kg/m^3, or kg; exactly one of them.
 
@@ -112,14 +111,13 @@ def shape_inertia(
         raise ModelError(
             f"{name} is {value:g}; expected a positive number of {'kg/m^3' if name == 'density' else 'kg'}"
         )
-    several = [mesh] if isinstance(mesh, TriangleMesh) else list(mesh)
-    surfaces = [_closed(part) for part in several]
-    whole, turned = outwards(joined_meshes([closed for closed, _, _ in surfaces]))
-    methods = {method for _, method, _ in surfaces}
-    method = next(one for one in reversed(InertiaMethod) if one in methods)
-    notes = tuple(dict.fromkeys([*(note for _, _, said in surfaces for note in said), *turned]))
+    meshes = [mesh] if isinstance(mesh, TriangleMesh) else list(mesh)
+    closed_meshes, methods, repairs = zip(*map(_closed, meshes), strict=True)
+    whole, turning_notes = outwards(joined_meshes(closed_meshes))
+    method = next(method for method in reversed(InertiaMethod) if method in methods)
+    notes = tuple(dict.fromkeys([*(note for notes in repairs for note in notes), *turning_notes]))
     volume, com, covariance = _moments(whole)
-    if volume <= FLAT * whole.size**3:
+    if volume <= MIN_VOLUME * whole.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
     rho = value if name == "density" else value / volume
     inertia = rho * (np.trace(covariance) * np.eye(3) - covariance)
@@ -127,21 +125,21 @@ def shape_inertia(
 
 
 def _closed(mesh: TriangleMesh) -> tuple[TriangleMesh, InertiaMethod, tuple[str, ...]]:
-    """Return a mesh made closed, how that was done, and what was changed."""
+    """Return a closed mesh, the method that closed it, and notes of the changes."""
     if not np.isfinite(mesh.vertices).all():
         raise ModelError("vertices that are not finite; expected numbers")
     surface = repaired(mesh)
     if not surface.is_closed:
-        said = "open: judged by its convex hull, which is no lighter than the link"
-        return convex_hull(mesh), InertiaMethod.HULL, (said,)
+        note = "open: judged by its convex hull, which is no lighter than the link"
+        return convex_hull(mesh), InertiaMethod.HULL, (note,)
     volume = signed_volume(surface.mesh)
-    if abs(volume) <= FLAT * mesh.size**3:
+    if abs(volume) <= MIN_VOLUME * mesh.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
     return surface.mesh, InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED, surface.notes
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
-    """Return the convex hull of a mesh's vertices, its triangles seen counterclockwise from outside.
+    """Return the convex hull of a mesh's vertices, in their unit, oriented outwards.
 
     Raises
     ------
@@ -163,22 +161,22 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
 def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
     """Return volume, centre and the integral of r r^T about the centre, of a closed mesh.
 
-    Coordinates are taken about the mesh's middle and in shares of its size: about a far origin the differences of large
-    moments would leave few digits, and a mesh of nanometres would underflow.
+    Coordinates are relative to the mesh's middle and to its size: about a distant origin, the differences of large
+    moments would keep few digits, and a mesh of nanometres would underflow.
     """
     size = mesh.size or 1.0
     middle = mesh.bounds.mean(axis=0)
-    shares = TriangleMesh((mesh.vertices - middle) / size, mesh.faces)
-    a, b, c = shares.corners_about(np.zeros(3))
+    scaled = TriangleMesh((mesh.vertices - middle) / size, mesh.faces)
+    a, b, c = scaled.corners_about(np.zeros(3))
     v = tetrahedra(a, b, c)
     volume = float(v.sum())
-    if volume <= FLAT:
+    if volume <= MIN_VOLUME:
         return volume * size**3, middle, np.zeros((3, 3))
     centre = v @ (a + b + c) / (4 * volume)
-    a, b, c = shares.corners_about(centre)
+    a, b, c = scaled.corners_about(centre)
     v = tetrahedra(a, b, c)
     s = a + b + c
-    rest = v @ s / (4 * volume)  # rounding alone
+    remainder = v @ s / (4 * volume)  # the rounding error of the centre
     second = np.sum([(x * v[:, None]).T @ x for x in (a, b, c, s)], axis=0) / 20
-    covariance = (second + second.T) / 2 - volume * np.outer(rest, rest)
-    return volume * size**3, middle + size * (centre + rest), covariance * size**5
+    covariance = (second + second.T) / 2 - volume * np.outer(remainder, remainder)
+    return volume * size**3, middle + size * (centre + remainder), covariance * size**5

@@ -2,7 +2,7 @@
 
 The block that is read is "Moments of inertia: Taken at the center of mass and aligned with the output coordinate
 system", Lxx ... Lzz. Its products are +integral of x y dm ("positive tensor notation", SolidWorks' default), so that
-the tensor has -Lxy; newer versions can write them the other way round. The other two blocks decide: the principal
+the tensor has -Lxy; newer versions can write them with the opposite sign. The other two blocks decide: the principal
 moments and axes are those of one of the two tensors, and Ixx ... Izz at the output coordinate system differ from
 Lxx ... Lzz by Steiner's terms, whose products have the same sign.
 """
@@ -10,7 +10,10 @@ Lxx ... Lzz by Steiner's terms, whose products have the same sign.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,23 +34,46 @@ AXIS = re.compile(
 )
 COORDINATE = re.compile(rf"^[ \t]*([XYZ])[ \t]*=[ \t]*({DECIMAL})", re.MULTILINE)
 MASS_UNITS = {"grams": 1e-3, "gram": 1e-3, "kilograms": 1.0, "kilogram": 1.0, "milligrams": 1e-6, "pounds": 0.45359237}
+"""Mass units by SolidWorks' names, kg."""
 LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches": 0.0254, "feet": 0.3048}
-NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
-CLEARER = 0.2
-"""The sign is decided where one tensor misses the other blocks by less than this share of what the other one does."""
-ROUGH, COARSEST = 1e-3, 0.05
-"""Half a unit of the last decimal, as a share of the mass, the largest moment, the radius of gyration for the centre of
-mass: warned of, and refused."""
-ROUNDED = 4.0
+"""Length units by SolidWorks' names, m."""
+ENTRY_NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
+MAX_MISFIT_RATIO = 0.2
+"""The sign is decided if one tensor's misfit to another block is below this share of the other tensor's misfit."""
+WARNED_ROUNDING, MAX_ROUNDING = 1e-3, 0.05
+"""Half a unit of the last decimal above which a warning is given, and above which the report is refused.
+
+Relative to the mass, the largest moment, and, for the centre of mass, the radius of gyration."""
+MISFIT_ROUNDINGS = 4.0
 """Half units of the last decimals that blocks may differ by: several rounded numbers enter each comparison."""
 
 
-@dataclass(frozen=True)
-class _Number:
+class _Block(Enum):
+    """The blocks of moments: about the centre of mass, about the origin, and the principal moments."""
+
+    CENTRE = "centre"
+    ORIGIN = "origin"
+    PRINCIPAL = "principal"
+
+
+class _Number(NamedTuple):
     """A decimal with half a unit of its last place."""
 
     value: float
     half: float
+
+
+class _Misfit(NamedTuple):
+    """Deviation of another block from both tensors, kg m^2."""
+
+    block: str
+    """The block, for messages."""
+    plus: float
+    """Deviation if products are listed as +integral."""
+    minus: float
+    """Deviation if products are listed as the tensor's entries."""
+    allowed: float
+    """Largest deviation that rounding explains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,117 +81,110 @@ class _Centre:
     """Mass and centre of mass, SI, with half units of their last places."""
 
     mass: float
-    mass_share: float
-    """As a share of the mass."""
+    relative_half: float
+    """Of the mass, relative to it."""
     com: Array
     com_half: float
 
 
-@dataclass(frozen=True, eq=False)
-class SolidWorksReport:
-    """What the report says of one part."""
+def read_solidworks_report(text: str, path: str, first: int = 1) -> tuple[str, MassProperties, tuple[str, ...]]:
+    """Read one report; return the part's name, its mass properties in SI, and notes.
 
-    part: str
-    properties: MassProperties
-    notes: tuple[str, ...]
+    Parameters
+    ----------
+    text
+        From "Mass properties of ..." to the next of them.
+    path, first
+        File and line of the text's beginning, for messages.
 
-    @classmethod
-    def of(cls, text: str, path: str, first: int = 1) -> SolidWorksReport:
-        """Read one report.
-
-        Parameters
-        ----------
-        text
-            From "Mass properties of ..." to the next of them.
-        path, first
-            File and line of the text's beginning, for messages.
-
-        Raises
-        ------
-        ModelError
-            A quantity or its unit is missing or none that is known, or the blocks contradict each other.
-        """
-        return _Reader(text, path, first).report()
+    Raises
+    ------
+    ModelError
+        A quantity or its unit is missing or unknown, or the blocks contradict each other.
+    """
+    return _Reader(text, path, first).report()
 
 
 class _Reader:
     def __init__(self, text: str, path: str, first: int) -> None:
         self.text, self.path, self.first = text, path, first
 
-    def report(self) -> SolidWorksReport:
+    def report(self) -> tuple[str, MassProperties, tuple[str, ...]]:
         title = REPORT.search(self.text)
         if assembly := ASSEMBLY.search(self.text):
             raise self._error(
                 "a report of an assembly; expected one of the part of a link: select the part alone in Mass Properties",
                 assembly,
             )
-        mass_at = self._found(MASS, "a line 'Mass = ... grams'")
-        written = self._number(mass_at[1], mass_at)
-        mass = written.value * self._unit(mass_at[2], MASS_UNITS, mass_at)
+        mass_line = self._match(MASS, "a line 'Mass = ... grams'")
+        number = self._number(mass_line[1], mass_line)
+        mass = number.value * self._unit(mass_line[2], MASS_UNITS, mass_line)
         if not mass > 0:
-            raise self._error(f"mass is {mass_at[1]}; expected a positive number", mass_at)
-        com, com_half = self._centre()
-        rounded = list(self._coarse("mass", written.half / written.value, "", mass_at))
-        blocks = {self._kind(match): match for match in BLOCK.finditer(self.text)}
-        if "centre" not in blocks:
+            raise self._error(f"mass is {mass_line[1]}; expected a positive number", mass_line)
+        centre = _Centre(mass, number.half / number.value, *self._centre_of_mass())
+        warnings = self._rounding_warning("mass", centre.relative_half, "", mass_line)
+        blocks = {self._block_kind(match): match for match in BLOCK.finditer(self.text)}
+        if _Block.CENTRE not in blocks:
             raise ModelError(
                 f"{self.path}, line {self.first}: no block 'Moments of inertia: Taken at the center of mass and "
                 "aligned with the output coordinate system'; expected SolidWorks' text of Mass Properties, in English"
             )
-        listed, half = self._tensor(blocks["centre"], "L")
-        coarse = float(half.max() / max(np.abs(listed).max(), np.finfo(float).tiny))
-        rounded += self._coarse("moments", coarse, " of the largest", blocks["centre"])
-        gyration = np.sqrt(max(float(np.trace(listed)), np.finfo(float).tiny) / (2 * mass))
-        rounded += self._coarse("centre of mass", com_half / gyration, " of its radius of gyration", mass_at)
-        centre = _Centre(mass, written.half / written.value, com, com_half)
-        sign, said = self._sign(listed, half, centre, blocks)
-        tensor = np.where(np.eye(3, dtype=bool), listed, -sign * listed)
-        block = "block read: moments about the centre of mass, axes of the output coordinate system (Lxx ... Lzz)"
-        part = title[1].strip() if title else ""
-        return SolidWorksReport(part, MassProperties(mass, com, tensor), (block, said, *rounded))
+        listed, half = self._tensor(blocks[_Block.CENTRE], "L")
+        tiny = np.finfo(float).tiny
+        rounding = float(half.max() / max(np.abs(listed).max(), tiny))
+        warnings += self._rounding_warning("moments", rounding, " of the largest", blocks[_Block.CENTRE])
+        gyration = np.sqrt(max(float(np.trace(listed)), tiny) / (2 * mass))
+        rounding = centre.com_half / gyration
+        warnings += self._rounding_warning("centre of mass", rounding, " of its radius of gyration", mass_line)
+        sign, sign_note = self._sign(listed, half, centre, blocks)
+        block_note = "block read: moments about the centre of mass, axes of the output coordinate system (Lxx ... Lzz)"
+        properties = MassProperties(mass, centre.com, _with_products_times(-sign, listed))
+        return title[1].strip() if title else "", properties, (block_note, sign_note, *warnings)
 
-    def _coarse(self, what: str, share: float, of: str, at: re.Match[str]) -> tuple[str, ...]:
-        """Return a warning where half a unit of the last decimal is much of a quantity; refuse where it is too much."""
+    def _rounding_warning(self, what: str, share: float, of: str, at: re.Match[str]) -> tuple[str, ...]:
+        """Return a warning if half a unit of the last decimal is a large share of a quantity; refuse a larger one."""
         verb, are = ("have", "are") if what == "moments" else ("has", "is")
-        if share > COARSEST:
+        if share > MAX_ROUNDING:
             raise self._error(
                 f"its {what} {verb} too few digits, {100 * min(share, 1.0):.0f} %{of}; choose smaller units or more "
                 "decimal places in the options of Mass Properties",
                 at,
             )
-        return (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if share > ROUGH else ()
+        is_warned = share > WARNED_ROUNDING
+        return (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if is_warned else ()
 
-    def _centre(self) -> tuple[Array, float]:
-        at = self._found(CENTRE, "a line 'Center of mass: ( millimeters )'")
-        unit = self._unit(at[1], LENGTH_UNITS, at)
-        found = {match[1]: self._number(match[2], match) for match in COORDINATE.finditer(self.text, at.end())}
-        if set(found) != set("XYZ"):
-            raise self._error("no X, Y and Z of the centre of mass; expected three lines 'X = ...'", at)
-        return unit * np.array([found[k].value for k in "XYZ"]), unit * max(found[k].half for k in "XYZ")
+    def _centre_of_mass(self) -> tuple[Array, float]:
+        """Return the centre of mass, shape (3,), m, and half a unit of its last decimals."""
+        heading = self._match(CENTRE, "a line 'Center of mass: ( millimeters )'")
+        unit = self._unit(heading[1], LENGTH_UNITS, heading)
+        matches = COORDINATE.finditer(self.text, heading.end())
+        numbers = {match[1]: self._number(match[2], match) for match in matches}
+        if set(numbers) != set("XYZ"):
+            raise self._error("no X, Y and Z of the centre of mass; expected three lines 'X = ...'", heading)
+        return unit * np.array([numbers[k].value for k in "XYZ"]), unit * max(numbers[k].half for k in "XYZ")
 
-    def _kind(self, block: re.Match[str]) -> str:
-        """Tell the three blocks apart by the line below their heading."""
+    def _block_kind(self, block: re.Match[str]) -> _Block:
+        """Return the kind of a block by the line below its heading."""
         line = block[2].lower()
         if "aligned" in line:
-            return "centre"
-        return "origin" if "output coordinate system" in line else "principal"
+            return _Block.CENTRE
+        return _Block.ORIGIN if "output coordinate system" in line else _Block.PRINCIPAL
 
     def _tensor(self, block: re.Match[str], letter: str) -> tuple[Array, Array]:
         """Return a block's nine entries as listed, kg m^2, and half a unit of the last decimals, shape (3, 3)."""
         unit, entries = self._moment_unit(block), self._entries(block, letter)
-        if missing := [name for row in NAMES for name in row if name not in entries]:
+        if missing := [name for row in ENTRY_NAMES for name in row if name not in entries]:
             raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
-        listed = unit * np.array([[entries[name].value for name in row] for row in NAMES])
-        half = unit * np.array([[entries[name].half for name in row] for row in NAMES])
+        numbers = np.array([[entries[name] for name in row] for row in ENTRY_NAMES])
+        listed, half = unit * numbers[..., 0], unit * numbers[..., 1]
         if np.any(np.abs(listed - listed.T) > 2 * (half + half.T)):
             raise self._error(f"{letter}xy and {letter}yx differ; expected a symmetric tensor", block)
         return (listed + listed.T) / 2, half
 
     def _entries(self, block: re.Match[str], letter: str) -> dict[str, _Number]:
         following = BLOCK.search(self.text, block.end())
-        end = following.start() if following else len(self.text)
-        found = ENTRY.finditer(self.text, block.end(), end)
-        return {match[2]: self._number(match[3], match) for match in found if match[1] == letter}
+        matches = ENTRY.finditer(self.text, block.end(), following.start() if following else len(self.text))
+        return {match[2]: self._number(match[3], match) for match in matches if match[1] == letter}
 
     def _moment_unit(self, block: re.Match[str]) -> float:
         words = block[1].lower().replace("*", " ").split()
@@ -175,82 +194,78 @@ class _Reader:
             )
         return self._unit(words[0], MASS_UNITS, block) * self._unit(words[2], LENGTH_UNITS, block) ** 2
 
-    def _sign(self, listed: Array, half: Array, centre: _Centre, blocks: dict[str, re.Match[str]]) -> tuple[float, str]:
-        """Return +1 where products are listed as +integral, -1 where as the tensor's entries, and how it was found."""
-        products = listed[np.triu_indices(3, 1)]
-        checks = []
-        if "principal" in blocks:
-            checks.append(
-                ("the principal moments and axes", *self._principal_misses(listed, half, blocks["principal"]))
-            )
-        if "origin" in blocks:
-            misses = self._steiner_misses(listed, half, centre, blocks["origin"])
-            checks.append(("Steiner's terms of the block at the output coordinate system", *misses))
-        for what, plus, minus, allowed in checks:
+    def _sign(
+        self, listed: Array, half: Array, centre: _Centre, blocks: Mapping[_Block, re.Match[str]]
+    ) -> tuple[float, str]:
+        """Return +1 if products are listed as +integral, -1 if as the tensor's entries, and a note on the evidence."""
+        misfits = []
+        if _Block.PRINCIPAL in blocks:
+            misfits.append(self._principal_misfit(listed, half, blocks[_Block.PRINCIPAL]))
+        if _Block.ORIGIN in blocks:
+            misfits.append(self._steiner_misfit(listed, half, centre, blocks[_Block.ORIGIN]))
+        for block, plus, minus, allowed in misfits:
             if min(plus, minus) > allowed:
                 raise self._error(
-                    f"{what} contradict Lxx ... Lzz by {min(plus, minus):.3g} kg m^2, more than their rounding",
-                    blocks["centre"],
+                    f"{block} contradict Lxx ... Lzz by {min(plus, minus):.3g} kg m^2, more than their rounding",
+                    blocks[_Block.CENTRE],
                 )
-        if not np.any(products):
+        if not np.any(listed[np.triu_indices(3, 1)]):
             return 1.0, "no products of inertia"
-        decided = [
-            (1.0 if plus < minus else -1.0, what)
-            for what, plus, minus, allowed in checks
-            if max(plus, minus) > allowed and min(plus, minus) < CLEARER * max(plus, minus)
-        ]
-        signs = {sign for sign, _ in decided}
+        evidence = {
+            block: 1.0 if plus < minus else -1.0
+            for block, plus, minus, allowed in misfits
+            if max(plus, minus) > allowed and min(plus, minus) < MAX_MISFIT_RATIO * max(plus, minus)
+        }
+        signs = set(evidence.values())
         if len(signs) > 1:
-            raise self._error("its blocks disagree about the sign of the products", blocks["centre"])
+            raise self._error("its blocks disagree about the sign of the products", blocks[_Block.CENTRE])
         names = {1.0: "+integral of x y dm", -1.0: "entries of the tensor, -integral of x y dm"}
         if signs:
             sign = signs.pop()
-            return sign, f"products listed as {names[sign]}, found by {' and '.join(what for _, what in decided)}"
-        if stated := NOTATION.search(self.text):
-            sign = 1.0 if stated[1].lower() == "positive" else -1.0
-            return sign, f"products listed as {names[sign]}, as the report states ({stated[1].lower()} tensor notation)"
+            return sign, f"products listed as {names[sign]}, found by {' and '.join(evidence)}"
+        if notation := NOTATION.search(self.text):
+            word = notation[1].lower()
+            sign = 1.0 if word == "positive" else -1.0
+            return sign, f"products listed as {names[sign]}, as the report states ({word} tensor notation)"
         return 1.0, f"products taken as {names[1.0]}, SolidWorks' default: the other blocks do not decide their sign"
 
-    def _principal_misses(self, listed: Array, half: Array, block: re.Match[str]) -> tuple[float, float, float]:
-        """Return by how much both tensors miss the principal moments, kg m^2, and what rounding explains."""
+    def _principal_misfit(self, listed: Array, half: Array, block: re.Match[str]) -> _Misfit:
+        """Return the deviation of both tensors from the principal moments and axes."""
         unit, entries = self._moment_unit(block), self._entries(block, "P")
         if missing := [k for k in "xyz" if k not in entries]:
             raise self._error(f"no P{missing[0]}; expected the principal moments Px, Py, Pz", block)
         moments = unit * np.array([entries[k].value for k in "xyz"])
-        rounding = ROUNDED * (np.abs(half).max() + unit * max(entries[k].half for k in "xyz"))
-        allowed = float(rounding + 1e-9 * np.abs(moments).max())
-        misses = []
+        rounding = MISFIT_ROUNDINGS * (np.abs(half).max() + unit * max(entries[k].half for k in "xyz"))
+        deviations = []
         axes = {match[1]: match for match in AXIS.finditer(self.text, block.end())}
         for sign in (1.0, -1.0):
-            tensor = np.where(np.eye(3, dtype=bool), listed, -sign * listed)
-            miss = float(np.abs(np.linalg.eigvalsh(tensor) - np.sort(moments)).max())
+            tensor = _with_products_times(-sign, listed)
+            deviation = float(np.abs(np.linalg.eigvalsh(tensor) - np.sort(moments)).max())
             if set(axes) == set("xyz"):
                 rows = np.array([[self._number(axes[k][j], axes[k]).value for j in (2, 3, 4)] for k in "xyz"])
                 last = max(self._number(axes["x"][j], axes["x"]).half for j in (2, 3, 4))
-                off = np.abs(rows @ tensor - moments[:, None] * rows).max() - 4 * last * np.abs(moments).max()
-                miss = max(miss, float(off))
-            misses.append(miss)
-        return misses[0], misses[1], allowed
+                residual = np.abs(rows @ tensor - moments[:, None] * rows).max() - 4 * last * np.abs(moments).max()
+                deviation = max(deviation, float(residual))
+            deviations.append(deviation)
+        allowed = float(rounding + 1e-9 * np.abs(moments).max())
+        return _Misfit("the principal moments and axes", deviations[0], deviations[1], allowed)
 
-    def _steiner_misses(
-        self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]
-    ) -> tuple[float, float, float]:
-        """Return by how much both signs miss the block at the origin, kg m^2, and what rounding explains."""
+    def _steiner_misfit(self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]) -> _Misfit:
+        """Return the deviation of both tensors, with Steiner's terms, from the block at the origin."""
         origin, origin_half = self._tensor(block, "I")
-        diagonal, mass, com, com_half = np.eye(3, dtype=bool), centre.mass, centre.com, centre.com_half
+        mass, com, com_half = centre.mass, centre.com, centre.com_half
         steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
         reach = float(np.abs(com).max()) + com_half
         allowed = (
-            ROUNDED * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
+            MISFIT_ROUNDINGS * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
             + 1e-9 * np.abs(origin).max()
         )
-        allowed += ROUNDED * centre.mass_share * float(np.abs(steiner).max())
+        allowed += MISFIT_ROUNDINGS * centre.relative_half * float(np.abs(steiner).max())
         difference = origin - listed
-        expected = [np.where(diagonal, steiner, -sign * steiner) for sign in (1.0, -1.0)]
-        plus, minus = (float(np.abs(difference - one).max()) for one in expected)
-        return plus, minus, float(allowed)
+        plus, minus = (float(np.abs(difference - _with_products_times(-s, steiner)).max()) for s in (1.0, -1.0))
+        return _Misfit("Steiner's terms of the block at the output coordinate system", plus, minus, float(allowed))
 
-    def _found(self, pattern: re.Pattern[str], expected: str) -> re.Match[str]:
+    def _match(self, pattern: re.Pattern[str], expected: str) -> re.Match[str]:
         match = pattern.search(self.text)
         if match is None:
             raise ModelError(f"{self.path}, line {self.first}: expected {expected}, as SolidWorks writes it in English")
@@ -264,12 +279,15 @@ class _Reader:
     def _number(self, text: str, at: re.Match[str]) -> _Number:
         if "," in text or text.count(".") > 1:
             raise self._error(f"found {text[:40]!r}; decimal commas are not read, write 1.5 for 1,5", at)
-        digits, _, exponent = text.lower().partition("e")
-        places = len(digits.partition(".")[2])
-        return _Number(
-            float(text), 0.5 * 10.0 ** (int(exponent or 0) - places) if abs(int(exponent or 0)) < 300 else 0.0
-        )
+        mantissa, _, exponent_text = text.lower().partition("e")
+        places, exponent = len(mantissa.partition(".")[2]), int(exponent_text or 0)
+        return _Number(float(text), 0.5 * 10.0 ** (exponent - places) if abs(exponent) < 300 else 0.0)
 
     def _error(self, message: str, at: re.Match[str]) -> ModelError:
         line = self.first + self.text.count("\n", 0, at.start())
         return ModelError(f"{self.path}, line {line}: {message}")
+
+
+def _with_products_times(factor: float, tensor: Array) -> Array:
+    """Return a tensor, shape (3, 3), with the entries off its diagonal multiplied by a factor."""
+    return np.where(np.eye(3, dtype=bool), tensor, factor * tensor)

@@ -1,4 +1,4 @@
-"""Reading a URDF into links and joints, checked on the way.
+"""Reader of URDFs: links and joints, checked while they are read.
 
 Pinocchio and yourdfpy accept links with two parents, circles beside the tree, axes of zero length and NaN masses, and
 read missing limits as [0, 0]. Here they are refused, or read by a stated rule with a warning.
@@ -14,27 +14,42 @@ from pathlib import Path
 
 import numpy as np
 
-from dhkit.description import Array, pose
+from dhkit.description import Array, Box, Capsule, Cylinder, Geometry, Mesh, Sphere, pose
+from dhkit.description.bodies import eigenvalue_tolerance
 from dhkit.errors import ModelError
-from dhkit.model.urdf_tree import MOVING, Inertial, UrdfJoint, UrdfLink, UrdfShape, UrdfTree
-from dhkit.model.urdf_xml import Element, child_name, numbers, parsed
+from dhkit.expressions import exact
+from dhkit.model.urdf_tree import (
+    AXIS_KINDS,
+    ElementName,
+    Inertial,
+    JointKind,
+    UrdfJoint,
+    UrdfLink,
+    UrdfShape,
+    UrdfTree,
+    UrdfWarning,
+)
+from dhkit.model.urdf_xml import Element, child_name, number, numbers, parse_urdf
 
 MAX_LINKS = 500
-"""Thousands of fixed joints in a row crash Pinocchio."""
+"""Largest number of links, and of joints: thousands of fixed joints in a row crash Pinocchio."""
 MAX_SHAPES = 2_000
-JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
-SAME_LENGTH = 1e-6
-"""Relative: an axis whose length differs more from 1 was hardly meant as a unit vector, and is said."""
-SAME_TURN = 1e-4
-"""How far a quaternion's length may be from 1: it is normalised."""
-FAR = 1e6
-"""m: nothing that is to be seen is larger or farther away."""
-OWN = "dhkit:"
+"""Largest number of visual or collision elements of a link."""
+UNIT_LENGTH_TOLERANCE = 1e-6
+"""Largest difference of an axis' length from 1 without a warning: other axes were hardly meant as unit vectors."""
+QUATERNION_TOLERANCE = 1e-4
+"""Largest difference of a quaternion's length from 1; it is normalized."""
+MAX_SHAPE_DISTANCE = 1e6
+"""Largest size and distance of a shape, m."""
+OWN_PREFIX = "dhkit:"
 """Beginning of the names that dhkit adds for other readers."""
-LEAST_DIGITS = 3
-"""Significant digits of a decimal that is taken for a rounded multiple of 15 degrees."""
-DECIMALS = range(3, 10)
-"""Decimals of the rounded right angles whose misses are read as 0."""
+MIN_DIGITS = 3
+"""Smallest number of significant digits of a decimal that is taken for a rounded multiple of 15 degrees."""
+ROUND_SIZES = (("radius", 1), ("length", 1))
+GEOMETRY_SIZES = {"box": (("size", 3),), "cylinder": ROUND_SIZES, "capsule": ROUND_SIZES, "sphere": (("radius", 1),)}
+"""Attributes with the sizes of a geometry, and how many numbers each has."""
+ROUNDED_DECIMALS = range(3, 10)
+"""Numbers of decimals of rounded right angles whose differences from the right angle are read as 0."""
 
 
 def read_urdf(path: str | Path, *, as_designed: bool = False) -> UrdfTree:
@@ -55,34 +70,38 @@ def read_urdf(path: str | Path, *, as_designed: bool = False) -> UrdfTree:
         The file cannot be read or breaks a rule; names file, element and value in one line.
     """
     path = Path(path)
-    return _Reader(path, as_designed).tree(parsed(path))
+    try:
+        return _Reader(path, as_designed).tree(parse_urdf(path))
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
 
 
 class _Reader:
-    """Reads one file; collects what is odd."""
+    """Reads one file and collects its warnings; messages do not name the file."""
 
     def __init__(self, path: Path, as_designed: bool) -> None:
         self.path = path
         self.as_designed = as_designed
-        self.warnings: list[str] = []
+        self.warnings: list[UrdfWarning] = []
         self.changes: list[str] = []
 
     def tree(self, robot: Element) -> UrdfTree:
         """Return the checked tree."""
-        link_elements = self._named(robot, "link")
-        joint_elements = self._named(robot, "joint")
-        parents = self._parents(link_elements, joint_elements)
-        root = self._root(link_elements, joint_elements, parents)
+        link_elements, joint_elements = _by_name(robot, "link"), _by_name(robot, "joint")
+        parents = _parent_joints(link_elements, joint_elements)
+        root = _root(link_elements, joint_elements, parents)
         colors = {
             name: color
             for material in robot.findall("material")
-            if (name := material.get("name")) and (color := self._color(material))
+            if (name := material.get("name")) and (color := _color(material))
         }
-        joints = {name: self._joint(name, element) for name, element in joint_elements.items()}
+        joints = {name: self._joint(ElementName("joint", name), element) for name, element in joint_elements.items()}
         for joint in joints.values():
             if joint.mimics is not None and joint.mimics not in joints:
-                self.warnings.append(f"joint {joint.name!r} follows {joint.mimics[:60]!r}, which is no joint")
-        links = {name: self._link(name, element, colors) for name, element in link_elements.items()}
+                self._warn(ElementName("joint", joint.name), f" follows {joint.mimics[:60]!r}, which is no joint")
+        links = {
+            name: self._link(ElementName("link", name), element, colors) for name, element in link_elements.items()
+        }
         return UrdfTree(
             path=self.path,
             name=robot.get("name", ""),
@@ -95,75 +114,29 @@ class _Reader:
             changes=tuple(self.changes),
         )
 
-    def _named(self, robot: Element, tag: str) -> dict[str, Element]:
-        elements = robot.findall(tag)
-        if len(elements) > MAX_LINKS:
-            raise ModelError(f"{self.path}: {len(elements)} {tag}s; expected {MAX_LINKS} at most")
-        named: dict[str, Element] = {}
-        for element in elements:
-            name = element.get("name", "")
-            if not name or not name.isprintable() or name.startswith(OWN):
-                raise ModelError(f"{self.path}: a {tag} has the name {name[:60]!r}; expected text")
-            if name in named:
-                raise ModelError(f"{self.path}: two {tag}s have the name {name[:60]!r}")
-            named[name] = element
-        return named
+    def _warn(self, element: ElementName, text: str) -> None:
+        self.warnings.append(UrdfWarning(element, text))
 
-    def _parents(self, links: Mapping[str, Element], joints: Mapping[str, Element]) -> dict[str, str]:
-        """Return each link's joint to its parent."""
-        if not links:
-            raise ModelError(f"{self.path}: no links; expected a robot (of a xacro file: what xacro makes of it)")
-        parents: dict[str, str] = {}
-        for name, joint in joints.items():
-            child, parent = child_name(joint, "child"), child_name(joint, "parent")
-            for tag, link in (("parent", parent), ("child", child)):
-                if link not in links:
-                    raise ModelError(f"{self.path}: joint {name!r}: <{tag}> is {link[:60]!r}, which is no link")
-            if child in parents:
-                raise ModelError(
-                    f"{self.path}: link {child!r} has two parents, by joints {parents[child]!r} and {name!r}"
-                )
-            parents[child] = name
-        return parents
-
-    def _root(self, links: Mapping[str, Element], joints: Mapping[str, Element], parents: Mapping[str, str]) -> str:
-        """Return the link without a parent; refuse none, several, and links that go round in a circle."""
-        roots = [link for link in links if link not in parents]
-        if len(roots) > 1:
-            raise ModelError(f"{self.path}: not connected: {_listed(roots)} have no parent; expected one root")
-        children: dict[str, list[str]] = {}
-        for child, name in parents.items():
-            children.setdefault(child_name(joints[name], "parent"), []).append(child)
-        reached, waiting = set(roots), list(roots)
-        while waiting:
-            for child in children.get(waiting.pop(), ()):
-                reached.add(child)
-                waiting.append(child)
-        if beyond := [link for link in links if link not in reached]:
-            raise ModelError(f"{self.path}: links {_listed(beyond)} go round in a circle; expected a tree")
-        return roots[0]
-
-    def _joint(self, name: str, joint: Element) -> UrdfJoint:
-        where = f"{self.path}: joint {name!r}"
-        kind = joint.get("type", "")
-        if kind not in JOINT_TYPES:
-            raise ModelError(f"{where} is {kind[:40]!r}; expected one of {', '.join(JOINT_TYPES)}")
+    def _joint(self, name: ElementName, joint: Element) -> UrdfJoint:
+        if joint.get("type", "") not in list(JointKind):
+            raise ModelError(f"{name} is {joint.get('type', '')[:40]!r}; expected one of {', '.join(JointKind)}")
+        kind = JointKind(joint.get("type", ""))
         mimic, dynamics = joint.find("mimic"), joint.find("dynamics")
-        moving = kind in MOVING
+        has_axis = kind in AXIS_KINDS
         damping, friction = (
-            (numbers(where, dynamics, key, 1) or [0.0])[0] if moving else 0.0 for key in ("damping", "friction")
+            (number(str(name), dynamics, key) or 0.0) if has_axis else 0.0 for key in ("damping", "friction")
         )
         if damping < 0 or friction < 0:
-            raise ModelError(f"{where}: damping {damping:g}, friction {friction:g}; expected none below 0")
-        velocity, effort = (self._largest(name, joint, key) if moving else None for key in ("velocity", "effort"))
+            raise ModelError(f"{name}: damping {damping:g}, friction {friction:g}; expected none below 0")
+        velocity, effort = (self._largest(name, joint, key) if has_axis else None for key in ("velocity", "effort"))
         return UrdfJoint(
-            name=name,
+            name=name.name,
             kind=kind,
             parent=child_name(joint, "parent"),
             child=child_name(joint, "child"),
-            T_parent_joint=self._origin(f"joint {name!r}", joint.find("origin")),
-            axis=self._axis(name, joint) if moving else np.array([1.0, 0.0, 0.0]),
-            limits=self._limits(name, joint) if moving else None,
+            T_parent_joint=self._origin(str(name), joint.find("origin")),
+            axis=self._axis(name, joint) if has_axis else np.array([1.0, 0.0, 0.0]),
+            limits=self._limits(name, joint) if has_axis else None,
             velocity=velocity,
             effort=effort,
             damping=damping,
@@ -171,179 +144,218 @@ class _Reader:
             mimics=None if mimic is None else mimic.get("joint", ""),
         )
 
-    def _origin(self, what: str, origin: Element | None) -> Array:
-        """Return a pose from xyz and rpy; what is missing is 0."""
-        where = f"{self.path}: {what}"
+    def _origin(self, where: str, origin: Element | None) -> Array:
+        """Return the pose of xyz and rpy, or of a quaternion; missing ones are 0."""
         xyz = numbers(where, origin, "xyz", 3) or [0.0] * 3
         if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
             if origin is not None and origin.get("rpy") is not None:
                 raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")
-            if abs(math.hypot(*quaternion) - 1) > SAME_TURN:
+            if abs(math.hypot(*quaternion) - 1) > QUATERNION_TOLERANCE:
                 raise ModelError(f"{where}: <origin quat_xyzw>: found length {math.hypot(*quaternion):.4g}; expected 1")
             return pose(xyz, quat=quaternion)
         rpy = numbers(where, origin, "rpy", 3) or [0.0] * 3
         if self.as_designed and origin is not None and any(rpy):
-            rpy = [
-                self._designed_angle(what, word, value)
-                for word, value in zip(origin.get("rpy", "").split(), rpy, strict=True)
-            ]
+            for i, (word, value) in enumerate(zip(origin.get("rpy", "").split(), rpy, strict=True)):
+                rpy[i] = _designed_angle(word, value)
+                if rpy[i] != value:
+                    self.changes.append(f"{where}: rpy {word} read as {math.degrees(rpy[i]):.6g} degrees")
         return pose(xyz, euler=rpy, order="xyz")
 
-    def _designed_angle(self, what: str, word: str, value: float) -> float:
-        designed = _rounded_from(word, value)
-        if designed != value:
-            self.changes.append(f"{what}: rpy {word} read as {math.degrees(designed):.6g} degrees")
-        return designed
-
-    def _axis(self, name: str, joint: Element) -> Array:
-        given = numbers(f"{self.path}: joint {name!r}", joint.find("axis"), "xyz", 3) or [1.0, 0.0, 0.0]
-        largest = max(map(abs, given))
+    def _axis(self, name: ElementName, joint: Element) -> Array:
+        entries = numbers(str(name), joint.find("axis"), "xyz", 3) or [1.0, 0.0, 0.0]
+        largest = max(map(abs, entries))
         if not largest > 0:
-            raise ModelError(f"{self.path}: joint {name!r}: <axis xyz>: found 0 0 0; expected a direction")
-        axis = np.array(given) / largest  # first, since squares of 1e200 overflow
+            raise ModelError(f"{name}: <axis xyz>: found 0 0 0; expected a direction")
+        axis = np.array(entries) / largest  # first, since squares of 1e200 overflow
         length = float(np.linalg.norm(axis))
-        if not 1 - SAME_LENGTH < length * largest < 1 + SAME_LENGTH:
-            self.warnings.append(f"joint {name!r}: axis has length {length * largest:.6g}; read as a direction")
+        if not 1 - UNIT_LENGTH_TOLERANCE < length * largest < 1 + UNIT_LENGTH_TOLERANCE:
+            self._warn(name, f": axis has length {length * largest:.6g}; read as a direction")
         axis = axis / length
         nearest = np.round(axis)
         small = axis[nearest == 0]
         if self.as_designed and small.any() and all(_is_rounding_of_zero(float(x)) for x in small):
-            self.changes.append(f"joint {name!r}: axis read as {' '.join(f'{x:g}' for x in nearest)}")
+            self.changes.append(f"{name}: axis read as {' '.join(f'{x:g}' for x in nearest)}")
             return np.asarray(nearest)
         return axis
 
-    def _limits(self, name: str, joint: Element) -> tuple[float, float] | None:
-        limit, where = joint.find("limit"), f"{self.path}: joint {name!r}"
-        lower, upper = (numbers(where, limit, key, 1) for key in ("lower", "upper"))
-        if joint.get("type") == "continuous":
+    def _limits(self, name: ElementName, joint: Element) -> tuple[float, float] | None:
+        limit = joint.find("limit")
+        lower, upper = (number(str(name), limit, key) for key in ("lower", "upper"))
+        if joint.get("type") == JointKind.CONTINUOUS:
             return None
-        if limit is None or (not lower and not upper):
-            self.warnings.append(f"joint {name!r}: no limits; read as unlimited")
+        if lower is None and upper is None:
+            self._warn(name, ": no limits; read as unlimited")
             return None
-        low, high = (lower or [0.0])[0], (upper or [0.0])[0]
+        low, high = lower or 0.0, upper or 0.0
         if low == high == 0:
-            self.warnings.append(f"joint {name!r}: limits [0, 0]; read as unlimited")
+            self._warn(name, ": limits [0, 0]; read as unlimited")
             return None
         if low > high:
-            raise ModelError(f"{where}: limits [{low:g}, {high:g}] are the wrong way round")
+            raise ModelError(f"{name}: limits [{low:g}, {high:g}] are the wrong way round")
         return low, high
 
-    def _largest(self, name: str, joint: Element, key: str) -> float | None:
+    def _largest(self, name: ElementName, joint: Element, key: str) -> float | None:
+        """Return the largest speed or torque, None for unlimited."""
         limit = joint.find("limit")
         if limit is not None and limit.get(key, "").strip().lower() in ("inf", "+inf", "infinity"):
-            self.warnings.append(f"joint {name!r}: {key} {limit.get(key)}; read as unlimited")
+            self._warn(name, f": {key} {limit.get(key)}; read as unlimited")
             return None
-        found = numbers(f"{self.path}: joint {name!r}", limit, key, 1)
-        if found and found[0] < 0:
-            raise ModelError(f"{self.path}: joint {name!r}: {key} is {found[0]:g}; expected none below 0")
-        if found and found[0] == 0:
-            self.warnings.append(f"joint {name!r}: {key} 0; read as unlimited")
-        return found[0] if found and found[0] > 0 else None
+        value = number(str(name), limit, key)
+        if value is not None and value < 0:
+            raise ModelError(f"{name}: {key} is {value:g}; expected none below 0")
+        if value == 0:
+            self._warn(name, f": {key} 0; read as unlimited")
+        return value or None
 
-    def _link(self, name: str, link: Element, colors: Mapping[str, str]) -> UrdfLink:
+    def _link(self, name: ElementName, link: Element, colors: Mapping[str, str]) -> UrdfLink:
         visuals, collisions = (tuple(self._shapes(name, link.findall(tag), colors)) for tag in ("visual", "collision"))
-        return UrdfLink(name, self._inertial(name, link.find("inertial")), visuals, collisions)
+        return UrdfLink(name.name, self._inertial(name, link.find("inertial")), visuals, collisions)
 
-    def _inertial(self, name: str, inertial: Element | None) -> Inertial | None:
+    def _inertial(self, name: ElementName, inertial: Element | None) -> Inertial | None:
         if inertial is None:
             return None
-        where = f"{self.path}: link {name!r}"
-        mass = numbers(where, inertial.find("mass"), "value", 1)
-        listed = [
-            numbers(where, inertial.find("inertia"), f"i{key}", 1) for key in ("xx", "yy", "zz", "xy", "yz", "xz")
-        ]
-        if not mass or not all(listed):
-            raise ModelError(f"{where}: <inertial> lacks mass or inertia; expected value, ixx, iyy, izz, ixy, iyz, ixz")
-        if mass[0] < 0:
-            raise ModelError(f"{where}: mass is {mass[0]:g}; expected none below 0")
-        (xx,), (yy,), (zz,), (xy,), (yz,), (xz,) = listed
-        lowest, *_, highest = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if lowest < -(1e-12 + 1e-9 * abs(highest)):
-            self.warnings.append(f"link {name!r}: no body has this inertia: a principal moment is {lowest:.3g} kg m^2")
-        T = self._origin(f"link {name!r}: inertial", inertial.find("origin"))
-        own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Inertial(mass[0], T[:3, 3], T[:3, :3] @ own @ T[:3, :3].T)
+        mass = number(str(name), inertial.find("mass"), "value")
+        keys = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+        moments = [x for key in keys for x in numbers(str(name), inertial.find("inertia"), key, 1)]
+        if mass is None or len(moments) != len(keys):
+            raise ModelError(f"{name}: <inertial> lacks mass or inertia; expected value, {', '.join(keys)}")
+        if mass < 0:
+            raise ModelError(f"{name}: mass is {mass:g}; expected none below 0")
+        xx, yy, zz, xy, yz, xz = moments
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        lowest, *_, highest = np.linalg.eigvalsh(tensor)
+        if lowest < -eigenvalue_tolerance(highest):
+            self._warn(name, f": no body has this inertia: a principal moment is {lowest:.3g} kg m^2")
+        T = self._origin(f"{name}: inertial", inertial.find("origin"))
+        return Inertial(mass, T[:3, 3], T[:3, :3] @ tensor @ T[:3, :3].T)
 
-    def _shapes(self, link: str, elements: Sequence[Element], colors: Mapping[str, str]) -> Iterator[UrdfShape]:
+    def _shapes(self, name: ElementName, elements: Sequence[Element], colors: Mapping[str, str]) -> Iterator[UrdfShape]:
         if len(elements) > MAX_SHAPES:
-            raise ModelError(f"{self.path}: link {link!r} has {len(elements)} shapes; expected {MAX_SHAPES} at most")
+            raise ModelError(f"{name} has {len(elements)} shapes; expected {MAX_SHAPES} at most")
         for element in elements:
-            what = f"link {link!r}: {element.tag}"
-            T, color, geometry = self._origin(what, element.find("origin")), None, element.find("geometry")
-            material = element.find("material")
+            T = self._origin(f"{name}: {element.tag}", element.find("origin"))
+            color, material = None, element.find("material")
             if material is not None:
-                color = self._color(material) or colors.get(material.get("name", ""))
-            shape = None if geometry is None else self._geometry(what, geometry, T, color)
-            if shape is None:
-                self.warnings.append(f"{what} has no geometry that dhkit knows; left out")
-            elif max(*map(abs, shape.sizes), np.abs(T[:3, 3]).max()) > FAR:
-                self.warnings.append(f"{what} is larger than {FAR:g} m or farther away; left out")
+                color = _color(material) or colors.get(material.get("name", ""))
+            geometry, size = self._geometry(name, element)
+            if geometry is None:
+                self._warn(name, f": {element.tag} has no geometry that dhkit knows; left out")
+            elif max(size, np.abs(T[:3, 3]).max()) > MAX_SHAPE_DISTANCE:
+                text = f": {element.tag} is larger than {MAX_SHAPE_DISTANCE:g} m or farther away; left out"
+                self._warn(name, text)
             else:
-                yield shape
+                yield UrdfShape(geometry, T, color)
 
-    def _geometry(self, what: str, geometry: Element, T: Array, color: str | None) -> UrdfShape | None:
-        where = f"{self.path}: {what}"
-        sizes: list[float] | None = None
-        for element in geometry:
-            match element.tag:
-                case "mesh":
-                    scale = numbers(where, element, "scale", 3) or [1.0, 1.0, 1.0]
-                    if not all(scale) or not element.get("filename"):
-                        self.warnings.append(f"{what}: a mesh without a file name or with scale 0; left out")
-                        return None
-                    return UrdfShape("mesh", tuple(scale), T, element.get("filename", ""), color)
-                case "box":
-                    sizes = numbers(where, element, "size", 3)
-                case "cylinder" | "capsule":
-                    sizes = [*numbers(where, element, "radius", 1), *numbers(where, element, "length", 1)]
-                    sizes = sizes if len(sizes) == 2 else None
-                case "sphere":
-                    sizes = numbers(where, element, "radius", 1)
-            if sizes and min(sizes) > 0:
-                return UrdfShape(element.tag, tuple(sizes), T, color=color)
-        return None
-
-    def _color(self, material: Element) -> str | None:
-        element = material.find("color")
-        rgba = [] if element is None else element.get("rgba", "").split()
-        try:
-            levels = [round(255 * min(max(float(word), 0.0), 1.0)) for word in rgba[:3]]
-        except ValueError:
-            return None  # a colour is not worth a robot
-        return "#{:02x}{:02x}{:02x}".format(*levels) if len(levels) == 3 else None
+    def _geometry(self, name: ElementName, shape: Element) -> tuple[Geometry | None, float]:
+        """Return the first known geometry of a visual or collision element, and its largest size or scale."""
+        where = f"{name}: {shape.tag}"
+        for element in shape.find("geometry") or ():
+            keys = GEOMETRY_SIZES.get(element.tag, ())
+            sizes = [size for key, count in keys for size in numbers(where, element, key, count)]
+            entries = [exact(size) for size in sizes] if sizes and min(sizes) > 0 else []
+            match element.tag, entries:
+                case "mesh", _:
+                    sizes = numbers(where, element, "scale", 3) or [1.0, 1.0, 1.0]
+                    if not all(sizes) or not element.get("filename"):
+                        self._warn(name, f": {shape.tag}: a mesh without a file name or with scale 0; left out")
+                        return None, 0.0
+                    x, y, z = map(exact, sizes)
+                    return Mesh(element.get("filename", ""), (x, y, z)), max(map(abs, sizes))
+                case "box", [x, y, z]:
+                    return Box((x, y, z)), max(sizes)
+                case "cylinder", [radius, length]:
+                    return Cylinder(radius, length), max(sizes)
+                case "capsule", [radius, length]:
+                    return Capsule(radius, length), max(sizes)
+                case "sphere", [radius]:
+                    return Sphere(radius), max(sizes)
+        return None, 0.0
 
 
-def _rounded_from(word: str, value: float) -> float:
+def _by_name(robot: Element, tag: str) -> dict[str, Element]:
+    """Return a robot's links or joints by name; refuse too many, invalid names and repeated ones."""
+    elements = robot.findall(tag)
+    if len(elements) > MAX_LINKS:
+        raise ModelError(f"{len(elements)} {tag}s; expected {MAX_LINKS} at most")
+    named: dict[str, Element] = {}
+    for element in elements:
+        name = element.get("name", "")
+        if not name or not name.isprintable() or name.startswith(OWN_PREFIX):
+            raise ModelError(f"a {tag} has the name {name[:60]!r}; expected text")
+        if name in named:
+            raise ModelError(f"two {tag}s have the name {name[:60]!r}")
+        named[name] = element
+    return named
+
+
+def _parent_joints(links: Mapping[str, Element], joints: Mapping[str, Element]) -> dict[str, str]:
+    """Return the name of the joint between each link and its parent."""
+    if not links:
+        raise ModelError("no links; expected a robot (of a xacro file: what xacro makes of it)")
+    parents: dict[str, str] = {}
+    for name, joint in joints.items():
+        for tag in ("parent", "child"):
+            if (link := child_name(joint, tag)) not in links:
+                raise ModelError(f"joint {name!r}: <{tag}> is {link[:60]!r}, which is no link")
+        child = child_name(joint, "child")
+        if child in parents:
+            raise ModelError(f"link {child!r} has two parents, by joints {parents[child]!r} and {name!r}")
+        parents[child] = name
+    return parents
+
+
+def _root(links: Mapping[str, Element], joints: Mapping[str, Element], parents: Mapping[str, str]) -> str:
+    """Return the link without a parent; refuse none, several, and links that form a circle."""
+    roots = [link for link in links if link not in parents]
+    if len(roots) > 1:
+        raise ModelError(f"not connected: {', '.join(roots)[:200]} have no parent; expected one root")
+    children: dict[str, list[str]] = {}
+    for child, name in parents.items():
+        children.setdefault(child_name(joints[name], "parent"), []).append(child)
+    reached = list(roots)
+    for link in reached:  # grows while it is traversed
+        reached += children.get(link, ())
+    if unreached := [link for link in links if link not in reached]:
+        raise ModelError(f"links {', '.join(unreached)[:200]} go round in a circle; expected a tree")
+    return roots[0]
+
+
+def _color(material: Element) -> str | None:
+    element = material.find("color")
+    rgba = [] if element is None else element.get("rgba", "").split()
+    try:
+        levels = [round(255 * min(max(float(word), 0.0), 1.0)) for word in rgba[:3]]
+    except ValueError:
+        return None  # an invalid colour is no reason to refuse a robot
+    return "#{:02x}{:02x}{:02x}".format(*levels) if len(levels) == 3 else None
+
+
+def _designed_angle(word: str, value: float) -> float:
     """Return the multiple of 15 degrees that a decimal of at least three digits rounds or cuts, or the value itself.
 
-    A miss of a rounded right angle, such as 3.6732e-06, is read as 0.
+    The difference of a right angle and its decimal, such as 3.6732e-06, is read as 0.
     """
     if _is_rounding_of_zero(value):
         return 0.0
-    step = round(value * 12 / math.pi) * math.pi / 12
-    number = Decimal(word)
-    digits, exponent = number.as_tuple().digits, number.as_tuple().exponent
-    if len(digits) < LEAST_DIGITS or not isinstance(exponent, int) or abs(step) > 2 * math.pi + 1e-9 or exponent > 0:
+    multiple = round(value * 12 / math.pi) * math.pi / 12
+    decimal = Decimal(word)
+    digits, exponent = decimal.as_tuple().digits, decimal.as_tuple().exponent
+    if len(digits) < MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
         return value
     unit = Decimal(1).scaleb(exponent)
-    exact = Decimal(step)
-    nearest = (exact.quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
-    return step if number in nearest and step else value
+    roundings = (Decimal(multiple).quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
+    return multiple if decimal in roundings and multiple else value
 
 
 def _is_rounding_of_zero(value: float) -> bool:
-    """Return whether a small number is what is left of a right angle that was rounded: 1.5708 - pi/2 = 3.67e-6."""
-    return abs(value) < 1e-12 or any(math.isclose(abs(value), miss, rel_tol=1e-3) for miss in _misses())
+    """Return whether a number is the difference of a right angle and its decimal: 1.5708 - pi/2 = 3.67e-6."""
+    return abs(value) < 1e-12 or any(math.isclose(abs(value), error, rel_tol=1e-3) for error in _rounding_errors())
 
 
 @lru_cache(maxsize=1)
-def _misses() -> tuple[float, ...]:
-    """Return how far right angles are from their decimals, rounded and cut, rad."""
-    rights = [k * math.pi / 2 for k in range(1, 5)]
-    misses = {abs(round(right, k) - right) for right in rights for k in DECIMALS}
-    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in rights for k in DECIMALS}
-    return tuple(miss for miss in misses | cut if miss < 2e-4)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)[:200]
+def _rounding_errors() -> tuple[float, ...]:
+    """Return the differences of right angles and their decimals, rounded and cut, rad."""
+    right_angles = [k * math.pi / 2 for k in range(1, 5)]
+    rounded = {abs(round(right, k) - right) for right in right_angles for k in ROUNDED_DECIMALS}
+    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in right_angles for k in ROUNDED_DECIMALS}
+    return tuple(error for error in rounded | cut if error < 2e-4)

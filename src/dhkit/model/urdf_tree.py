@@ -1,17 +1,51 @@
-"""A URDF as data: links and joints of one tree, as :mod:`dhkit.model.urdf_reader` makes it."""
+"""A URDF as data: links and joints of one tree, as :mod:`dhkit.model.urdf_reader` reads them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array
+from dhkit.description import Array, Geometry
 from dhkit.model.urdf_xml import Element
 
-MOVING = ("revolute", "continuous", "prismatic")
+
+class JointKind(StrEnum):
+    """Types of joints in a URDF."""
+
+    REVOLUTE = "revolute"
+    CONTINUOUS = "continuous"
+    PRISMATIC = "prismatic"
+    FIXED = "fixed"
+    FLOATING = "floating"
+    PLANAR = "planar"
+
+
+AXIS_KINDS = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
+
+
+class ElementName(NamedTuple):
+    """A link or joint of a URDF; prints as ``joint 'elbow'``."""
+
+    tag: Literal["link", "joint"]
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.tag} {self.name!r}"
+
+
+class UrdfWarning(NamedTuple):
+    """An unusual element of a URDF, and how it was read; prints as one line."""
+
+    element: ElementName
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.element}{self.text}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,26 +59,20 @@ class Inertial:
 
 @dataclass(frozen=True, eq=False)
 class UrdfShape:
-    """What a link looks like or collides with, as the URDF states it.
+    """A visual or collision shape of a link.
 
     Attributes
     ----------
-    kind
-        mesh, box, cylinder, sphere or capsule.
-    sizes
-        Edges of a box, radius and length of a cylinder or capsule, radius of a sphere, scale (3) of a mesh.
+    geometry
+        Sizes in m; the path of a mesh is the URDF's file name or URI.
     T_link_shape
         Shape (4, 4), m.
-    file
-        The mesh's file name or URI; empty for other kinds.
     color
         ``#rrggbb``, or None.
     """
 
-    kind: str
-    sizes: tuple[float, ...]
+    geometry: Geometry
     T_link_shape: Array
-    file: str = ""
     color: str | None = None
 
 
@@ -65,7 +93,7 @@ class UrdfJoint:
     Attributes
     ----------
     T_parent_joint
-        Shape (4, 4), m: where the joint, and the child link with it at zero, stands in the parent link.
+        Shape (4, 4), m: the pose of the joint, and of the child link with the joint at zero, in the parent link.
     axis
         Unit vector, shape (3,), in the joint's frame; of moving joints.
     limits
@@ -79,7 +107,7 @@ class UrdfJoint:
     """
 
     name: str
-    kind: str
+    kind: JointKind
     parent: str
     child: str
     T_parent_joint: Array
@@ -92,9 +120,19 @@ class UrdfJoint:
     mimics: str | None
 
     @property
-    def is_moving(self) -> bool:
-        """Whether it is one of revolute, continuous and prismatic."""
-        return self.kind in MOVING
+    def is_fixed(self) -> bool:
+        """Whether the joint cannot move."""
+        return self.kind is JointKind.FIXED
+
+    @property
+    def is_prismatic(self) -> bool:
+        """Whether the joint slides along its axis."""
+        return self.kind is JointKind.PRISMATIC
+
+    @property
+    def has_axis(self) -> bool:
+        """Whether the joint is revolute, continuous or prismatic."""
+        return self.kind in AXIS_KINDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +144,7 @@ class UrdfTree:
     path, name
         The file, and the robot's name in it.
     element
-        The XML that was read, for readers behind this gate.
+        The XML that was read, for other readers of this checked text.
     links, joints
         By name, in the file's order.
     parent_joint
@@ -114,9 +152,9 @@ class UrdfTree:
     root
         The link without a parent.
     warnings
-        What was odd, with how it was read.
+        Unusual elements, and how they were read.
     changes
-        What ``as_designed`` read differently from how it is written.
+        Numbers that ``as_designed`` read differently from how they are written.
     """
 
     path: Path
@@ -126,29 +164,29 @@ class UrdfTree:
     joints: Mapping[str, UrdfJoint]
     parent_joint: Mapping[str, UrdfJoint]
     root: str
-    warnings: tuple[str, ...]
+    warnings: tuple[UrdfWarning, ...]
     changes: tuple[str, ...]
 
     def joints_to(self, link: str, base: str | None = None) -> tuple[UrdfJoint, ...] | None:
-        """Return the joints from a base (the root if not given) to a link; None if the base is not on the way."""
-        end, along = self.root if base is None else base, []
+        """Return the joints from a base (the root if not given) to a link; None if the base is not on that path."""
+        end, joints = self.root if base is None else base, []
         while link != end:
             joint = self.parent_joint.get(link)
             if joint is None:
                 return None
-            along.append(joint)
+            joints.append(joint)
             link = joint.parent
-        return tuple(along[::-1])
+        return tuple(joints[::-1])
 
     def zero_poses(self) -> dict[str, Array]:
-        """Return all links in the root link, shape (4, 4) each, with every joint at zero."""
+        """Return the poses of all links in the root link, shape (4, 4) each, m, with every joint at zero."""
         poses: dict[str, Array] = {self.root: np.eye(4)}
         for link in self.links:
-            along = []
+            without_pose = []
             while link not in poses:
-                along.append(link)
+                without_pose.append(link)
                 link = self.parent_joint[link].parent
-            for below in reversed(along):
-                joint = self.parent_joint[below]
-                poses[below] = poses[joint.parent] @ joint.T_parent_joint
+            for child in reversed(without_pose):
+                joint = self.parent_joint[child]
+                poses[child] = poses[joint.parent] @ joint.T_parent_joint
         return poses

@@ -1,4 +1,4 @@
-"""Optimal trajectories: objectives, constraints, the planner, and certificates of what it found."""
+"""Optimal trajectories: objectives, constraints, the planner, and certificates of the limits of a motion."""
 
 from dhkit.description import Payload
 from dhkit.planning.along import along_path

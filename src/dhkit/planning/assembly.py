@@ -1,4 +1,4 @@
-"""From a program's numbers to a trajectory that joins its configurations exactly."""
+"""Trajectories from the variables of a program, corrected to pass exactly through the given configurations."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from dhkit.planning.problem import Knots
 from dhkit.trajectories import Trajectory
 
 ROUNDS = 2
-"""Corrections: the first leaves what rounding makes of it."""
+"""Number of corrections: the second removes the rounding error of the first."""
 
 
-def assembled(description: Description, mesh: Mesh, knots: Knots, *, fixed_ends: bool) -> Trajectory:
+def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, fixed_ends: bool) -> Trajectory:
     """Return the motion of a program's accelerations.
 
-    Ipopt leaves gaps of some 1e-8 between intervals. Integrated from the start, they would add up at the goal; so the
-    accelerations are changed, as little as possible, to lead exactly through every leg's end.
+    Ipopt leaves gaps of about 1e-8 between intervals, which would add up at the goal. The accelerations are therefore
+    changed by the least squares correction that makes the motion pass exactly through the end of every leg.
 
     Parameters
     ----------
@@ -57,7 +57,10 @@ def _integrated(knots: Knots, qdd: Array, h: Array, W: Array, U: Array) -> tuple
 
 @lru_cache(maxsize=32)
 def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
-    """Return how an interval's accelerations change velocity (times h) and position (times h^2), (K, columns) each."""
+    """Return the weights of accelerations in an interval's changes of velocity (times h) and position (times h^2).
+
+    Shape (K, columns) each.
+    """
     step = (1, 2, 1, 2)[curve.value]
     w = ((1.0,), (1 / 2, 1 / 2), (1 / 2, 1 / 2), (1 / 6, 4 / 6, 1 / 6))[curve.value]
     u = ((1 / 2,), (1 / 3, 1 / 6), (1 / 3, 1 / 6), (1 / 6, 1 / 3, 0.0))[curve.value]
@@ -68,7 +71,7 @@ def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
 
 
 def _acceleration_polynomials(curve: Curve, qdd: Array, h: Array) -> tuple[Array, Array, Array]:
-    """Return each interval's acceleration a, slope b and curvature c: qdd = a + b t + c t^2."""
+    """Return the coefficients a, b, c of the acceleration qdd = a + b t + c t^2 in each interval."""
     h = h[:, None]
     if curve is Curve.CONSTANT:
         return qdd, 0 * qdd, 0 * qdd
@@ -81,12 +84,12 @@ def _acceleration_polynomials(curve: Curve, qdd: Array, h: Array) -> tuple[Array
 
 
 def knots_along(trajectory: Trajectory, mesh: Mesh, ends: Array) -> Knots:
-    """Return a trajectory's values on a mesh, to start a solution from.
+    """Return the values of a trajectory on a mesh, as the start of a solution.
 
     Parameters
     ----------
     ends
-        When its legs end, shape (legs,), s.
+        Times at which its legs end, shape (legs,), s.
     """
     durations = np.diff(np.concatenate([[0.0], ends]))
     t = mesh.times(durations)

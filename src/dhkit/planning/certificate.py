@@ -1,4 +1,4 @@
-"""What a motion really keeps: its limits on a dense grid, by an independent path, and the slow-down they ask for."""
+"""Certificates: the limits of a motion checked on a dense grid with Pinocchio, and the slow-down they require."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.display import html_block, html_table, repr_line, value_line
-from dhkit.planning.clear import NOTHING, Surroundings
+from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
@@ -17,29 +17,29 @@ from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import default_limits
 
 POINTS = 24
-"""States an interval, both its ends included: more than anybody will ask for."""
-SPREAD = 4
-"""States an interval for each coefficient of its polynomials: extremes of those of high degree lie close together."""
-ACCEPTED = 5e-7
-"""By what share of a limit a certified motion may exceed it: half of what is promised."""
-ACTIVE = 0.99
-"""From this share of a limit on, it counts as active."""
+"""Number of states in an interval, with both ends: dense, since users sample a motion at any times."""
+POINTS_PER_COEFFICIENT = 4
+"""Number of states in an interval for each coefficient of its polynomials, whose extremes lie close together."""
+ACCEPTED_EXCESS = 5e-7
+"""Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
+ACTIVE_SHARE = 0.99
+"""Share of a limit from which it counts as active."""
 HALVINGS = 40
-TINY = 1e-9
-"""m: an arm of no reach."""
+MIN_REACH = 1e-9
+"""Smallest reach (m) used as a scale of lengths, for arms without reach."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One kind of limit on one motion."""
+    """Result of one kind of limit on one motion."""
 
     what: str
     excess: float
-    """By what share of the limit it is exceeded at worst; negative: what is left."""
+    """Largest excess as a share of the limit; negative if the limit is kept."""
     row: int
-    """The joint from 0, or the row of a constraint, that comes nearest to its limit."""
+    """Joint (from 0) or row of a constraint that comes nearest to its limit."""
     time: float
-    """When, s."""
+    """Time of the largest excess, s."""
 
     def __repr__(self) -> str:
         return value_line(self)
@@ -47,29 +47,29 @@ class Check:
 
 @dataclass(frozen=True)
 class Certificate:
-    """A motion's limits as checked on a dense grid."""
+    """Limits of a motion, checked on a dense grid."""
 
     checks: tuple[Check, ...]
     states: int
     reference: str
-    """Who worked out torques and poses."""
+    """Name of the library that computed torques and poses: Pinocchio, or dhkit if it is not installed."""
     active: tuple[tuple[str, int, float], ...]
-    """Limit, joint from 0, and the share of time in which the joint is at it."""
+    """Active limits: the kind, the joint from 0, and the share of time for which the joint is at it."""
     any_active: float
-    """The share of time in which some joint is at some limit."""
+    """Share of time for which at least one joint is at a limit."""
 
     @property
     def violation(self) -> float:
-        """The largest excess, as a share of its limit; 0 where nothing is limited."""
+        """Largest excess, as a share of its limit; 0 without limits."""
         return 0.0 if self.worst is None else self.worst.excess
 
     @property
     def ok(self) -> bool:
-        """Whether all limits are kept, up to half a millionth."""
-        return self.violation <= ACCEPTED
+        """Whether all limits are kept, up to 5e-7 of each."""
+        return self.violation <= ACCEPTED_EXCESS
 
-    def worsened(self, checks: Sequence[Check]) -> Certificate:
-        """Return the same with other checks of the same limits, where those are worse."""
+    def with_worse_checks(self, checks: Sequence[Check]) -> Certificate:
+        """Return the certificate with checks of the same limits replaced where the given ones are worse."""
         by_name = {check.what: check for check in self.checks}
         for check in checks:
             if check.what not in by_name or check.excess > by_name[check.what].excess:
@@ -78,7 +78,7 @@ class Certificate:
 
     @property
     def worst(self) -> Check | None:
-        """The check that comes nearest to its limit, or exceeds it most; None where nothing is limited."""
+        """The check with the largest excess; None without limits."""
         return max(self.checks, key=lambda check: check.excess, default=None)
 
     def __repr__(self) -> str:
@@ -113,20 +113,20 @@ def certify(
     friction: bool | Friction | None = None,
     payload: Payload | None = None,
 ) -> Certificate:
-    """Check a motion that comes from anywhere against limits, as planned motions are.
+    """Check any motion against limits, with the checks that planned motions pass.
 
     Parameters
     ----------
     description
         The robot.
     motion
-        A motion of it.
+        A motion of the robot.
     limits
-        Of position, velocity, acceleration, jerk and torque; the robot's own unless given.
+        Limits of position, velocity, acceleration, jerk and torque; the robot's own unless given.
     friction
-        Torques of friction that drives must supply too, False for none; the motion's own unless given.
+        Friction that the drives' torques include, False for none; the motion's own unless given.
     payload
-        What the tool carries; the motion's own unless given.
+        Payload of the tool; the motion's own unless given.
 
     Raises
     ------
@@ -153,27 +153,27 @@ def certify(
     carried = motion.payload if payload is None else payload
     loaded = description if carried is None else carried.carried(description)
     chosen = motion.friction if friction is None else Friction.chosen(friction)
-    points = max(POINTS, SPREAD * motion.coefficients.shape[1])
+    points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1])
     certificate = Checker(loaded, limits, friction=chosen, points=points).check(motion)
-    return certificate.worsened(_extremes(motion, limits, points))
+    return certificate.with_worse_checks(_extremes(motion, limits, points))
 
 
 @dataclass(frozen=True, eq=False)
 class Checker:
-    """The limits of a motion, ready to be checked."""
+    """Limits and constraints of a motion, for checking trajectories against them."""
 
     description: Description
-    """With its payload."""
+    """The robot with its payload."""
     limits: Limits
     constraints: tuple[Constraint, ...] = ()
     parameters: tuple[Array, ...] = ()
     friction: Friction | None = None
-    surroundings: Surroundings = NOTHING
+    avoidance: CollisionAvoidance = NO_AVOIDANCE
     points: int = POINTS
-    """States an interval, both its ends included."""
+    """Number of states in an interval, with both ends."""
 
     def states(self, trajectory: Trajectory) -> States:
-        """Return a motion's states on the grid, both sides of each break."""
+        """Return the states of a motion on the grid, on both sides of each break."""
         s = np.linspace(0.0, 1.0, self.points)
         breaks = trajectory.breaks
         t = breaks[:-1, None] + np.diff(breaks)[:, None] * s
@@ -182,7 +182,7 @@ class Checker:
         return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), self.points)
 
     def measured(self, states: States) -> list[tuple[str, Array]]:
-        """Return every kind of limit with its use, shape (N, k): 1 where the limit is reached."""
+        """Return each kind of limit with its use, shape (N, k), which is 1 at the limit."""
         limits, found = self.limits, []
         for what, values, limit in (
             ("velocity", states.qd, limits.velocity),
@@ -195,22 +195,22 @@ class Checker:
         for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
             values = constraint.measured(states, parameters)
             found.append((constraint.what, np.abs(values) if constraint.low == -1 else values))
-        if self.surroundings:
-            short = self.surroundings.clearance - self.surroundings.gaps(self.description, states.q)
-            found.append(("clearance", 1 + short[:, None] / max(self.description.reach, TINY)))
+        if self.avoidance:
+            short = self.avoidance.clearance - self.avoidance.gaps(self.description, states.q)
+            found.append(("clearance", 1 + short[:, None] / max(self.description.reach, MIN_REACH)))
         return found
 
     def peaks(self, states: States) -> list[tuple[str, Array]]:
-        """Return the same of a grid's states, raised by what is missed between them.
+        """Return each kind of limit with its use at the grid's states, shape (N, k), raised to its peak between states.
 
-        Between states of an interval a use is as high as the parabola through three of them.
+        The peak is that of the parabola through three neighbouring states of an interval.
         """
-        return [(what, use + _rises(use, self.points)) for what, use in self.measured(states)]
+        return [(what, use + _parabola_rises(use, self.points)) for what, use in self.measured(states)]
 
     def positions(self, states: States) -> Array:
-        """Return by what share of its range each joint leaves it at a grid's states, shape (N, n); negative inside.
+        """Return the excess of each joint value over its limits at the grid's states, shape (N, n); negative inside.
 
-        Raised as in :meth:`peaks`.
+        In shares of the limit (:func:`position_sizes`), raised to peaks between states as in :meth:`peaks`.
         """
         lower, upper = self.limits.lower, self.limits.upper
         size = position_sizes(self.limits)
@@ -218,12 +218,12 @@ class Checker:
             return np.full(states.q.shape, -np.inf)
         with np.errstate(invalid="ignore"):
             excess = np.stack([(lower - states.q) / size, (states.q - upper) / size])
-            raised = [np.where(np.isfinite(side), side + _rises(side, self.points), side) for side in excess]
+            raised = [np.where(np.isfinite(side), side + _parabola_rises(side, self.points), side) for side in excess]
         worst: Array = np.maximum(*raised)
         return worst
 
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
-        """Check a motion; ``states``: those of it, where they are known."""
+        """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
         states = self.states(trajectory) if states is None else states
         checks, active, anywhere = [], [], np.zeros(len(states.times), dtype=bool)
         share = _time_shares(trajectory, states)
@@ -236,19 +236,19 @@ class Checker:
             checks.append(_largest_jerk(trajectory, self.limits.jerk))
         for what, use in self.peaks(states):
             checks.append(_check(what, use - 1, states.times))
-            reached = use >= ACTIVE
+            reached = use >= ACTIVE_SHARE
             anywhere |= reached.any(axis=1)
             active += [(what, i, float(share @ reached[:, i])) for i in range(use.shape[1]) if reached[:, i].any()]
         return Certificate(tuple(checks), len(states.times), states.reference, tuple(active), float(share @ anywhere))
 
     def slow_down(self, states: States) -> float:
-        """Return the least c >= 1 by which the motion must be slowed down to keep what depends on velocity.
+        """Return the smallest factor c >= 1 of the duration with which limits that depend on velocity are kept.
 
-        Infinite where no slow-down helps: something is exceeded at rest. For motions from rest to rest.
+        Infinite if a limit is exceeded even at rest. Only for motions from rest to rest.
         """
 
         def keeps(c: float) -> bool:
-            return all(np.nanmax(use, initial=0.0) <= 1.0 for _, use in self._moving(states.slowed(c)))
+            return all(np.nanmax(use, initial=0.0) <= 1.0 for _, use in self._velocity_dependent(states.slowed(c)))
 
         if keeps(1.0):
             return 1.0
@@ -265,20 +265,20 @@ class Checker:
                 break
         return high
 
-    def _moving(self, states: States) -> list[tuple[str, Array]]:
+    def _velocity_dependent(self, states: States) -> list[tuple[str, Array]]:
         resting = {constraint.what for constraint in self.constraints if not constraint.moving}
-        moving = replace(self, surroundings=NOTHING)
+        moving = replace(self, avoidance=NO_AVOIDANCE)
         return [(what, use) for what, use in moving.peaks(states) if what not in resting]
 
 
 def position_sizes(limits: Limits) -> Array:
-    """Return by what positions outside their limits are measured, shape (n,): the larger limit, or 1 rad or m."""
+    """Return the scales of positions outside their limits, shape (n,): the larger limit, at least 1 rad or m."""
     size = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
     return np.where(np.isfinite(size) & (size > 0), size, 1.0)
 
 
-def _rises(use: Array, points: int) -> Array:
-    """Return how much higher than each value, (N, k), the vertex of the parabola through it and its neighbours is."""
+def _parabola_rises(use: Array, points: int) -> Array:
+    """Return the height of the parabola's vertex over each value, shape (N, k), through it and its neighbours."""
     values = use.reshape(-1, points, use.shape[1])
     slope, bend = (values[:, 2:] - values[:, :-2]) / 2, np.diff(values, 2, axis=1)
     inside = (bend < 0) & (np.abs(slope) < np.abs(bend))
@@ -292,7 +292,7 @@ def _check(what: str, excess: Array, times: Array) -> Check:
 
 
 def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
-    """Return where a motion's positions or velocities jump most between its pieces; None where they do not."""
+    """Return the largest jump of positions or velocities between pieces of a motion; None if there is none."""
     inner = trajectory.breaks[1:-1]
     if not len(inner):
         return None
@@ -309,21 +309,21 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
         found.append(Check(what, float(jumps[k, i]), int(i), float(inner[k])))
     worst = max(found, key=lambda check: check.excess)
-    return worst if worst.excess > ACCEPTED else None
+    return worst if worst.excess > ACCEPTED_EXCESS else None
 
 
 def _largest_jerk(trajectory: Trajectory, limit: Array) -> Check:
-    """Return where a motion's jerk uses most of its limit: at an end of an interval, or inside one of high degree."""
+    """Return the largest use of the jerk limits: at ends of intervals, and inside pieces of high degree."""
     pieces = trajectory.pieces.differentiated(3)
     degree = pieces.coefficients.shape[1] - 1
-    t, values = pieces.inside(2) if degree < 2 else pieces.extremes(SPREAD * (degree + 1))
+    t, values = pieces.inside(2) if degree < 2 else pieces.extremes(POINTS_PER_COEFFICIENT * (degree + 1))
     use = np.abs(values) / limit
     k, p, i = np.unravel_index(int(np.argmax(use)), use.shape)
     return Check("jerk", float(use[k, p, i] - 1), int(i), float(t[k, p] if t.ndim == 2 else t[k, p, i]))
 
 
 def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
-    """Return what positions, rates and accelerations use where they are extreme, found from so many points a piece."""
+    """Return the checks of the extremes of positions, rates and accelerations, searched from ``points`` in a piece."""
     found = []
     size = position_sizes(limits)
     for order, what in enumerate(("position", "velocity", "acceleration")):
@@ -339,7 +339,7 @@ def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
 
 
 def _time_shares(trajectory: Trajectory, states: States) -> Array:
-    """Return each state's share of the duration by the trapezoidal rule, shape (N,)."""
+    """Return the share of the duration of each state by the trapezoidal rule, shape (N,)."""
     K = len(trajectory.breaks) - 1
     weights = np.ones(len(states.times) // K)
     weights[[0, -1]] = 0.5

@@ -1,7 +1,7 @@
-"""What a motion must keep besides the joints' limits, as small values.
+"""Constraints of a motion besides the joint limits, as immutable value objects.
 
-A constraint is written twice: as rows of symbols for the optimizer, and as numbers of a motion's samples by another
-path (Pinocchio's kinematics and dynamics), by which the result is certified. Rows are scaled so that 1 is the limit.
+A constraint is written twice: as CasADi expressions for the optimizer, and as numbers at samples of a motion, from
+Pinocchio's kinematics and dynamics, for the certificate. Both are scaled so that 1 is the limit.
 """
 
 from __future__ import annotations
@@ -25,43 +25,43 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Constraint:
-    """Something that must stay between ``low`` and ``high`` in every state."""
+    """A quantity that must stay between ``low`` and 1 in every state of a motion."""
 
     moving: ClassVar[bool] = True
-    """Whether velocity counts: a motion that is slowed down enough keeps it."""
+    """Whether the quantity depends on velocity, so that a motion keeps the constraint if it is slow enough."""
     low: ClassVar[float] = -math.inf
     high: ClassVar[float] = 1.0
     needs_torque: ClassVar[bool] = False
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         raise NotImplementedError
 
-    def told(self, use: float) -> str:
-        """Return a use of the limit, 1 where it is reached, in words."""
+    def use_text(self, use: float) -> str:
+        """Return a use of the limit (1 at the limit) as text."""
         return f"{100 * use:.4g} % of its limit"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay between ``low`` and 1, k x 1."""
+        """Return the limited expressions, k x 1, without unit, between ``low`` and 1."""
         raise NotImplementedError
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         raise NotImplementedError
 
     def size(self, description: Description) -> int:
-        """Return how many parameters it takes."""
+        """Return the number of parameters."""
         return 0
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return its parameters for a motion whose tool begins at a pose, shape (size,)."""
+        """Return the parameters of a motion that starts at the tool's pose ``T_start`` (4, 4), shape (size,)."""
         return np.zeros(0)
 
 
 @dataclass(frozen=True)
 class MotorPower(Constraint):
-    """The mechanical power of each joint, tau qd, W, both ways."""
+    """Limit of the mechanical power |tau qd| of each joint, W."""
 
     watts: float | tuple[float, ...]
     low = -1.0
@@ -72,15 +72,15 @@ class MotorPower(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "motor power"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         return point.tau * point.qd / _each(self.watts, point.n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         return states.tau * states.qd / _each(self.watts, states.n)
 
     def __repr__(self) -> str:
@@ -89,12 +89,12 @@ class MotorPower(Constraint):
 
 @dataclass(frozen=True)
 class TorqueSpeedLine(Constraint):
-    """A motor's torque falls with its speed: tau / stall + qd / no-load speed stays within -1 and 1."""
+    """Torque-speed line of a motor: tau / stall torque + qd / no-load speed stays between -1 and 1."""
 
     stall_torque: float | tuple[float, ...]
-    """Joint side, N m or N."""
+    """Stall torque at the joint, N m or N: one number, or one for each joint."""
     no_load_speed: float | tuple[float, ...]
-    """Joint side, rad/s or m/s."""
+    """No-load speed at the joint, rad/s or m/s, likewise."""
     low = -1.0
     needs_torque = True
 
@@ -104,16 +104,16 @@ class TorqueSpeedLine(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "torque-speed line"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         n = point.n
         return point.tau / _each(self.stall_torque, n) + point.qd / _each(self.no_load_speed, n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         n = states.n
         measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(self.no_load_speed, n)
         return measured
@@ -130,7 +130,7 @@ def _each(value: float | tuple[float, ...], n: int) -> Array:
 
 
 def positive(name: str, value: float | ArrayLike) -> float | tuple[float, ...]:
-    """Return numbers that are positive; a ValueError names whose they are not."""
+    """Return a positive number or a tuple of shape (n,), of any unit; a ValueError names the argument."""
     array = number_array(value, name, "(n,)")
     if array.ndim > 1 or not array.size or not (array > 0).all():
         raise ValueError(f"{name}: {value!r}; expected positive numbers")

@@ -1,4 +1,4 @@
-"""What a motion costs: objectives integrated over it, by the path that certifies."""
+"""Objectives integrated over a motion, from the states that certify it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-"""Exact to degree 9: of a motion's squared jerk, and of its squared torques up to their curvature in an interval."""
+"""Gauss-Legendre rule of 5 points, exact to degree 9: for squared jerk, and nearly so for squared torques."""
 
 
 def cost_of(
     objective: Objective, trajectory: Trajectory, description: Description, friction: Friction | None = None
 ) -> float:
-    """Return an objective's value for a motion, in the units of its terms; ``description`` may carry a load."""
+    """Return an objective's value for a motion, in the units of its terms; ``description`` may include a payload."""
     rates, weights = _rates(objective, trajectory, description, friction)
     return float(weights @ sum(rates))
 
@@ -25,7 +25,7 @@ def cost_of(
 def size_of(
     objective: Objective, trajectory: Trajectory, description: Description, friction: Friction | None = None
 ) -> float:
-    """Return how large an objective is along a motion: its terms without their signs."""
+    """Return the magnitude of an objective along a motion: the integral of its terms' absolute values."""
     rates, weights = _rates(objective, trajectory, description, friction)
     return float(weights @ sum(np.abs(rate) for rate in rates))
 
@@ -33,7 +33,7 @@ def size_of(
 def _rates(
     objective: Objective, trajectory: Trajectory, description: Description, friction: Friction | None
 ) -> tuple[list[Array], Array]:
-    """Return each term's rate at a quadrature's nodes, shape (N,), and the nodes' weights."""
+    """Return each term's integrand at the quadrature's nodes, shape (N,), and the weights of the nodes, s."""
     h = np.diff(trajectory.breaks)[:, None]
     times = trajectory.breaks[:-1, None] + h * (NODES + 1) / 2
     weights = (h * WEIGHTS / 2).ravel()

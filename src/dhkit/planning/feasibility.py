@@ -1,4 +1,4 @@
-"""Why there is no motion: said before a solver would find out, in words."""
+"""Checks before a solution starts: reasons why no motion can exist, as error messages."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.description.joint_words import joint_words, outside_words
+from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.goals import Place
 from dhkit.planning.objectives import Objective
 from dhkit.planning.states import States
-from dhkit.planning.task import Task
+from dhkit.planning.task import PlanTask
 from dhkit.trajectories import Limits, quintic, trapezoidal
 
-BARELY = 1e-6
-"""By what share of a constraint rounding may exceed it."""
-EDGE = 1e-9
-"""rad and m: how far outside its limits rounding may put a joint."""
+CONSTRAINT_ROUNDING = 1e-6
+"""Excess of a constraint, as a share of it, that counts as rounding."""
+LIMIT_ROUNDING = 1e-9
+"""Distance of a joint value from its limits (rad or m) that counts as rounding."""
 
 
 def require_inside_limits(description: Description, limits: Limits, q: Array, where: str) -> None:
-    """Refuse a configuration outside the joint limits.
+    """Require joint values q (n,), rad and m, inside the joint limits.
 
     Raises
     ------
@@ -31,15 +31,15 @@ def require_inside_limits(description: Description, limits: Limits, q: Array, wh
         Names the joint and the limit.
     """
     excess = np.maximum(limits.lower - q, q - limits.upper)
-    if not excess.max() > EDGE:
+    if not excess.max() > LIMIT_ROUNDING:
         return
     i = int(np.argmax(excess))
-    words = outside_words(q[i], limits.lower[i], limits.upper[i], slides=bool(description.numbers.prismatic[i]))
+    words = violated_limit_text(q[i], limits.lower[i], limits.upper[i], slides=bool(description.numbers.prismatic[i]))
     raise PlanningError(f"{where}: joint {description.joints[i].name} is at {words}")
 
 
 def require_speed(description: Description, limits: Limits, qd: Array, where: str) -> None:
-    """Refuse a velocity beyond its limit.
+    """Require joint rates qd (n,), rad/s and m/s, within their limits.
 
     Raises
     ------
@@ -51,24 +51,24 @@ def require_speed(description: Description, limits: Limits, qd: Array, where: st
         return
     i = int(np.argmax(excess))
     slides = bool(description.numbers.prismatic[i])
-    found, bound = (joint_words(x, slides=slides, rate="/s") for x in (abs(qd[i]), limits.velocity[i]))
-    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {found}, above its limit, {bound}")
+    durations, bound = (joint_text(x, slides=slides, rate="/s") for x in (abs(qd[i]), limits.velocity[i]))
+    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {durations}, above its limit, {bound}")
 
 
 def require_holdable(description: Description, limits: Limits, q: Array, where: str) -> None:
-    """Refuse a configuration in which the arm's torques do not hold it.
+    """Require joint values q (n,), rad and m, at which the torque limits suffice to hold the arm.
 
     Raises
     ------
     PlanningError
-        Names the joint, what it takes and what it has.
+        Names the joint, the torque for holding it, and its limit.
     """
     if np.isinf(limits.torque).all():
         return
     still = np.zeros((1, description.n))
     g = States(description, np.zeros(1), q[None], still, still).gravity_torque[0]
     excess = np.abs(g) - limits.torque
-    if not (excess > EDGE * limits.torque).any():
+    if not (excess > LIMIT_ROUNDING * limits.torque).any():
         return
     i = int(np.argmax(np.abs(g) / limits.torque))
     unit = "N" if description.numbers.prismatic[i] else "N m"
@@ -78,32 +78,32 @@ def require_holdable(description: Description, limits: Limits, q: Array, where: 
     )
 
 
-def require_kept(description: Description, constraints: Sequence[Constraint], T_start: Array, spot: Place) -> None:
-    """Refuse a place that breaks a constraint at rest, by its configuration or its pose.
+def require_kept(description: Description, constraints: Sequence[Constraint], T_start: Array, place: Place) -> None:
+    """Require that a place keeps the constraints at rest; ``T_start`` (4, 4), m, is the tool's pose at the start.
 
     Raises
     ------
     PlanningError
         Names the constraint.
     """
-    q = np.zeros(description.n) if spot.q is None else spot.q
+    q = np.zeros(description.n) if place.q is None else place.q
     still = np.zeros((1, description.n))
     states = States(description, np.zeros(1), q[None], still, still)
-    if spot.T is not None:
-        states = states.with_tool(spot.T[None])
+    if place.T is not None:
+        states = states.with_tool(place.T[None])
     for constraint in constraints:
         use = float(constraint.measured(states, constraint.values(description, T_start)).max())
-        if use > 1 + BARELY:
-            raise PlanningError(f"{spot.name}: its {constraint.what} is not allowed: {constraint.told(use)}")
+        if use > 1 + CONSTRAINT_ROUNDING:
+            raise PlanningError(f"{place.name}: its {constraint.what} is not allowed: {constraint.use_text(use)}")
 
 
 def require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:
-    """Refuse a time-optimal motion of a joint that could jump.
+    """Require limits that keep every moving joint of a time-optimal motion from jumping.
 
     Parameters
     ----------
     moves
-        Which joints have to move, shape (n,).
+        Whether each joint has to move, shape (n,), without unit.
 
     Raises
     ------
@@ -121,16 +121,16 @@ def require_bounded(description: Description, limits: Limits, objective: Objecti
         )
 
 
-def classical(task: Task) -> tuple[tuple[str, float], ...]:
+def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:
     """Return the durations of a quintic and of the best trapezoid along the straight joint path, under its limits, s.
 
-    None for what they cannot do: with configurations on the way, other ends than rest, obstacles, or friction.
+    Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction.
     """
     if (
         len(task.points) > 2
         or not task.rests
         or task.friction is not None
-        or task.surroundings
+        or task.avoidance
         or task.checker.constraints
     ):
         return ()
@@ -138,11 +138,11 @@ def classical(task: Task) -> tuple[tuple[str, float], ...]:
     def torques(q: Array, qd: Array, qdd: Array) -> Array:
         return States(task.description, np.zeros(len(q)), q, qd, qdd).tau
 
-    found = []
+    durations = []
     for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
         try:
             motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
         except PlanningError:
-            continue  # the straight way may lead through where the arm is too weak
-        found.append((name, motion.duration))
-    return tuple(found)
+            continue  # the straight path may need more than the torque limits
+        durations.append((name, motion.duration))
+    return tuple(durations)

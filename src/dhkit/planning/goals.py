@@ -11,50 +11,50 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, check_pose, joint_array
 from dhkit.description.arrays import number_array
-from dhkit.description.joint_words import joint_words
+from dhkit.description.joint_text import joint_text
 from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
 from dhkit.kinematics import inverse_kinematics, solve_numerically
 from dhkit.trajectories import Limits
 
-SEARCHES = 24
-"""Starts of the iteration for arms without a closed form."""
-SAME = 1e-3
-"""rad and m: solutions nearer to each other are one."""
-MOST = 32
-"""Ways through all branches that are thought of at most, the shortest ones."""
+ITERATION_STARTS = 24
+"""Number of starts of the iterative solution, for arms without a closed form."""
+SAME_SOLUTION = 1e-3
+"""Largest difference of joint values (rad or m) between two solutions that count as the same."""
+MAX_ROUTES = 32
+"""Largest number of routes through the branches of all places; the shortest are kept."""
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a motion is to be: one configuration, or all that have the tool in a pose."""
+    """A place that a motion passes: one configuration q, or all configurations with the tool at a pose T."""
 
     name: str
-    """``"start"``, ``"goal"`` or ``"via 2"``."""
+    """``"start"``, ``"goal"`` or ``"via 2"``, for messages."""
     q: Array | None
     T: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """One way through all places."""
+    """One configuration for each place, in order."""
 
     points: Array
-    """Shape (legs + 1, n)."""
+    """Configurations, shape (legs + 1, n), rad and m."""
     label: str
-    """The branches taken, empty where there was no choice."""
+    """Names of the chosen branches; empty if there was no choice."""
     bound: float
-    """s: no motion along it is faster."""
+    """Lower bound of the duration from the speed limits, s."""
     length: float
-    """By which ways are ordered that are not bounded: of the straight joint path, joints measured by their speeds."""
+    """Length of the straight joint path, each joint divided by its speed limit: orders routes without a bound."""
 
 
-def place(description: Description, value: ArrayLike | str, name: str) -> Place:
-    """Return what an argument means: joint values (n,), the name of a configuration, or a pose (4, 4) of the tool.
+def parse_place(description: Description, value: ArrayLike | str, name: str) -> Place:
+    """Return the place of an argument: joint values (n,), the name of a configuration, or a pose (4, 4) of the tool.
 
     Raises
     ------
     PlanningError
-        No such configuration.
+        A name that is not one of the arm's configurations.
     ValueError, TypeError
         Another shape, values that are not finite, or not numbers.
     """
@@ -79,8 +79,8 @@ def place(description: Description, value: ArrayLike | str, name: str) -> Place:
     return Place(name, q)
 
 
-def routes(description: Description, limits: Limits, places: Sequence[Place]) -> list[Route]:
-    """Return the ways through places, the most promising first.
+def find_routes(description: Description, limits: Limits, places: Sequence[Place]) -> list[Route]:
+    """Return the routes through all places, sorted by their lower bounds of the duration.
 
     Raises
     ------
@@ -89,43 +89,47 @@ def routes(description: Description, limits: Limits, places: Sequence[Place]) ->
     PlanningError
         A pose that it reaches only outside its limits.
     """
-    ways: list[tuple[list[Array], list[str]]] = [([], [])]
-    for spot in places:
+    routes: list[tuple[list[Array], list[str]]] = [([], [])]
+    for place in places:
         longer = []
-        for points, labels in ways:
+        for points, labels in routes:
             near = points[-1] if points else None
-            for q, label in _configurations(description, limits, spot, near):
+            for q, label in _configurations(description, limits, place, near):
                 longer.append(([*points, q], [*labels, label] if label else labels))
-        longer.sort(key=lambda way: _length(limits, np.stack(way[0])))
-        ways = longer[:MOST]
+        longer.sort(key=lambda route: _length(limits, np.stack(route[0])))
+        routes = longer[:MAX_ROUTES]
     made = [
         Route(
             np.stack(points), " then ".join(labels), _bound(limits, np.stack(points)), _length(limits, np.stack(points))
         )
-        for points, labels in ways
+        for points, labels in routes
     ]
     return sorted(made, key=lambda route: (route.bound, route.length))
 
 
 def _configurations(
-    description: Description, limits: Limits, spot: Place, near: Array | None
+    description: Description, limits: Limits, place: Place, near: Array | None
 ) -> list[tuple[Array, str]]:
-    if spot.q is not None:
-        return [(spot.q, "")]
-    T = np.asarray(spot.T)
+    if place.q is not None:
+        return [(place.q, "")]
+    T = np.asarray(place.T)
     try:
-        found = inverse_kinematics(description, T)
-        every, labels = found.q, [str(label) for label in found.branches]
-        angles = found.within_limits(near)
+        solutions = inverse_kinematics(description, T)
+        every, labels = solutions.q, [str(label) for label in solutions.branches]
+        angles = solutions.within_limits(near)
     except (DescriptionError, ModelError):
-        every, labels = _iterated(description, T, near)
+        every, labels = _iterative_solutions(description, T, near)
         angles = every
     if not np.isfinite(every).all(axis=-1).any():
-        raise UnreachableError(f"{spot.name}: no joint values have the tool in the pose: {_where(T)} is out of reach")
-    inside = np.atleast_1d(((angles >= limits.lower - SAME**3) & (angles <= limits.upper + SAME**3)).all(axis=-1))
+        raise UnreachableError(
+            f"{place.name}: no joint values have the tool in the pose: {_position_text(T)} is out of reach"
+        )
+    inside = np.atleast_1d(
+        ((angles >= limits.lower - SAME_SOLUTION**3) & (angles <= limits.upper + SAME_SOLUTION**3)).all(axis=-1)
+    )
     if not inside.any():
         raise PlanningError(
-            f"{spot.name}: {_count(every)} of the pose at {_where(T)}, all outside the joint limits: "
+            f"{place.name}: {_count(every)} of the pose at {_position_text(T)}, all outside the joint limits: "
             f"{_excess(description, limits, every)}"
         )
     return [
@@ -136,33 +140,33 @@ def _configurations(
 
 
 def _count(every: Array) -> str:
-    """Return how many solutions there are, in words."""
+    """Return the number of solutions as text."""
     count = int(np.isfinite(every).all(axis=-1).sum())
     return f"{count} solution{'s' * (count != 1)}"
 
 
 def _excess(description: Description, limits: Limits, every: Array) -> str:
-    """Return which joint of the solution nearest to the limits is outside."""
+    """Return the joint that is outside in the solution nearest to the limits, and its limit, as text."""
     finite = every[np.isfinite(every).all(axis=-1)]
     excess = np.maximum(limits.lower - finite, finite - limits.upper)
     best = excess[np.argmin(np.maximum(excess, 0.0).sum(axis=1))]
     i = int(np.argmax(best))
-    words = joint_words(best[i], slides=bool(description.numbers.prismatic[i]), digits=4)
+    words = joint_text(best[i], slides=bool(description.numbers.prismatic[i]), digits=4)
     return f"at best joint {description.joints[i].name} by {words}"
 
 
-def _iterated(description: Description, T: Array, near: Array | None) -> tuple[Array, list[str]]:
-    """Return different solutions of a pose by iteration from several starts."""
+def _iterative_solutions(description: Description, T: Array, near: Array | None) -> tuple[Array, list[str]]:
+    """Return the distinct iterative solutions of a pose from several starts, and their (empty) labels."""
     numbers = description.numbers
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -np.pi)
     upper = np.where(np.isfinite(numbers.upper), numbers.upper, np.pi)
-    starts = np.random.default_rng(0).uniform(lower, upper, (SEARCHES, description.n))
+    starts = np.random.default_rng(0).uniform(lower, upper, (ITERATION_STARTS, description.n))
     if near is not None:
         starts[0] = near
-    found = solve_numerically(description, np.broadcast_to(T, (SEARCHES, 4, 4)), starts).q[:, 0]
+    solutions = solve_numerically(description, np.broadcast_to(T, (ITERATION_STARTS, 4, 4)), starts).q[:, 0]
     different: list[Array] = []
-    for q in found[np.isfinite(found).all(axis=1)]:
-        if not any(np.abs(q - other).max() < SAME for other in different):
+    for q in solutions[np.isfinite(solutions).all(axis=1)]:
+        if not any(np.abs(q - other).max() < SAME_SOLUTION for other in different):
             different.append(q)
     if not different:
         return np.full((1, description.n), np.nan), [""]
@@ -170,16 +174,16 @@ def _iterated(description: Description, T: Array, near: Array | None) -> tuple[A
 
 
 def _bound(limits: Limits, points: Array) -> float:
-    """Return the duration that speeds alone allow, s."""
+    """Return the lower bound of the duration from the speed limits, s."""
     return float(sum(np.max(np.abs(b - a) / limits.velocity) for a, b in pairwise(points)))
 
 
 def _length(limits: Limits, points: Array) -> float:
-    """Return the length of a way, joints measured by their speed limits where they have one."""
+    """Return the length of a route, each joint divided by its speed limit if it has one."""
     speed = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)
     return float(sum(np.linalg.norm((b - a) / speed) for a, b in pairwise(points)))
 
 
-def _where(T: Array) -> str:
+def _position_text(T: Array) -> str:
     x, y, z = T[:3, 3]
     return f"({x:.4g}, {y:.4g}, {z:.4g}) m"

@@ -1,4 +1,4 @@
-"""Where a solution starts from: legs along straight joint paths, about as fast as the limits allow."""
+"""Initial guesses: legs along straight joint paths, about as fast as the limits allow, and detours."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from dhkit.planning.assembly import knots_along
 from dhkit.planning.mesh import Mesh
 from dhkit.planning.problem import Knots
 from dhkit.planning.states import States
-from dhkit.planning.task import Task
+from dhkit.planning.task import PlanTask
 from dhkit.trajectories import Limits, Trajectory
 
 SAMPLES = 17
-"""States by which a leg's duration is guessed."""
-ROOM = 0.05
-"""Share of a torque that is at least counted on, where gravity takes nearly all."""
-ASIDE = 0.7
-"""How far a detour leads at most, of half a joint's range."""
-LONGER = 2.0
-"""How much longer it takes."""
+"""Number of states of a leg from which its duration is estimated."""
+MIN_TORQUE_SHARE = 0.05
+"""Smallest share of a torque limit assumed free for acceleration, where gravity needs nearly all of it."""
+DETOUR_SHARE = 0.7
+"""Largest deviation of a detour, as a share of half a joint's range."""
+DETOUR_DURATION_FACTOR = 2.0
+"""Factor of the duration of a detour over that of the straight path."""
 
 
 def leg_durations(description: Description, limits: Limits, points: Array) -> Array:
-    """Return about how long legs between configurations take from rest to rest, shape (legs,), s.
+    """Return estimates of the durations of legs between configurations, from rest to rest, shape (legs,), s.
 
     Each is the least duration of a cubic, with the torques that gravity leaves at each state; 0 without limits.
     """
@@ -40,23 +40,24 @@ def _leg(description: Description, limits: Limits, start: Array, goal: Array) ->
     found.append(np.cbrt(np.max(12 * np.abs(step) / limits.jerk)))
     if np.isfinite(limits.torque).any():
         states = States(description, x[:, 0], q, qd, qdd)
-        room = np.maximum(limits.torque - np.abs(states.gravity_torque), ROOM * limits.torque)
+        room = np.maximum(limits.torque - np.abs(states.gravity_torque), MIN_TORQUE_SHARE * limits.torque)
         found.append(np.sqrt(np.max(np.abs(states.tau - states.gravity_torque) / room)))
     return float(max(found))
 
 
-def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
-    """Return cubics between a task's configurations on a mesh, at rest in between."""
+def straight_knots(task: PlanTask, mesh: Mesh, durations: Array) -> Knots:
+    """Return cubics between a task's configurations on a mesh, at rest in between; durations of legs (legs,), s."""
     velocities = np.zeros_like(task.points)
     velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
     times = np.concatenate([[0.0], np.cumsum(durations)])
     return knots_along(Trajectory.from_samples(task.arm, times, task.points, velocities), mesh, times[1:])
 
 
-def usual_accelerations(task: Task, guess: Knots) -> Array:
-    """Return by what accelerations are measured, shape (n,): what a joint's torque gives it alone, or its limit.
+def usual_accelerations(task: PlanTask, guess: Knots) -> Array:
+    """Return the scales of accelerations, shape (n,), rad/s^2 and m/s^2.
 
-    Where neither is limited, twice the largest of a first guess.
+    The acceleration that the torque limit gives a joint alone, or its limit of acceleration; where neither is limited,
+    twice the largest of the initial guess.
     """
     limits, n = task.limits, task.arm.n
     largest = np.maximum(2 * np.abs(guess.qdd).max(axis=0), 1e-3)
@@ -69,15 +70,17 @@ def usual_accelerations(task: Task, guess: Knots) -> Array:
     return np.where(np.isfinite(usual), usual, np.maximum(largest, 0.05 * largest.max()))
 
 
-def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
-    """Return the same by way of random configurations, one halfway along each leg."""
+def detour(task: PlanTask, mesh: Mesh, durations: Array, seed: int) -> Knots:
+    """Return a guess through random configurations, one halfway along each leg; durations (legs,), s."""
     rng, limits, points = np.random.default_rng(seed), task.limits, task.points
     reach = np.where(task.arm.numbers.prismatic, max(task.arm.reach, 1e-3), np.pi)
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, reach)
-    halfway = (points[1:] + points[:-1]) / 2 + ASIDE * half * rng.uniform(-1, 1, (len(durations), task.arm.n))
+    halfway = (points[1:] + points[:-1]) / 2 + DETOUR_SHARE * half * rng.uniform(-1, 1, (len(durations), task.arm.n))
     rows = np.empty((2 * len(durations) + 1, task.arm.n))
     rows[0::2], rows[1::2] = points, np.clip(halfway, limits.lower, limits.upper)
     velocities = np.zeros_like(rows)
     velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
-    times = np.concatenate([[0.0], np.cumsum(np.repeat(durations * (1.0 if task.duration else LONGER) / 2, 2))])
+    times = np.concatenate(
+        [[0.0], np.cumsum(np.repeat(durations * (1.0 if task.duration else DETOUR_DURATION_FACTOR) / 2, 2))]
+    )
     return knots_along(Trajectory.from_samples(task.arm, times, rows, velocities), mesh, times[2::2])

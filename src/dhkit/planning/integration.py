@@ -1,4 +1,4 @@
-"""A motion's pieces as expressions: its accelerations integrated exactly, and what bounds it inside an interval."""
+"""Pieces of a motion as CasADi expressions: accelerations integrated exactly, and bounds inside intervals."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class MotionPieces:
-    """A motion's pieces as MX expressions; K intervals."""
+    """Pieces of a motion with K intervals as MX expressions."""
 
     q_end: casadi.MX
-    """Where intervals lead, n x K."""
+    """Joint values at the ends of intervals, n x K."""
     qd_end: casadi.MX
     q_inside: casadi.MX
-    """What bounds positions inside intervals, n x many."""
+    """Bernstein coefficients that bound positions inside intervals, n x any number."""
     qd_inside: casadi.MX | None
-    """What bounds velocities inside; None where knots do."""
+    """Coefficients that bound velocities inside intervals; None if the knots bound them."""
     qdd_inside: casadi.MX | None
-    """What bounds accelerations inside; None where knots and midpoints do."""
+    """Coefficients that bound accelerations inside intervals; None if knots and midpoints bound them."""
     q_middle: casadi.MX
-    """At the midpoints, n x K."""
+    """Joint values at the midpoints of intervals, n x K."""
     jerk: casadi.MX
-    """At the ends of intervals, n x many."""
+    """Jerks at the ends of intervals, n x any number."""
     squared_jerk: casadi.MX
-    """Its integral."""
+    """Integral of the squared jerk."""
     states: tuple[casadi.MX, casadi.MX, casadi.MX]
-    """q, qd, qdd where torques are asked for, n x P."""
+    """q, qd and qdd at the P points where torques are limited, n x P."""
     weights: casadi.MX
-    """By which values there are integrated over time, 1 x P."""
+    """Weights of these points in an integral over time, 1 x P, s."""
 
     @classmethod
     def of(cls, curve: Curve, Q: casadi.MX, V: casadi.MX, A: casadi.MX, H: casadi.MX, *, dense: bool) -> MotionPieces:
-        """Return a curve's pieces; ``dense``: with the midpoints among the states, where what is limited may bulge."""
+        """Return the pieces of a curve; with ``dense``, midpoints are among the states."""
         import casadi
 
         q, v, h = Q[:, :-1], V[:, :-1], H[0, :]
         if curve is Curve.CONSTANT:
-            # Positions are parabolas: those of an interval lie between its ends and q + h v / 2 (Bernstein).
+            # Positions are parabolas, inside the hull of their Bernstein coefficients: the ends and q + h v / 2.
             return cls(
                 q_end=q + H * v + H * H / 2 * A,
                 qd_end=v + H * A,
@@ -108,5 +108,5 @@ class MotionPieces:
 
 
 def _knots_of(curve: Curve, A: casadi.MX) -> casadi.MX:
-    """Return the accelerations at knots."""
+    """Return the accelerations at the knots, n x (K + 1)."""
     return A if curve is Curve.LINEAR else A[:, 0::2]

@@ -1,4 +1,4 @@
-"""What a motion is to have little of: objectives as small values that add and take weights."""
+"""Objectives (time, effort, energy, jerk) as immutable value objects with weights, which can be added."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dhkit.planning.states import States
 if TYPE_CHECKING:
     import casadi
 
-SOFT = 0.02
-"""Share of a joint's greatest power over which regenerated power fades out, so that it can be differentiated."""
+FADE_SHARE = 0.02
+"""Share of a joint's maximum power over which the positive part of its power is smoothed, to be differentiable."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """One thing to minimize, with a weight; terms add to an :class:`Objective`."""
+    """One quantity to minimize, with a weight; terms add to an :class:`Objective`."""
 
     weight: float = 1.0
 
@@ -32,11 +32,11 @@ class Term:
             raise ValueError(f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number")
 
     def integrand(self, point: Point) -> casadi.SX | None:
-        """Return what is integrated over time, without the weight; None where that is not a function of the state."""
+        """Return the integrand over time, 1 x 1, unit of the term over s; None if not a function of the state."""
         return None
 
     def measured(self, states: States) -> Array:
-        """Return the same of a motion's states, shape (N,), by numbers."""
+        """Return the integrand at a motion's states, shape (N,)."""
         raise NotImplementedError
 
     def __add__(self, other: Term | Objective) -> Objective:
@@ -53,48 +53,48 @@ class Time(Term):
     """The duration, s."""
 
     def measured(self, states: States) -> Array:
-        """Return 1 for each state."""
+        """Return ones, shape (N,)."""
         return np.ones(len(states.times))
 
 
 @dataclass(frozen=True)
 class Effort(Term):
-    """The integral of the torques' squares, N^2 m^2 s (of a prismatic joint N^2 s)."""
+    """The integral of the squared torques, N^2 m^2 s (for a prismatic joint N^2 s)."""
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return tau . tau."""
+        """Return tau . tau, 1 x 1, N^2 m^2."""
         import casadi
 
         return casadi.sumsqr(point.tau)
 
     def measured(self, states: States) -> Array:
-        """Return tau . tau."""
+        """Return tau . tau, shape (N,), N^2 m^2."""
         squares: Array = np.sum(states.tau**2, axis=1)
         return squares
 
 
 @dataclass(frozen=True)
 class Jerk(Term):
-    """The integral of the jerks' squares, rad^2/s^5 or m^2/s^5; such motions begin and end without acceleration."""
+    """The integral of the squared jerks, rad^2/s^5 or m^2/s^5; such motions begin and end with zero acceleration."""
 
     def measured(self, states: States) -> Array:
-        """Return the jerks' squared length."""
+        """Return the sum of the squared jerks, shape (N,)."""
         squares: Array = np.sum(states.jerk**2, axis=1)
         return squares
 
 
 @dataclass(frozen=True)
 class Energy(Term):
-    """Electrical energy, J: what heats the windings and, where the drives do not feed it back, all positive power.
+    """Electrical energy, J: losses in the windings plus mechanical work; negative power counts only if regenerated.
 
-    A motor whose torque is tau_m heats its windings by (tau_m / k)^2 watts, with its motor constant k; the joint's
-    torque is gear tau_m.
+    A motor of torque tau_m and motor constant k loses (tau_m / k)^2 watts in its windings; the joint's torque is
+    gear tau_m.
     """
 
     motor_constants: float | tuple[float, ...] = ()
-    """k of each joint's motor, N m per square root of W; one number counts for all; empty: no heat."""
+    """Motor constants k, N m per square root of W: one for all joints or one for each; empty for no losses."""
     regenerates: bool = False
-    """Whether braking gives its power back."""
+    """Whether the drives feed the power of braking back."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -106,15 +106,15 @@ class Energy(Term):
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """The motor constants, one or of each joint."""
+        """The motor constants, one for all joints or one for each."""
         return self.motor_constants if isinstance(self.motor_constants, tuple) else (self.motor_constants,)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return the electrical power, W, less what is the same for every motion between the same states.
+        """Return the electrical power, 1 x 1, W, minus the part that is equal for all motions between the same states.
 
         The joints' work, the integral of tau qd, is what the arm's energy gains and friction takes; of the positive
-        power (P + abs P) / 2 only abs P depends on the way. With all of it, the optimizer would find motions along
-        which a quadrature errs.
+        power (P + abs P) / 2 only abs P depends on the motion. With all of it, the optimizer would find motions for
+        which the quadrature is inaccurate.
         """
         import casadi
 
@@ -128,14 +128,14 @@ class Energy(Term):
         total = point.dissipation / (1.0 if self.regenerates else 2.0)
         for i in range(n):
             if not self.regenerates:
-                power, soft = point.tau[i] * point.qd[i], SOFT * point.power_scale[i]
+                power, soft = point.tau[i] * point.qd[i], FADE_SHARE * point.power_scale[i]
                 total += (casadi.sqrt(power * power + soft * soft) - soft) / 2
             if constants:
                 total += (point.tau[i] / (constants[i % len(constants)] * point.gear[i])) ** 2
         return total
 
     def measured(self, states: States) -> Array:
-        """Return the electrical power, W."""
+        """Return the electrical power, shape (N,), W."""
         power = states.tau * states.qd
         if not self.regenerates:
             power = np.maximum(power, 0.0)
@@ -162,7 +162,7 @@ class Objective:
 
     @classmethod
     def of(cls, objective: ObjectiveLike) -> Objective:
-        """Return what an argument ``objective=`` means: a name, a term, or a sum of terms.
+        """Return the objective of an argument ``objective=``: a name, a term, or a sum of terms.
 
         Raises
         ------
@@ -176,36 +176,36 @@ class Objective:
         if isinstance(objective, Term):
             return cls((objective,))
         if isinstance(objective, str):
-            if objective not in NAMED:
+            if objective not in OBJECTIVES:
                 raise ValueError(
-                    f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like"
+                    f"objective is {objective!r}; expected one of {', '.join(OBJECTIVES)}, or Time() and the like"
                 )
-            return cls((NAMED[objective],))
-        raise TypeError(f"objective is {objective!r}; expected one of {', '.join(NAMED)}, or Time() and the like")
+            return cls((OBJECTIVES[objective],))
+        raise TypeError(f"objective is {objective!r}; expected one of {', '.join(OBJECTIVES)}, or Time() and the like")
 
     @property
     def has_time(self) -> bool:
-        """Whether the duration counts: else it must be given."""
+        """Whether the duration is a term; otherwise it must be given."""
         return any(isinstance(term, Time) for term in self.terms)
 
     @property
     def has_jerk(self) -> bool:
-        """Whether the jerk counts."""
+        """Whether the jerk is a term."""
         return any(isinstance(term, Jerk) for term in self.terms)
 
     @property
     def only_time(self) -> bool:
-        """Whether nothing but the duration counts."""
+        """Whether the duration is the only term."""
         return all(isinstance(term, Time) for term in self.terms)
 
     @property
-    def needs_calm(self) -> bool:
-        """Whether more than one motion may be best: joints that have time, or power that is given back."""
+    def needs_smoothing(self) -> bool:
+        """Whether the optimum may not be unique, because joints have spare time or power is regenerated."""
         return self.only_time or any(isinstance(term, Energy) for term in self.terms)
 
     @property
     def needs_torque(self) -> bool:
-        """Whether the arm needs bodies."""
+        """Whether a term depends on torques, so that every link needs a body."""
         return any(isinstance(term, Effort | Energy) for term in self.terms)
 
     def __add__(self, other: Term | Objective) -> Objective:
@@ -230,4 +230,4 @@ class Objective:
 
 ObjectiveLike: TypeAlias = "str | Term | Objective"
 
-NAMED: dict[str, Term] = {"time": Time(), "effort": Effort(), "energy": Energy(), "jerk": Jerk()}
+OBJECTIVES: dict[str, Term] = {"time": Time(), "effort": Effort(), "energy": Energy(), "jerk": Jerk()}

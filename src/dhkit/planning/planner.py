@@ -1,4 +1,4 @@
-"""The planner: programs made once, solved for many motions, each certified before it is handed out."""
+"""The planner: one program for many motions, each certified before it is returned."""
 
 from __future__ import annotations
 
@@ -16,54 +16,55 @@ from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
-from dhkit.planning.clear import Clear, Surroundings
+from dhkit.planning.collision_avoidance import ClearanceConstraint, CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
-    classical,
+    classical_durations,
     require_bounded,
     require_holdable,
     require_inside_limits,
     require_kept,
     require_speed,
 )
-from dhkit.planning.goals import Place, Route, place, routes
+from dhkit.planning.goals import Place, Route, find_routes, parse_place
 from dhkit.planning.guess import leg_durations
-from dhkit.planning.mesh import LEAST, Curve, Mesh
+from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
-from dhkit.planning.search import Found, Program, Search, coarser
+from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
+from dhkit.planning.search import PlannedMotion, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.states import prepare
-from dhkit.planning.task import FEW, Task, curve_for
-from dhkit.planning.wish import Wish, checked_limits, end_velocity
+from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curve_for
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
 
-EXPANDED = 400
-"""Up to so many joints times intervals a program is expanded into scalars: solved twice as fast, made in ten times."""
+MAX_EXPANDED_SIZE = 400
+"""Largest product of joints and intervals up to which a program is expanded into scalar operations: it is then solved
+twice as fast, but takes ten times as long to build."""
 CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}
-"""Ipopt's tolerance: of arms of many joints, the mesh counts for more."""
-USUAL = 48
-"""Intervals of arms of six joints; of fewer joints more, as they cost less."""
-MOST, LEAST_USUAL = 2000, 24
-NUMBERS = 384
-"""Joints times intervals: what arms of few joints get."""
-NEARLY = 1e-3
-"""By what share the fastest motion must be longer than a duration that is called too short."""
-LEISURELY = 2.0
-"""Where a duration is needed and none is given: times that of the fastest cubics."""
-SMOOTHED = Friction(width=1e-2)
-"""What a step of friction is taken as: rad/s or m/s."""
+"""Ipopt's tolerance for each curve: with constant accelerations, the error of the mesh is larger than 1e-6."""
+DEFAULT_INTERVALS = 48
+"""Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
+MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
+SMALL_ARM_SIZE = 384
+"""Product of joints and default intervals for arms of few joints."""
+DURATION_TOLERANCE = 1e-3
+"""Relative excess of the fastest motion over a given duration from which an error calls the duration too short."""
+DEFAULT_DURATION_FACTOR = 2.0
+"""Factor over the duration of the fastest cubics that gives the default duration of objectives without time."""
+SMOOTH_FRICTION = Friction(width=1e-2)
+"""Smooth friction in place of friction that is a step, of this width in rad/s or m/s."""
 
 
 class Planner:
     """Plans motions of one arm with one objective and one set of constraints.
 
-    Programs are made when first needed and then solved for any start, goal, limits, payload and obstacles. Calls from
-    several threads take turns. Every motion that is returned was checked on a dense grid with Pinocchio.
+    Programs are built when first needed and then solved for any start, goal, limits, payload and obstacles. Calls from
+    several threads take turns. Every returned motion was checked on a dense grid with Pinocchio.
 
     Parameters
     ----------
@@ -75,12 +76,12 @@ class Planner:
     limits
         The robot's own unless given; see :class:`dhkit.trajectories.Limits`.
     constraints
-        What else must be kept: ``ToolSpeed(0.5)`` and the like.
+        Further constraints, such as ``ToolSpeed(0.5)``.
     intervals
-        Of the mesh. Unless given 48 for arms of six joints and more, and more for smaller ones; half of that for
-        objectives without time, and around obstacles. Finer meshes find slightly better motions in more time.
+        Number of intervals of the mesh; by default 48 for six joints or more, and more for fewer joints; half of that
+        for objectives without time and with obstacles. Finer meshes find slightly better motions in more time.
     friction
-        Of the drives, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+        Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
 
     Raises
     ------
@@ -106,8 +107,12 @@ class Planner:
         friction: bool | Friction = False,
     ) -> None:
         description = description_of(description)
-        if intervals is not None and (type(intervals) is not int or not LEAST <= intervals <= MOST):
-            raise ValueError(f"intervals is {intervals!r}; expected a whole number from {LEAST} to {MOST}")
+        if intervals is not None and (
+            type(intervals) is not int or not MIN_LEG_INTERVALS <= intervals <= MAX_INTERVALS
+        ):
+            raise ValueError(
+                f"intervals is {intervals!r}; expected a whole number from {MIN_LEG_INTERVALS} to {MAX_INTERVALS}"
+            )
         constraints = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
@@ -116,12 +121,12 @@ class Planner:
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
         self.constraints = constraints
-        usual = NUMBERS // description.n if description.n <= FEW else USUAL
-        # Smooth motions need half as many: their accelerations are parabolas.
-        self._given = intervals
+        usual = SMALL_ARM_SIZE // description.n if description.n <= MAX_SMALL_JOINTS else DEFAULT_INTERVALS
+        # Smooth objectives need half as many intervals: their accelerations are parabolas.
+        self._requested_intervals = intervals
         self.intervals = intervals or (usual if self.objective.has_time else usual // 2)
         chosen = Friction.chosen(friction)
-        self.friction = SMOOTHED if chosen is not None and chosen.width == 0 else chosen
+        self.friction = SMOOTH_FRICTION if chosen is not None and chosen.width == 0 else chosen
         self._programs: dict[tuple[object, ...], Program] = {}
         self._making = threading.Lock()
 
@@ -156,36 +161,36 @@ class Planner:
         start
             Joint values (n,), rad and m, or the name of a configuration.
         goal
-            The same, or a pose (4, 4) of the tool in the world: then all branches of inverse kinematics are tried.
+            The same, or a pose (4, 4) of the tool in the world, of which all branches of inverse kinematics are tried.
         via
-            Where to pass on the way, likewise, in order; when is free.
+            Places to pass in order, likewise, at times that are optimized.
         duration
-            s. Objectives without time need one: without it, they get twice what cubics along the straight path take.
+            Duration, s. For objectives without time, by default twice that of cubics along the straight path.
         start_velocity, goal_velocity
             Shape (n,), rad/s and m/s; at rest unless given.
         limits
-            In place of the planner's.
+            Limits in place of the planner's.
         payload
-            What the tool carries.
+            Payload of the tool.
         obstacles
-            What to keep away from: ``Obstacle.box(...)`` and the like, ``Floor()``.
+            Obstacles to avoid: ``Obstacle.box(...)`` and the like, ``Floor()``.
         clearance
-            By how much, m.
+            Smallest distance from obstacles, m.
         self_collision
-            Whether links keep away from each other too.
+            Whether links keep the clearance from each other too.
         warm
-            A similar motion to start from.
+            A similar motion, as the initial guess.
         time_limit
-            s; after it the search ends with an error, or the best motion found so far among branches.
+            Time limit, s, after which the search raises, or returns the best motion of the branches solved so far.
         progress
-            Called once an iteration; an exception in it ends the search.
+            Called once in each iteration; an exception in it ends the search.
         compare
-            Whether the report also says what classical motions and a coarser mesh would have cost.
+            Whether the report includes the durations of classical motions and the cost on a coarser mesh.
 
         Raises
         ------
         PlanningError
-            There is no such motion, or none was found: says what stands against it.
+            There is no such motion, or none was found: says which limit or obstacle prevents it.
         ValueError, TypeError
             Arguments of another shape or type.
         """
@@ -202,29 +207,29 @@ class Planner:
                 raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
             warm.require(description)
         if isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0):
-            via = [via]  # one place alone
+            via = [via]  # a single place
         check_duration(duration)
         names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
-        places = [place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
+        places = [parse_place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
         if places[0].q is None:
             raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
-        wish = Wish(
+        request = PlanRequest(
             checked_limits(description, self.limits if limits is None else limits),
             duration,
             *(end_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
             payload,
-            Surroundings.of(obstacles, clearance, self_collision),
+            CollisionAvoidance.of(obstacles, clearance, self_collision),
         )
-        for spot in places:
-            if spot.q is not None:
-                require_inside_limits(description, wish.limits, spot.q, spot.name)
-        ways = routes(description, wish.limits, places)
-        self._require(wish, places, ways)
+        for place in places:
+            if place.q is not None:
+                require_inside_limits(description, request.limits, place.q, place.name)
+        routes = find_routes(description, request.limits, places)
+        self._require(request, places, routes)
         deadline = began + time_limit
         try:
-            found, branches, seconds, counts = self._best(wish, ways, warm, deadline, progress)
+            found, branches, seconds, counts = self._best(request, routes, warm, deadline, progress)
         except PlanningError as error:
-            raise self._explained(error, wish, ways, deadline) from None
+            raise self._with_reason(error, request, routes, deadline) from None
         task, best = found
         report = PlanReport(
             objective=str(self.objective),
@@ -240,18 +245,18 @@ class Planner:
             slow_down=best.slow_down,
             tightened=best.tightened,
             branches=branches,
-            unlimited=wish.limits.unlimited,
+            unlimited=request.limits.unlimited,
         )
         if compare:
-            report = replace(report, classical=classical(task), coarse=self._coarse(task, best, deadline))
+            report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 
     # Programs
 
-    def program(self, task: Task, intervals: int | None = None) -> tuple[Program, float]:
-        """Return the program for a task, and the seconds that it took to make just now."""
+    def program(self, task: PlanTask, intervals: int | None = None) -> tuple[Program, float]:
+        """Return the program for a task, and the time for building it now, s."""
         intervals = self.intervals_for(task) if intervals is None else intervals
-        legs, limits, slots = len(task.points) - 1, task.limits, task.surroundings.slots
+        legs, limits, slots = len(task.points) - 1, task.limits, task.avoidance.slots
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
         key = (legs, task.is_loaded, slots, jerk_limited, with_torque, intervals)
@@ -264,102 +269,102 @@ class Planner:
             problem = Problem(
                 self.description,
                 self.objective,
-                (*self.constraints, Clear(slots)) if task.surroundings else self.constraints,
+                (*self.constraints, ClearanceConstraint(slots)) if task.avoidance else self.constraints,
                 limits,
                 Mesh.of(intervals, legs, curve),
                 friction=self.friction,
                 payload=task.is_loaded,
                 jerk_limited=jerk_limited,
             )
-            expand = self.description.n * problem.mesh.intervals <= EXPANDED
-            made = Program.of(problem, CONVERGENCE[curve], expand=expand)
-            self._programs[key] = made
-            return made, time.perf_counter() - began
+            expand = self.description.n * problem.mesh.intervals <= MAX_EXPANDED_SIZE
+            program = Program.of(problem, CONVERGENCE[curve], expand=expand)
+            self._programs[key] = program
+            return program, time.perf_counter() - began
 
-    def intervals_for(self, task: Task) -> int:
-        """Return the intervals of a task's mesh: half where every knot is held against obstacles, unless given."""
-        if self._given is None and task.surroundings:
-            return max(LEAST_USUAL, self.intervals // 2)
+    def intervals_for(self, task: PlanTask) -> int:
+        """Return the number of intervals of a task's mesh: by default half with obstacles, whose rows are many."""
+        if self._requested_intervals is None and task.avoidance:
+            return max(MIN_DEFAULT_INTERVALS, self.intervals // 2)
         return self.intervals
 
     # One motion
 
-    def _require(self, wish: Wish, places: Sequence[Place], ways: Sequence[Route]) -> None:
-        """Refuse what no solver could find, of places that leave no choice."""
-        description, limits = self.description, wish.limits
-        loaded = wish.loaded(description)
-        require_speed(description, limits, wish.start_velocity, "start")
-        require_speed(description, limits, wish.goal_velocity, "goal")
-        for spot in places:
-            if spot.q is None:
+    def _require(self, request: PlanRequest, places: Sequence[Place], routes: Sequence[Route]) -> None:
+        """Require that the given places and limits allow a motion, as far as can be checked without a solution."""
+        description, limits = self.description, request.limits
+        loaded = request.loaded(description)
+        require_speed(description, limits, request.start_velocity, "start")
+        require_speed(description, limits, request.goal_velocity, "goal")
+        for place in places:
+            if place.q is None:
                 continue
-            if wish.rests_at(spot.name):
-                require_holdable(loaded, limits, spot.q, spot.name)
-            if wish.surroundings:
-                wish.surroundings.require(description, spot.q, spot.name)
+            if request.rests_at(place.name):
+                require_holdable(loaded, limits, place.q, place.name)
+            if request.avoidance:
+                request.avoidance.require(description, place.q, place.name)
         resting = [constraint for constraint in self.constraints if not constraint.moving]
-        T_start = world_to_tool(description, ways[0].points[0])
-        for spot in places:
-            require_kept(description, resting, T_start, spot)
-        if wish.duration is not None and wish.duration < ways[0].bound:
-            least = f"the speed limits alone ask for {ways[0].bound:.6g} s"
-            raise PlanningError(f"a duration of {wish.duration:.6g} s is too short: {least}")
-        moves = np.max([np.ptp(way.points, axis=0) for way in ways], axis=0) > 0
-        if not moves.any() and wish.rests_at("start") and wish.rests_at("goal"):
+        T_start = world_to_tool(description, routes[0].points[0])
+        for place in places:
+            require_kept(description, resting, T_start, place)
+        if request.duration is not None and request.duration < routes[0].bound:
+            least = f"the speed limits alone ask for {routes[0].bound:.6g} s"
+            raise PlanningError(f"a duration of {request.duration:.6g} s is too short: {least}")
+        moves = np.max([np.ptp(route.points, axis=0) for route in routes], axis=0) > 0
+        if not moves.any() and request.rests_at("start") and request.rests_at("goal"):
             raise PlanningError("start and goal are the same configuration")
         require_bounded(description, limits, self.objective, moves)
 
-    def _task(self, wish: Wish, points: Array) -> Task:
-        description, limits = self.description, wish.limits
-        loaded = wish.loaded(description)
+    def _task(self, request: PlanRequest, points: Array) -> PlanTask:
+        description, limits = self.description, request.limits
+        loaded = request.loaded(description)
         T_start = world_to_tool(description, points[0])
         parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
-        duration = wish.duration
+        duration = request.duration
         if duration is None and not self.objective.has_time:
-            duration = LEISURELY * float(leg_durations(loaded, limits, points).sum())
+            duration = DEFAULT_DURATION_FACTOR * float(leg_durations(loaded, limits, points).sum())
             if not duration > 0:
                 raise PlanningError(f"nothing limits how fast {self.objective} may be: give a duration, or limits")
-        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, wish.surroundings)
-        return Task(
+        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, request.avoidance)
+        return PlanTask(
             description,
             loaded,
             points,
-            wish.start_velocity,
-            wish.goal_velocity,
+            request.start_velocity,
+            request.goal_velocity,
             duration,
             limits,
             checker,
-            load=wish.payload.numbers if wish.payload else None,
+            load=request.payload.numbers if request.payload else None,
             parameters=parameters,
             friction=self.friction,
-            surroundings=wish.surroundings,
+            avoidance=request.avoidance,
         )
 
     def _best(
         self,
-        wish: Wish,
-        ways: Sequence[Route],
+        request: PlanRequest,
+        routes: Sequence[Route],
         warm: Trajectory | None,
         deadline: float,
         progress: ProgressCall | None,
-    ) -> tuple[tuple[Task, Found], tuple[BranchReport, ...], float, tuple[int, int]]:
-        """Return the best motion along any way, what the others cost, seconds of making, iterations and solves."""
-        best: tuple[Task, Found] | None = None
+    ) -> tuple[tuple[PlanTask, PlannedMotion], tuple[BranchReport, ...], float, tuple[int, int]]:
+        """Return the best motion of all routes, the branches' reports, the building time (s), iterations and solves."""
+        best: tuple[PlanTask, PlannedMotion] | None = None
         failure: PlanningError | None = None
         reports: list[BranchReport] = []
         seconds, iterations, solves, chosen = 0.0, 0, 0, -1
-        for number, way in enumerate(ways):
-            hopeless = best is not None and self.objective.only_time and way.bound >= best[1].trajectory.duration
+        for number, route in enumerate(routes):
+            hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
             late = best is not None and time.perf_counter() > deadline
             if hopeless or late:
-                reports.append(BranchReport(way.label, way.bound, solved=False))
+                reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
-                if way.label:  # a branch that was chosen here: of others _require has seen the ends
-                    self._require_ends(wish, way.points)
-                task = self._task(wish, way.points)
-                program, made = self.program(task)
-                seconds += made
+                if route.label:  # a chosen branch; the ends of a single route were checked by _require
+                    self._require_ends(request, route.points)
+                task = self._task(request, route.points)
+                program, seconds_made = self.program(task)
+                seconds += seconds_made
                 search = Search(task, program, deadline + seconds, progress)
                 try:
                     found = search(warm)
@@ -367,45 +372,53 @@ class Planner:
                     iterations, solves = iterations + search.iterations, solves + search.solves
             except PlanningError as error:
                 failure = failure or error
-                reports.append(BranchReport(way.label, float("inf"), solved=True, reason=str(error)))
+                reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
                 continue
-            reports.append(BranchReport(way.label, found.trajectory.duration, solved=True))
+            reports.append(BranchReport(route.label, found.trajectory.duration, solved=True))
             if best is None or found.cost < best[1].cost:
                 best, chosen = (task, found), number
         if best is None:
-            if failure is None or len(ways) == 1:
+            if failure is None or len(routes) == 1:
                 raise failure or PlanningError("no motion found")
-            raise PlanningError(f"none of {len(ways)} branches has a motion; the first, {ways[0].label}: {failure}")
-        told = tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(ways) > 1 else ()
-        return best, told, seconds, (iterations, solves)
+            raise PlanningError(f"none of {len(routes)} branches has a motion; the first, {routes[0].label}: {failure}")
+        reports_of_branches = (
+            tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(routes) > 1 else ()
+        )
+        return best, reports_of_branches, seconds, (iterations, solves)
 
-    def _explained(self, error: PlanningError, wish: Wish, ways: Sequence[Route], deadline: float) -> PlanningError:
-        """Return why a motion of a given duration was not found: because there is no faster one, where that is it."""
+    def _with_reason(
+        self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
+    ) -> PlanningError:
+        """Return the error for a motion that was not found: a duration below that of the fastest motion, if so."""
         late = time.perf_counter() > deadline
-        if late or wish.duration is None or len(ways) > 1 or wish.surroundings:
+        if late or request.duration is None or len(routes) > 1 or request.avoidance:
             return error
-        quickest = Planner(self.description, "time", wish.limits, self.constraints, LEAST_USUAL, self.friction or False)
+        quickest = Planner(
+            self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False
+        )
         try:
-            program, made = quickest.program(quick := quickest._task(replace(wish, duration=None), ways[0].points))
-            least = Search(quick, program, deadline + made)().trajectory.duration
+            program, seconds_made = quickest.program(
+                quick := quickest._task(replace(request, duration=None), routes[0].points)
+            )
+            least = Search(quick, program, deadline + seconds_made)().trajectory.duration
         except PlanningError:
             return error
-        if least <= wish.duration * (1 + NEARLY):
+        if least <= request.duration * (1 + DURATION_TOLERANCE):
             return error
         fastest = f"the fastest motion found takes {least:.6g} s"
-        return PlanningError(f"a duration of {wish.duration:.6g} s is too short: {fastest}")
+        return PlanningError(f"a duration of {request.duration:.6g} s is too short: {fastest}")
 
-    def _coarse(self, task: Task, best: Found, deadline: float) -> tuple[int, float] | None:
-        half = max(LEAST, self.intervals_for(task) // 2)
+    def _coarse(self, task: PlanTask, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
+        half = max(MIN_LEG_INTERVALS, self.intervals_for(task) // 2)
         if half == self.intervals_for(task):
             return None
-        program, made = self.program(task, half)
-        return coarser(Search(task, program, deadline + made), best.trajectory)
+        program, seconds_made = self.program(task, half)
+        return coarser(Search(task, program, deadline + seconds_made), best.trajectory)
 
-    def _require_ends(self, wish: Wish, points: Array) -> None:
-        loaded = wish.loaded(self.description)
-        if wish.rests_at("goal"):
-            require_holdable(loaded, wish.limits, points[-1], "goal")
-        if wish.surroundings:
+    def _require_ends(self, request: PlanRequest, points: Array) -> None:
+        loaded = request.loaded(self.description)
+        if request.rests_at("goal"):
+            require_holdable(loaded, request.limits, points[-1], "goal")
+        if request.avoidance:
             for k, point in enumerate(points[1:], start=1):
-                wish.surroundings.require(self.description, point, "goal" if k == len(points) - 1 else f"via {k}")
+                request.avoidance.require(self.description, point, "goal" if k == len(points) - 1 else f"via {k}")

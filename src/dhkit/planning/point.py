@@ -1,4 +1,4 @@
-"""One state of a motion as symbols: what constraints and objectives are written in."""
+"""One state of a motion as CasADi symbols, in which constraints and objectives are written."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     import casadi
 
 LOAD = 10
-"""Numbers of a payload: mass, centre of mass (3), inertia (6)."""
+"""Number of parameters of a payload: mass, centre of mass (3), inertia (6)."""
 
 
 class Point:
-    """q, qd and qdd of an arm as SX symbols, and what follows from them; each derived when first asked for."""
+    """q, qd and qdd of an arm as SX symbols, and quantities derived from them on first use."""
 
     def __init__(self, description: Description, limits: Limits, friction: Friction | None, payload: bool) -> None:
         self.description = description
@@ -41,7 +41,7 @@ class Point:
 
     @cached_property
     def dissipation(self) -> casadi.SX:
-        """The power that friction takes, W."""
+        """The power lost to friction, 1 x 1, W."""
         import casadi
 
         if self.friction is None:
@@ -55,7 +55,7 @@ class Point:
 
     @cached_property
     def T_world_tool(self) -> casadi.SX:
-        """The tool in the world, 4 x 4."""
+        """The pose of the tool in the world, 4 x 4, m."""
         return SymbolicTable.of(self.description).world_to_tool(self.q)
 
     @cached_property
@@ -65,7 +65,7 @@ class Point:
 
     @cached_property
     def tool_acceleration(self) -> casadi.SX:
-        """Its acceleration, 3 x 1, m/s^2."""
+        """The acceleration of the tool's origin, 3 x 1, m/s^2, world axes."""
         import casadi
 
         v = self.tool_velocity
@@ -73,24 +73,24 @@ class Point:
 
     @property
     def torque_scale(self) -> Array:
-        """What torques are measured by, shape (n,): the limits, 1 where there is none."""
+        """Scales of torques, shape (n,), N m and N: their limits, 1 where unlimited."""
         torque = self.limits.torque
         return np.where(np.isfinite(torque), torque, 1.0)
 
     @property
     def power_scale(self) -> Array:
-        """A joint's power at its limits, shape (n,), W; 1 where there are none."""
+        """Scales of power, shape (n,), W: torque limit times speed limit, 1 where unlimited."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
         return self.torque_scale * velocity
 
     @property
     def gear(self) -> Array:
-        """Gear ratios, shape (n,); 1 without a drive."""
+        """Gear ratios, shape (n,), without unit; 1 without a drive."""
         return gear_ratios(self.description)
 
 
 def gear_ratios(description: Description) -> Array:
-    """Return the drives' gear ratios, shape (n,); 1 without a drive."""
+    """Return the drives' gear ratios, shape (n,), without unit; 1 without a drive."""
     values = resolved(description.parameters)
     drives = [joint.drive for joint in description.joints]
     return np.array([float(substitute(drive.gear, values)) if drive else 1.0 for drive in drives])

@@ -1,7 +1,7 @@
-"""A motion as a nonlinear program: knots, the rows that hold it together, and its limits; built once, solved often.
+"""A motion as a nonlinear program: variables at knots, rows of continuity and of limits; built once, solved often.
 
-Acceleration is constant, linear or quadratic inside an interval and integrated exactly, so that a solution is a
-motion and no approximation of one; only between the points where limits are asked for can they be missed.
+Acceleration is constant, linear or quadratic inside an interval and integrated exactly, so that a solution is exactly
+a motion; limits can be exceeded only between the points where they are imposed.
 """
 
 from __future__ import annotations
@@ -24,35 +24,34 @@ from dhkit.trajectories import Limits
 if TYPE_CHECKING:
     import casadi
 
-CALM = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
-"""Share of the objective that accelerations have in least time or energy: joints with slack then move calmly.
-
-In arms of few joints no joint has much slack, and more of it would cost time."""
-TINY_TIME = 1e-4
-"""s: the shortest duration of a leg."""
+SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
+"""Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
+then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
+MIN_LEG_DURATION = 1e-4
+"""Shortest duration of a leg, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Knots:
-    """A motion on a mesh: what the program decides on."""
+    """A motion on a mesh: the variables of the program."""
 
     durations: Array
-    """Shape (legs,), s."""
+    """Durations of the legs, shape (legs,), s."""
     q: Array
-    """Shape (intervals + 1, n)."""
+    """Joint values at the knots, shape (intervals + 1, n), rad and m."""
     qd: Array
-    """Likewise."""
+    """Joint rates at the knots, shape (intervals + 1, n), rad/s and m/s."""
     qdd: Array
-    """Shape (columns, n); see :class:`Curve`."""
+    """Accelerations, shape (columns, n), rad/s^2 and m/s^2; see :class:`Curve`."""
 
     @property
     def vector(self) -> Array:
-        """All numbers in the program's order."""
+        """The variables in the program's order, shape (variables,), SI units."""
         return np.concatenate([self.durations, self.q.ravel(), self.qd.ravel(), self.qdd.ravel()])
 
     @classmethod
     def of(cls, vector: Array, mesh: Mesh, n: int) -> Knots:
-        """Return the motion that a program's numbers are."""
+        """Return the knots of a vector of variables, shape (variables,), SI units."""
         legs, knots, columns = len(mesh.legs), mesh.intervals + 1, mesh.curve.columns(mesh.intervals)
         parts = np.split(vector, np.cumsum([legs, n * knots, n * knots]))
         return cls(
@@ -62,22 +61,22 @@ class Knots:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows of one kind: the same few at many points."""
+    """Rows of one kind, repeated at several points."""
 
     what: str
-    """In words: ``"torque"``."""
+    """Name of the limited quantity, such as ``"torque"``."""
     count: int
-    """Rows at each point."""
+    """Number of rows at each point."""
     points: int
     low: Array
-    """Shape (count,)."""
+    """Lower bounds, shape (count,)."""
     high: Array
 
 
 class Problem:
-    """The program of one arm, objective and set of constraints on one mesh.
+    """The nonlinear program of one arm, objective and set of constraints on one mesh.
 
-    Start, goal, limits, payload, durations and the constraints' parameters are its arguments.
+    Start, goal, limits, payload, durations and the constraints' parameters are arguments of the program.
     """
 
     def __init__(
@@ -103,26 +102,26 @@ class Problem:
 
     @property
     def jerk_counts(self) -> bool:
-        """Whether motions begin and end without acceleration."""
+        """Whether motions begin and end with zero acceleration."""
         return self.jerk_limited or self.objective.has_jerk
 
     # Arguments
 
     @cached_property
     def parameter_sizes(self) -> tuple[int, ...]:
-        """The load's numbers, then each constraint's, the cost's scale, and each joint's usual acceleration."""
+        """Lengths of the parameters: payload, each constraint, scale of the cost, scales of accelerations."""
         each = (constraint.size(self.description) for constraint in self.constraints)
         return (LOAD if self.payload else 0, *each, 1, self.n)
 
     def parameters(self, load: Array | None, each: tuple[Array, ...], scale: float, usual: Array) -> Array:
-        """Return the program's parameters as one array; ``usual``: accelerations to be measured by, shape (n,)."""
+        """Return the program's parameters as one array; ``usual`` are the scales of accelerations, shape (n,)."""
         return np.concatenate([np.zeros(0) if load is None else load, *each, [scale], 1 / usual])
 
     # The program
 
     @cached_property
     def program(self) -> tuple[dict[str, Any], list[Rows]]:
-        """The program's x, p, f and g, and what its rows are."""
+        """The program's x, p, f and g for Ipopt, and the kinds of its rows."""
         import casadi
 
         n, mesh = self.n, self.mesh
@@ -188,11 +187,11 @@ class Problem:
                 case _:
                     cost += term.weight * next(waiting)
         cost = scale * cost
-        if self.objective.needs_calm:
-            # By shares of time: what counts is how long joints are busy, and meshes are finer at their ends.
+        if self.objective.needs_smoothing:
+            # Weighted by shares of time, since meshes are finer at their ends.
             squares = casadi.sum1((A * casadi.repmat(usual, 1, A.shape[1])) ** 2)
             cost += (
-                CALM[self.mesh.curve]
+                SMOOTHING_WEIGHTS[self.mesh.curve]
                 / (self.n * len(self.mesh.legs))
                 * casadi.dot(casadi.DM(self._column_shares), squares.T)
             )
@@ -200,7 +199,7 @@ class Problem:
 
     @property
     def _column_shares(self) -> Array:
-        """The share of time of each column of accelerations."""
+        """The share of time of each acceleration variable."""
         shares = self.mesh.shares
         if self.mesh.curve is Curve.CONSTANT:
             return shares
@@ -213,7 +212,7 @@ class Problem:
         both[0::2], both[1::2] = around / 3, shares * 2 / 3
         return both
 
-    # What is asked at one point
+    # Rows at one point
 
     @property
     def _places(self) -> tuple[Constraint, ...]:

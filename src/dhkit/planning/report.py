@@ -1,4 +1,4 @@
-"""What a planner has to say about a motion that it found."""
+"""Reports of planned motions: cost, certificate, branches and counts."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from typing import Any
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.planning.certificate import Certificate
 
-JOINTWISE = ("position", "velocity", "acceleration", "jerk", "torque", "motor power", "torque-speed line")
-"""Limits of each joint."""
-TOLD = 3
-"""So many limits are told in words."""
+JOINT_LIMITS = ("position", "velocity", "acceleration", "jerk", "torque", "motor power", "torque-speed line")
+"""Names of limits that apply to each joint."""
+MAX_LISTED_LIMITS = 3
+"""Largest number of active limits that are listed as text."""
 
 
 @dataclass(frozen=True)
 class BranchReport:
-    """What another way to a goal pose would have cost."""
+    """Result of another branch of inverse kinematics at a goal pose."""
 
     branch: str
     duration: float
-    """s; a lower bound where ``solved`` is False, infinite where there is no motion."""
+    """Duration, s; a lower bound if ``solved`` is False, infinite if there is no motion."""
     solved: bool
     chosen: bool = False
     reason: str = ""
-    """Why there is no motion."""
+    """Reason why there is no motion; empty if there is one."""
 
     def __str__(self) -> str:
-        return f"{self.branch}: {'no motion: ' if self.reason else ''}{_told(self)}"
+        return f"{self.branch}: {'no motion: ' if self.reason else ''}{_duration_text(self)}"
 
     def __repr__(self) -> str:
         return repr_line("BranchReport", said=str(self))
@@ -35,41 +35,41 @@ class BranchReport:
 
 @dataclass(frozen=True)
 class PlanReport:
-    """How a motion was found, and what it is worth; plain data."""
+    """Report of a planned motion: cost, certificate and how it was found."""
 
     objective: str
     cost: float
-    """The objective's value."""
+    """Value of the objective."""
     duration: float
-    """s."""
+    """Duration of the motion, s."""
     certificate: Certificate
     joints: tuple[str, ...]
     intervals: int
     iterations: int
     solves: int
-    """Programs solved for this motion, those of other branches included."""
+    """Number of programs solved, including those of other branches."""
     build_seconds: float
-    """For making programs; 0 where they were ready."""
+    """Time for building programs, s; 0 if they existed."""
     solve_seconds: float
     slow_down: float = 1.0
-    """By what factor the solution was slowed down to keep its limits between the points of the program."""
+    """Factor by which the solution was slowed down to keep its limits between the points of the program."""
     tightened: tuple[str, ...] = ()
-    """Limits that were tightened and solved for again, for the same reason."""
+    """Limits that were tightened for another solution, for the same reason."""
     coarse: tuple[int, float] | None = None
-    """Intervals and cost on a coarser mesh."""
+    """Number of intervals and cost on a coarser mesh."""
     classical: tuple[tuple[str, float], ...] = ()
     """Durations of classical motions along the straight joint path under the same limits, s."""
     branches: tuple[BranchReport, ...] = ()
     unlimited: tuple[str, ...] = ()
-    """Kinds of limits that the motion was planned without, such as ``acceleration``: it may jump there."""
+    """Kinds of limits that the motion was planned without, such as ``acceleration``: these quantities may jump."""
 
     @property
     def sensitivity(self) -> float | None:
-        """By what share the cost on half as many intervals is above this one."""
+        """Relative excess of the cost on half as many intervals over this one."""
         return None if self.coarse is None else self.coarse[1] / self.cost - 1
 
     def active_limits(self) -> list[tuple[str, float]]:
-        """Return the limits that are reached and in what share of the time, the most active first."""
+        """Return the active limits and their shares of time, the most active first."""
         named = [(f"{what} of {self._name(what, row)}", share) for what, row, share in self.certificate.active]
         return sorted(named, key=lambda item: -item[1])
 
@@ -79,7 +79,10 @@ class PlanReport:
     def _repr_html_(self) -> str:
         facts = [("duration", f"{self.duration:.4f} s"), (f"cost ({self.objective})", f"{self.cost:.6g}")]
         facts.append(("some limit is active", f"{100 * self.certificate.any_active:.0f} % of the time"))
-        facts += [(f"{name} active", f"{100 * share:.0f} % of the time") for name, share in self.active_limits()[:TOLD]]
+        facts += [
+            (f"{name} active", f"{100 * share:.0f} % of the time")
+            for name, share in self.active_limits()[:MAX_LISTED_LIMITS]
+        ]
         if self.unlimited:
             facts.append(("not limited", ", ".join(self.unlimited)))
         if self.slow_down > 1:
@@ -88,7 +91,9 @@ class PlanReport:
             facts.append((f"{self.coarse[0]} intervals cost", f"{100 * (self.sensitivity or 0):.2f} % more"))
         facts += [(f"{name}, straight joint path", f"{duration:.4f} s") for name, duration in self.classical]
         facts.append(("solved in", f"{self.solve_seconds:.3f} s, {self.iterations} iterations"))
-        branches = [(branch.branch, _told(branch), "chosen" if branch.chosen else "") for branch in self.branches]
+        branches = [
+            (branch.branch, _duration_text(branch), "chosen" if branch.chosen else "") for branch in self.branches
+        ]
         return html_block(
             f"{self.duration:.4f} s, least {self.objective}, {self._certified}",
             html_table((), facts),
@@ -105,10 +110,10 @@ class PlanReport:
         return "the tool" if joint is None else joint
 
     def _joint(self, what: str, row: int) -> str | None:
-        return self.joints[row] if what in JOINTWISE else None
+        return self.joints[row] if what in JOINT_LIMITS else None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as plain numbers and texts, for JSON."""
+        """Return the report as numbers and texts, for JSON."""
         certificate = self.certificate
         return {
             "objective": self.objective,
@@ -167,7 +172,10 @@ class PlanReport:
             lines.append(f"slowed down by {100 * (self.slow_down - 1):.3f} % to keep its limits between knots")
         if self.tightened:
             lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
-        active = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:TOLD]) or "none"
+        active = (
+            ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:MAX_LISTED_LIMITS])
+            or "none"
+        )
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
@@ -185,6 +193,6 @@ class PlanReport:
         return "\n".join(lines)
 
 
-def _told(branch: BranchReport) -> str:
-    """Return a branch's duration, or why it has none."""
+def _duration_text(branch: BranchReport) -> str:
+    """Return a branch's duration as text, or the reason why it has none."""
     return branch.reason or f"{'' if branch.solved else 'at least '}{branch.duration:.4f} s"

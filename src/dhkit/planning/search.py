@@ -1,4 +1,4 @@
-"""From one task to a certified motion: solve, check, slow down or tighten, solve again."""
+"""Search for a certified motion of one task: solve, check, slow down or tighten limits, solve again."""
 
 from __future__ import annotations
 
@@ -10,46 +10,47 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import PlanningError
-from dhkit.planning.assembly import assembled, knots_along
+from dhkit.planning.assembly import assemble_trajectory, knots_along
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.clear import BEYOND
+from dhkit.planning.collision_avoidance import INFLATION_FACTOR
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.problem import Knots, Problem, Rows
-from dhkit.planning.report import JOINTWISE
+from dhkit.planning.report import JOINT_LIMITS
 from dhkit.planning.solver import ProgressCall, Solution, Solver, Stopped
 from dhkit.planning.states import States
-from dhkit.planning.task import FEW, Margins, Task, g_bounds, worst_row, x_bounds
+from dhkit.planning.task import MAX_SMALL_JOINTS, Margins, PlanTask, g_bounds, worst_row, x_bounds
 from dhkit.trajectories import Trajectory
 
-FEASIBLE = 1e-5
-"""What a solution's rows may miss at most to be taken: the certificate decides about the rest."""
+FEASIBILITY_TOLERANCE = 1e-5
+"""Largest violation of a solution's rows with which it is used; the certificate then decides."""
 SMALL_STEP = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-3, Curve.QUADRATIC: 1e-3}
-"""A solution that needs less of a slow-down is slowed down; else limits are tightened where they are exceeded."""
-LARGER = 3.0
-"""What that limit is multiplied by with each round: some excesses wander."""
-WIDER, DOUBLE = 1.1, 2.0
-"""What an excess is multiplied by to widen a margin, and that factor with each round: some bulge between knots."""
-ROUNDS = 8
-"""How often a motion is solved for anew at most, to be certified."""
-SLACK = 2e-7
-"""What a slow-down adds, for what lies between the certificate's states."""
-FACTORS = (2.5, 0.6)
-"""What guessed durations are multiplied by where the first start fails."""
-STARTS = 4
-"""Of arms of two or three joints: their programs have more than one optimum, and are small."""
-SHORTEST = 1e-3
-"""s: of a leg, where a search starts."""
-LONGEST, FACTORS_TRIED = 100.0, 24
-"""Durations that are tried for objectives of time and something else: from the fastest to so many seconds."""
-DETOURS = 8
-"""Starts around obstacles at most."""
+"""Relative slow-down up to which a solution is slowed down; beyond it, exceeded limits are tightened."""
+STEP_GROWTH = 3.0
+"""Growth of SMALL_STEP in each round: some excesses move from interval to interval."""
+MARGIN_FACTOR, MARGIN_GROWTH = 1.1, 2.0
+"""Factor of an excess that is added to the margin of a limit, and its growth in each round: some limits are exceeded
+only between knots."""
+MAX_ROUNDS = 8
+"""Largest number of solutions with tightened limits, before the search fails."""
+TIME_SCALING_MARGIN = 2e-7
+"""Relative margin added to a time scaling: the certificate samples states, and a peak may lie between two of them."""
+RESTART_FACTORS = (2.5, 0.6)
+"""Factors of the guessed durations for further starts, if the first one fails."""
+SMALL_ARM_STARTS = 4
+"""Number of starts for arms of two or three joints: their programs are small and have several local optima."""
+MIN_LEG_DURATION = 1e-3
+"""Shortest duration of a leg in an initial guess, s."""
+MAX_GUESSED_DURATION, GUESSED_DURATIONS = 100.0, 24
+"""Longest duration (s) and number of durations that are compared for the initial guess of mixed objectives."""
+MAX_DETOURS = 8
+"""Largest number of starts with detours around obstacles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A problem that is made ready to be solved."""
+    """A problem with its solver."""
 
     problem: Problem
     rows: list[Rows]
@@ -57,7 +58,7 @@ class Program:
 
     @classmethod
     def of(cls, problem: Problem, tolerance: float, *, expand: bool) -> Program:
-        """Make a problem ready."""
+        """Build the solver of a problem."""
         program, rows = problem.program
         return cls(problem, rows, Solver(program, len(problem.mesh.legs), tolerance=tolerance, expand=expand))
 
@@ -68,8 +69,8 @@ class Program:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A certified motion, and what it took."""
+class PlannedMotion:
+    """A certified motion, with its cost and the work of finding it."""
 
     trajectory: Trajectory
     certificate: Certificate
@@ -82,22 +83,22 @@ class Found:
 
 @dataclass(eq=False)
 class Search:
-    """The search for one motion; keeps count."""
+    """The search for one motion, which counts its solutions and iterations."""
 
-    task: Task
+    task: PlanTask
     program: Program
     deadline: float
-    """As of ``time.perf_counter``."""
+    """Time at which the search ends, on the clock of ``time.perf_counter``, s."""
     progress: ProgressCall | None = None
     iterations: int = 0
     solves: int = 0
     tightened: list[str] = field(default_factory=list)
     value: float = np.inf
-    """Of the last solution's objective."""
+    """Value of the objective in the last solution."""
     failure: PlanningError | None = None
-    """The first."""
+    """The first failure."""
 
-    def __call__(self, warm: Trajectory | None = None) -> Found:
+    def __call__(self, warm: Trajectory | None = None) -> PlannedMotion:
         """Return the best certified motion.
 
         Raises
@@ -108,73 +109,77 @@ class Search:
         try:
             for knots in self._solutions(warm):
                 try:
-                    return self._certified(knots)
+                    return self._certify(knots)
                 except PlanningError as error:
-                    self._note(error)
-        except _TimeIsOver:
+                    self._keep_first_failure(error)
+        except _TimeLimitReached:
             starts = f"{self.solves} start{'s' * (self.solves > 1)}"
             raise PlanningError(
-                f"no motion found{self._around} within the time limit, in {starts}{self._why}"
+                f"no motion found{self._clearance_text} within the time limit, in {starts}{self._failure_reason}"
             ) from None
-        if self.failure is None or not self.task.surroundings:
+        if self.failure is None or not self.task.avoidance:
             raise self.failure or PlanningError("no motion found")
-        raise PlanningError(f"no motion found{self._around}, in {self.solves} starts{self._why}") from None
+        raise PlanningError(
+            f"no motion found{self._clearance_text}, in {self.solves} starts{self._failure_reason}"
+        ) from None
 
     @property
-    def _around(self) -> str:
-        surroundings = self.task.surroundings
-        if not surroundings:
+    def _clearance_text(self) -> str:
+        avoidance = self.task.avoidance
+        if not avoidance:
             return ""
-        return f" that keeps {1000 * surroundings.clearance:.3g} mm clear of {surroundings.names}"
+        return f" that keeps {1000 * avoidance.clearance:.3g} mm clear of {avoidance.names}"
 
     @property
-    def _why(self) -> str:
+    def _failure_reason(self) -> str:
         return f"; the first: {self.failure}" if self.failure else ""
 
-    def _note(self, error: PlanningError) -> None:
-        if isinstance(error, _TimeIsOver):
+    def _keep_first_failure(self, error: PlanningError) -> None:
+        if isinstance(error, _TimeLimitReached):
             raise error
         self.failure = self.failure or error
 
-    def _certified(self, knots: Knots) -> Found:
-        """Return a solution as a motion that keeps its limits everywhere, solved anew where it must be."""
+    def _certify(self, knots: Knots) -> PlannedMotion:
+        """Return a solution as a certified motion, solved again with tightened limits where necessary."""
         task, mesh = self.task, self.program.mesh
-        margins, inflation = Margins(mesh), np.zeros(len(task.surroundings.obstacles) + 1)
-        for turn in range(ROUNDS):
-            trajectory = assembled(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
-            trajectory, states, certificate, c = self._kept(trajectory, SMALL_STEP[mesh.curve] * LARGER**turn)
+        margins, inflation = Margins(mesh), np.zeros(len(task.avoidance.obstacles) + 1)
+        for turn in range(MAX_ROUNDS):
+            trajectory = assemble_trajectory(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
+            trajectory, states, certificate, c = self._slow_down(trajectory, SMALL_STEP[mesh.curve] * STEP_GROWTH**turn)
             if certificate.ok:
                 cost = self._cost(trajectory)
-                return Found(trajectory, certificate, cost, c, tuple(self.tightened), self.iterations, self.solves)
+                return PlannedMotion(
+                    trajectory, certificate, cost, c, tuple(self.tightened), self.iterations, self.solves
+                )
             exceeded = [check.what for check in certificate.checks if check.excess > 0]
             self.tightened += [what for what in exceeded if what not in self.tightened]
-            margins = self._wider(margins, states, WIDER * DOUBLE**turn)
+            margins = self._widen_margins(margins, states, MARGIN_FACTOR * MARGIN_GROWTH**turn)
             if "clearance" in exceeded:
-                inflation = inflation + BEYOND * task.surroundings.short(task.description, states.q)
+                inflation = inflation + INFLATION_FACTOR * task.avoidance.shortfalls(task.description, states.q)
             guess = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
             knots = self._solution(guess, margins, inflation)
         worst = max(certificate.checks, key=lambda check: check.excess)
         raise PlanningError(
-            f"{self._whose(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {ROUNDS} rounds"
+            f"{self._row_name(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds"
         )
 
-    def _kept(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
-        """Return a motion, slowed down where a small step is all it takes, its states, certificate, and that factor."""
+    def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
+        """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
         task = self.task
         states, c = task.checker.states(trajectory), 1.0
         if task.rests and task.duration is None:
             c = task.checker.slow_down(states)
             if 1 < c < 1 + step:
-                c *= 1 + SLACK
-                # Worked out anew: that torques follow the law of slower motions is not taken for granted.
+                c *= 1 + TIME_SCALING_MARGIN
+                # The states are computed again, so that the certificate does not rely on the law of time scaling.
                 trajectory = trajectory.slowed(c)
                 states = task.checker.states(trajectory)
             else:
                 c = 1.0
         return trajectory, states, task.checker.check(trajectory, states), c
 
-    def _wider(self, margins: Margins, states: States, factor: float) -> Margins:
-        """Return margins that are wider by a multiple of what a motion exceeds in each interval."""
+    def _widen_margins(self, margins: Margins, states: States, factor: float) -> Margins:
+        """Return margins raised in each interval by ``factor`` times the excess of a motion."""
         checker = self.task.checker
         excesses = [(what, use - 1) for what, use in checker.peaks(states) if what != "clearance"]
         for what, excess in [*excesses, ("position", checker.positions(states))]:
@@ -186,68 +191,70 @@ class Search:
     # Starts
 
     def _solutions(self, warm: Trajectory | None) -> Iterator[Knots]:
-        """Yield solutions, those to be tried first first."""
+        """Yield solutions; several starts of a small arm are sorted by their cost."""
         task, mesh = self.task, self.program.mesh
-        margins, inflation = Margins(mesh), np.zeros(len(task.surroundings.obstacles) + 1)
-        many = 1 < task.arm.n <= FEW and self.program.problem.objective.has_time and not task.surroundings
+        margins, inflation = Margins(mesh), np.zeros(len(task.avoidance.obstacles) + 1)
+        is_multistart = (
+            1 < task.arm.n <= MAX_SMALL_JOINTS and self.program.problem.objective.has_time and not task.avoidance
+        )
         found: list[tuple[float, Knots]] = []
-        for guess in self._guesses(warm, STARTS if many else 1):
+        for guess in self._guesses(warm, SMALL_ARM_STARTS if is_multistart else 1):
             try:
                 knots = self._solution(guess(), margins, inflation)
             except PlanningError as error:
-                if found and isinstance(error, _TimeIsOver):
+                if found and isinstance(error, _TimeLimitReached):
                     break
-                self._note(error)
+                self._keep_first_failure(error)
                 continue
-            if not many:
+            if not is_multistart:
                 yield knots
             else:
                 found.append((self.value, knots))
         yield from (knots for _, knots in sorted(found, key=lambda item: item[0]))
 
-    def _guesses(self, warm: Trajectory | None, many: int) -> Iterator[Callable[[], Knots]]:
-        """Yield what to start from: a motion that is known, straight ways, and detours."""
+    def _guesses(self, warm: Trajectory | None, starts: int) -> Iterator[Callable[[], Knots]]:
+        """Yield initial guesses: a given motion, straight paths, and detours."""
         task, mesh = self.task, self.program.mesh
         if warm is not None and len(mesh.legs) == 1:
             yield lambda: knots_along(warm, mesh, np.array([warm.duration]))
-        durations = np.maximum(leg_durations(task.description, task.limits, task.points), SHORTEST)
+        durations = np.maximum(leg_durations(task.description, task.limits, task.points), MIN_LEG_DURATION)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
         elif not self.program.problem.objective.only_time:
             durations *= self._best_factor(durations)
         yield lambda: straight_knots(task, mesh, durations)
-        for seed in range(DETOURS if task.surroundings else many - 1):
+        for seed in range(MAX_DETOURS if task.avoidance else starts - 1):
             yield lambda seed=seed: detour(task, mesh, durations, seed)  # type: ignore[misc]
         if self.failure is not None and task.duration is None:
-            for factor in FACTORS:
+            for factor in RESTART_FACTORS:
                 yield lambda factor=factor: straight_knots(task, mesh, durations * factor)  # type: ignore[misc]
 
     def _best_factor(self, durations: Array) -> float:
-        """Return by what to slow down a straight way so that it costs least."""
-        factors = np.geomspace(1.0, LONGEST / max(float(durations.sum()), 1e-6), FACTORS_TRIED)
+        """Return the factor of the durations with which the straight path costs least."""
+        factors = np.geomspace(1.0, MAX_GUESSED_DURATION / max(float(durations.sum()), 1e-6), GUESSED_DURATIONS)
         costs = []
         for factor in factors:
             knots = straight_knots(self.task, self.program.mesh, durations * factor)
-            costs.append(self._cost(assembled(self.task.arm, self.program.mesh, knots, fixed_ends=False)))
+            costs.append(self._cost(assemble_trajectory(self.task.arm, self.program.mesh, knots, fixed_ends=False)))
         return float(factors[int(np.argmin(costs))])
 
     def _cost(self, trajectory: Trajectory) -> float:
         return cost_of(self.program.problem.objective, trajectory, self.task.description, self.task.friction)
 
     def _solution(self, guess: Knots, margins: Margins, inflation: Array) -> Knots:
-        """Solve from a guess.
+        """Return a solution from an initial guess.
 
         Raises
         ------
         PlanningError
-            Says what is missed most.
+            Not converged: names the row with the largest violation.
         """
         task, problem, mesh = self.task, self.program.problem, self.program.mesh
         bounds = g_bounds(task, problem, self.program.rows, margins)
         parameters = problem.parameters(
             task.load,
-            (*task.parameters, task.surroundings.values(inflation)) if task.surroundings else task.parameters,
-            1.0 / self._scale(guess),
+            (*task.parameters, task.avoidance.values(inflation)) if task.avoidance else task.parameters,
+            1.0 / self._cost_scale(guess),
             usual_accelerations(task, guess),
         )
         inside = x_bounds(task, mesh, margins, jerk_counts=problem.jerk_counts)
@@ -255,44 +262,44 @@ class Search:
         try:
             solution = self.program.solver(guess.vector, parameters, inside, bounds, self.deadline, self.progress)
         except Stopped:
-            raise _TimeIsOver from None
+            raise _TimeLimitReached from None
         self.iterations += solution.iterations
-        if solution.converged and solution.infeasibility <= FEASIBLE:
+        if solution.converged and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self.value = solution.cost
             return Knots.of(solution.x, mesh, problem.n)
-        raise PlanningError(self._missed(solution, bounds))
+        raise PlanningError(self._failure_text(solution, bounds))
 
-    def _missed(self, solution: Solution, bounds: tuple[Array, Array]) -> str:
+    def _failure_text(self, solution: Solution, bounds: tuple[Array, Array]) -> str:
         row, which, share, misses = worst_row(solution, self.program.rows, bounds)
         return (
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
-            f"{self._whose(row.what, which)} misses its bound by {misses:.2g} at {100 * share:.0f} % of the way"
+            f"{self._row_name(row.what, which)} misses its bound by {misses:.2g} at {100 * share:.0f} % of the way"
         )
 
-    def _whose(self, what: str, row: int) -> str:
+    def _row_name(self, what: str, row: int) -> str:
         names = [joint.name for joint in self.task.description.joints]
-        return f"{what} of joint {names[row]}" if what in ROWS_OF_JOINTS else what
+        return f"{what} of joint {names[row]}" if what in JOINT_ROWS else what
 
-    def _scale(self, guess: Knots) -> float:
-        """Return the cost of a guess, by which costs are divided."""
+    def _cost_scale(self, guess: Knots) -> float:
+        """Return the cost of a guess, which scales the objective."""
         if self.program.problem.objective.only_time:
             return float(guess.durations.sum())
-        trajectory = assembled(self.task.arm, self.program.mesh, guess, fixed_ends=False)
+        trajectory = assemble_trajectory(self.task.arm, self.program.mesh, guess, fixed_ends=False)
         objective, task = self.program.problem.objective, self.task
-        return max(size_of(objective, trajectory, task.description, task.friction), SMALLEST)
+        return max(size_of(objective, trajectory, task.description, task.friction), MIN_COST_SCALE)
 
 
-class _TimeIsOver(PlanningError):  # noqa: N818 (it never leaves this file)
-    """The deadline has passed."""
+class _TimeLimitReached(PlanningError):  # noqa: N818 (internal to this file)
+    """The time limit was reached."""
 
 
-SMALLEST = 1e-9
-ROWS_OF_JOINTS = (*JOINTWISE, "joint positions", "joint velocities")
-"""What has a row for each joint."""
+MIN_COST_SCALE = 1e-9
+JOINT_ROWS = (*JOINT_LIMITS, "joint positions", "joint velocities")
+"""Names of rows that apply to each joint."""
 
 
 def coarser(search: Search, motion: Trajectory) -> tuple[int, float] | None:
-    """Return the intervals of a coarser program and a motion's cost on it; nothing where the time is over."""
+    """Return the number of intervals of a coarser program and the cost of its motion; None if time has run out."""
     if time.perf_counter() > search.deadline:
         return None
     try:

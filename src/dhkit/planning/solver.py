@@ -1,4 +1,4 @@
-"""Ipopt on a program: by measured options, watched while it runs."""
+"""Ipopt with options chosen by measurement, and a callback for progress, time limits and interruption."""
 
 from __future__ import annotations
 
@@ -29,49 +29,49 @@ OPTIONS: dict[str, Any] = {
     "acceptable_iter": 0,
     "max_iter": 500,
 }
-"""Twice as fast as Ipopt's own on minimum time, and as reliable."""
+"""Options of Ipopt: for minimum time, twice as fast as its defaults and as reliable."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a solution stands."""
+    """State of a running solution."""
 
     iteration: int
     duration: float
-    """s, as of now."""
+    """Duration of the present iterate, s."""
     infeasibility: float
-    """The largest amount by which a row misses its bounds."""
+    """Largest violation of a row's bounds."""
     seconds: float
-    """Since the solution began."""
+    """Time since the solution began, s."""
 
     def __repr__(self) -> str:
         return value_line(self)
 
 
 ProgressCall: TypeAlias = Callable[[Progress], object]
-"""Called once an iteration; an exception in it ends the solution."""
+"""Callback in each iteration; an exception in it ends the solution."""
 
 
-class Stopped(Exception):  # noqa: N818 (no error of the caller's)
-    """A solution ran out of time."""
+class Stopped(Exception):  # noqa: N818 (not an error of the caller)
+    """The deadline passed during a solution."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What Ipopt came to."""
+    """Result of Ipopt."""
 
     x: Array
     g: Array
     converged: bool
     status: str
-    """In Ipopt's words."""
+    """Ipopt's return status."""
     iterations: int
     infeasibility: float
     cost: float
 
 
 class Solver:
-    """A program made ready for Ipopt; calls from several threads take turns."""
+    """Ipopt for one program; calls from several threads take turns."""
 
     def __init__(self, program: dict[str, Any], legs: int, *, tolerance: float, expand: bool) -> None:
         import casadi
@@ -105,7 +105,7 @@ class Solver:
         Parameters
         ----------
         deadline
-            When to stop, as of ``time.perf_counter``.
+            Time at which to stop, on the clock of ``time.perf_counter``, s.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Solver:
 
 
 class _KeptInterrupt:
-    """Keeps what Ctrl-C raises until CasADi returns: raised while CasADi calls back, or Ipopt evaluates, it is lost."""
+    """Delays KeyboardInterrupt until CasADi returns: raised during a callback or an evaluation, it would be lost."""
 
     raised: BaseException | None = None
 
@@ -158,7 +158,7 @@ def _outside(values: Array, low: Array, high: Array) -> float:
 
 
 def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
-    """Return what Ipopt calls once an iteration."""
+    """Return the callback that Ipopt calls in each iteration."""
     import casadi
 
     class Watch(casadi.Callback):
@@ -205,7 +205,7 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
                     duration = float(casadi.sum1(values["x"][:legs]))
                     misses = _outside(np.array(values["g"]).ravel(), *self.bounds)
                     self.progress(Progress(self.iteration - 1, duration, misses, now - self.started))
-            except BaseException as error:  # Ipopt would swallow it, an interruption by the keyboard too
+            except BaseException as error:  # Ipopt would discard it, KeyboardInterrupt too
                 self.raised = error
                 return [1]
             return [0]

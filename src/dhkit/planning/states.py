@@ -1,4 +1,8 @@
-"""A motion's states by Pinocchio: the numbers by which a plan is certified share no code with those that made it."""
+"""States of a motion by Pinocchio, for certificates.
+
+The optimizer's torques and poses are CasADi expressions of dhkit; those of a certificate are Pinocchio's. Both read the
+same description of the arm, and where Pinocchio is not installed, dhkit's own numeric mechanics takes its place.
+"""
 
 from __future__ import annotations
 
@@ -19,18 +23,18 @@ from dhkit.trajectories.pieces import Side
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """q, qd and qdd of N states, shape (N, n) each, and what follows from them; derived when first asked for."""
+    """q, qd and qdd of N states, shape (N, n) each, and quantities derived from them on first use."""
 
     description: Description
-    """With its payload."""
+    """The robot with its payload."""
     times: Array
-    """Shape (N,), s."""
+    """Times, shape (N,), s."""
     q: Array
     qd: Array
     qdd: Array
     friction: Friction | None = None
     jerk: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    """Shape (N, n), where it is asked for."""
+    """Jerks, shape (N, n), rad/s^3 and m/s^3; empty unless requested."""
 
     @classmethod
     def of(
@@ -41,13 +45,13 @@ class States:
         friction: Friction | None = None,
         side: Side = "right",
     ) -> States:
-        """Return a motion's states at times of any shape; ``description`` may carry a load."""
+        """Return a motion's states at times of any shape, s; ``description`` may include a payload."""
         values = (trajectory.q, trajectory.qd, trajectory.qdd, trajectory.jerk)
         q, qd, qdd, jerk = (value(times, side).reshape(-1, trajectory.n) for value in values)
         return cls(description, times.ravel(), q, qd, qdd, friction, jerk)
 
     def beside(self, last: States, count: int) -> States:
-        """Return rows of ``count`` states each: those of this one, K x (count - 1), and a last one of the other."""
+        """Return K rows of ``count`` states each: count - 1 of these and a last one of ``last``."""
 
         def joined(a: Array, b: Array) -> Array:
             width = a.shape[1:]
@@ -70,17 +74,17 @@ class States:
 
     @cached_property
     def reference(self) -> str:
-        """Who works the numbers out: Pinocchio, or dhkit where that is not installed."""
+        """Name of the library that computes torques and poses: Pinocchio, or dhkit if it is not installed."""
         return "dhkit" if _model(self.description) is None else "Pinocchio"
 
     @cached_property
     def tau(self) -> Array:
-        """Joint torques, friction included, shape (N, n)."""
+        """Joint torques including friction, shape (N, n), N m and N."""
         return self._rigid + self._friction_torque(self.qd)
 
     @cached_property
     def gravity_torque(self) -> Array:
-        """What holds the arm, shape (N, n)."""
+        """Gravity torques, shape (N, n), N m and N."""
         model = _model(self.description)
         if model is None:
             return dynamics.gravity_torque(self.description, self.q)
@@ -91,27 +95,27 @@ class States:
 
     @cached_property
     def T_world_tool(self) -> Array:
-        """The tool, shape (N, 4, 4)."""
+        """Poses of the tool in the world, shape (N, 4, 4)."""
         return self._tool[0]
 
     @cached_property
     def tool_velocity(self) -> Array:
-        """Of the tool's origin, world axes, shape (N, 3), m/s."""
+        """Velocities of the tool's origin, world axes, shape (N, 3), m/s."""
         return self._tool[1]
 
     @cached_property
     def tool_acceleration(self) -> Array:
-        """Of the tool's origin, world axes, shape (N, 3), m/s^2."""
+        """Accelerations of the tool's origin, world axes, shape (N, 3), m/s^2."""
         return self._tool[2]
 
     def with_tool(self, T_world_tool: Array) -> States:
-        """Return the same with the tool at rest in poses (N, 4, 4) of which the joint values are not known."""
+        """Return these states with the tool at rest in poses (N, 4, 4) whose joint values are not known."""
         other = replace(self)
         other.__dict__["_tool"] = (T_world_tool, np.zeros((self.n, 3)), np.zeros((self.n, 3)))
         return other
 
     def slowed(self, c: float) -> States:
-        """Return the states of the motion c times as slow; torques by their law, tau(t / c) = g + (tau - g) / c^2."""
+        """Return the states of the motion slowed down c times, with torques g + (tau - g) / c^2."""
         slower = replace(self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3)
         known: dict[str, Any] = slower.__dict__
         if "_rigid" in self.__dict__:
@@ -161,13 +165,13 @@ class States:
         return T, velocity, acceleration
 
     def _gathered(self, rows: list[Array]) -> Array:
-        # eigenpy hands a matrix of one column over as a vector.
+        # eigenpy returns a matrix of one column as a vector.
         return np.reshape(np.array(rows), self.q.shape)
 
 
 @lru_cache(maxsize=16)
 def _model(description: Description) -> PinocchioModel | None:
-    """Return the Pinocchio model of an arm, None where Pinocchio is not installed."""
+    """Return the Pinocchio model of an arm, or None if Pinocchio is not installed."""
     try:
         return pinocchio_model(description)
     except ModelError as error:
@@ -177,5 +181,5 @@ def _model(description: Description) -> PinocchioModel | None:
 
 
 def prepare(description: Description) -> None:
-    """Make the model of an arm, so that the first certificate need not."""
+    """Build the Pinocchio model of an arm in advance, so that the first certificate is fast."""
     _model(description)

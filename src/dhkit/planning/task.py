@@ -1,4 +1,4 @@
-"""One motion to be found, and the bounds that it puts on a program's numbers."""
+"""Task of one motion, and the bounds of a program's variables and rows that follow from it."""
 
 from __future__ import annotations
 
@@ -8,77 +8,77 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.certificate import Checker, position_sizes
-from dhkit.planning.clear import NOTHING, Surroundings
+from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.mesh import Curve, Mesh
-from dhkit.planning.problem import TINY_TIME, Problem, Rows
+from dhkit.planning.problem import MIN_LEG_DURATION, Problem, Rows
 from dhkit.planning.solver import Solution
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits
 
-FEW = 3
-"""Joints: with so many, programs are small."""
-LEAST_ROOM = 0.05
-"""Of a limit: margins take no more than the rest."""
+MAX_SMALL_JOINTS = 3
+"""Largest number of joints of arms whose programs are small."""
+MIN_LIMIT_SHARE = 0.05
+"""Smallest share of a limit that margins leave."""
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
-    """A motion through configurations, and what it must keep."""
+class PlanTask:
+    """A motion through given configurations, with its limits and constraints."""
 
     arm: Description
-    """Whose motion it is."""
+    """The robot."""
     description: Description
-    """The same with its payload."""
+    """The robot with its payload."""
     points: Array
-    """Shape (legs + 1, n): start, what lies on the way, goal."""
+    """Configurations of start, via points and goal, shape (legs + 1, n), rad and m."""
     start_velocity: Array
     goal_velocity: Array
     duration: float | None
-    """s; None: open."""
+    """Duration, s; None if it is optimized."""
     limits: Limits
     checker: Checker
     load: Array | None = None
-    """The payload's numbers, shape (10,)."""
+    """Parameters of the payload, shape (10,)."""
     parameters: tuple[Array, ...] = ()
-    """Of each constraint."""
+    """Parameters of each constraint."""
     friction: Friction | None = None
-    surroundings: Surroundings = NOTHING
+    avoidance: CollisionAvoidance = NO_AVOIDANCE
 
     @property
     def is_loaded(self) -> bool:
-        """Whether there is a payload."""
+        """Whether the tool carries a payload."""
         return self.load is not None
 
     @property
     def rests(self) -> bool:
-        """Whether the motion begins and ends at rest: it may then be slowed down."""
+        """Whether the motion begins and ends at rest, so that it can be slowed down."""
         return not (self.start_velocity.any() or self.goal_velocity.any())
 
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """How much tighter than they are limits are for a program, by kind: shares of the limit, (intervals, rows) each.
+    """Margins by which limits are tightened for a program, by kind: shares of the limit, shape (intervals, rows).
 
-    Only intervals in which a limit was exceeded are tightened: elsewhere the motion need not suffer for it.
+    Limits are tightened only in intervals in which they were exceeded, so that the motion stays fast elsewhere.
     """
 
     mesh: Mesh
     shares: dict[str, Array] = field(default_factory=dict)
 
     def of(self, what: str, count: int) -> Array:
-        """Return the shares of a kind in each interval, shape (intervals, count)."""
+        """Return the margins of a kind in each interval, shape (intervals, count), without unit."""
         return self.shares.get(what, np.zeros((self.mesh.intervals, count)))
 
     def at_knots(self, what: str, count: int) -> Array:
-        """Return the shares at knots, shape (intervals + 1, count): the wider one of both sides."""
+        """Return the margins at knots, shape (intervals + 1, count), without unit: the larger of both sides."""
         shares = self.of(what, count)
         edge = np.zeros((1, count))
         return np.maximum(np.vstack([shares, edge]), np.vstack([edge, shares]))
 
     def at_points(self, what: str, count: int, points: int) -> Array:
-        """Return the shares at a program's points, shape (points, count).
+        """Return the margins at a program's points, shape (points, count).
 
-        Points are one or more of every interval, or the knots (all, or those inside) and then the midpoints.
+        Points are one or more in every interval, or the knots (all, or the inner ones) followed by the midpoints.
         """
         shares, K = self.of(what, count), self.mesh.intervals
         if points % K == 0:
@@ -87,13 +87,13 @@ class Margins:
         return np.vstack([knots if points == 2 * K + 1 else knots[1:-1], shares])
 
     def raised(self, what: str, excess: Array) -> Margins:
-        """Return margins that are wider by an excess, shape (intervals, rows), shares of the limit."""
-        wider = np.minimum(self.of(what, excess.shape[1]) + np.maximum(excess, 0.0), 1 - LEAST_ROOM)
+        """Return margins raised by an excess, shape (intervals, rows), without unit (shares of the limit)."""
+        wider = np.minimum(self.of(what, excess.shape[1]) + np.maximum(excess, 0.0), 1 - MIN_LIMIT_SHARE)
         return Margins(self.mesh, {**self.shares, what: wider})
 
 
-def x_bounds(task: Task, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> tuple[Array, Array]:
-    """Return the bounds of a program's numbers."""
+def x_bounds(task: PlanTask, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> tuple[Array, Array]:
+    """Return the lower and upper bounds of a program's variables, shape (variables,) each, SI units."""
     n, K, limits = len(task.start_velocity), mesh.intervals, task.limits
     room = margins.at_knots("position", n) * position_sizes(limits)
     q = limits.lower + room, limits.upper - room
@@ -114,15 +114,15 @@ def x_bounds(task: Task, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> 
     legs = len(mesh.legs)
     low, high = (
         np.concatenate([np.full(legs, first), *(bounds[side].ravel() for bounds in (q, qd, qdd))])
-        for side, first in enumerate((TINY_TIME, np.inf))
+        for side, first in enumerate((MIN_LEG_DURATION, np.inf))
     )
     if task.duration is not None and legs == 1:
         low[0] = high[0] = task.duration
     return low, high
 
 
-def g_bounds(task: Task, problem: Problem, rows: list[Rows], margins: Margins) -> tuple[Array, Array]:
-    """Return the bounds of a program's rows."""
+def g_bounds(task: PlanTask, problem: Problem, rows: list[Rows], margins: Margins) -> tuple[Array, Array]:
+    """Return the lower and upper bounds of a program's rows, shape (rows,) each, in the units of the rows."""
     limits, low, high = task.limits, [], []
     for row in rows:
         shares = margins.at_points(row.what, row.count, row.points) if row.what in margins.shares else 0.0
@@ -157,7 +157,7 @@ def g_bounds(task: Task, problem: Problem, rows: list[Rows], margins: Margins) -
 
 
 def worst_row(solution: Solution, rows: list[Rows], bounds: tuple[Array, Array]) -> tuple[Rows, int, float, float]:
-    """Return the kind of row that misses its bounds most, which of its rows, where (0 to 1), and by how much."""
+    """Return the kind of row with the largest violation of bounds (rows,), its index, place (0 to 1), violation."""
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)
     at, begin = int(np.argmax(misses)), 0
@@ -171,13 +171,13 @@ def worst_row(solution: Solution, rows: list[Rows], bounds: tuple[Array, Array])
 
 
 def curve_for(n: int, has_time: bool, jerk_counts: bool) -> Curve:
-    """Return how accelerations run: the fewest numbers that come near to the best motion.
+    """Return the curve of accelerations with the fewest variables that comes near the optimum.
 
-    In least time torques jump. Constant accelerations take twice as many intervals to follow them as linear ones, but
-    are solved for faster where there are many joints.
+    Torques of time-optimal motions jump. Constant accelerations need twice as many intervals as linear ones, but are
+    solved faster for arms of many joints.
     """
     if not has_time:
         return Curve.QUADRATIC
     if jerk_counts:
         return Curve.LINEAR
-    return Curve.JUMPING if n <= FEW else Curve.CONSTANT
+    return Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT

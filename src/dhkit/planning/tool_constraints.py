@@ -1,4 +1,4 @@
-"""What the tool must keep on the way: speed, acceleration, direction, orientation."""
+"""Constraints of the tool: speed, acceleration, direction, orientation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ToolSpeed(Constraint):
-    """The speed of the tool's origin, m/s."""
+    """Limit of the speed of the tool's origin, m/s."""
 
     limit: float
 
@@ -31,24 +31,24 @@ class ToolSpeed(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "tool speed"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         import casadi
 
         return casadi.sumsqr(point.tool_velocity) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         square: Array = np.sum(states.tool_velocity**2, axis=1, keepdims=True)
         return square / self.limit**2
 
 
 @dataclass(frozen=True)
 class ToolAcceleration(Constraint):
-    """The size of the acceleration of the tool's origin, m/s^2."""
+    """Limit of the magnitude of the acceleration of the tool's origin, m/s^2."""
 
     limit: float
 
@@ -57,31 +57,31 @@ class ToolAcceleration(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "tool acceleration"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         import casadi
 
         return casadi.sumsqr(point.tool_acceleration) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         square: Array = np.sum(states.tool_acceleration**2, axis=1, keepdims=True)
         return square / self.limit**2
 
 
 @dataclass(frozen=True)
 class ToolDirection(Constraint):
-    """An axis of the tool keeps its direction in the world up to an angle, as a full glass needs it."""
+    """Limit of the angle between an axis of the tool and a direction in the world, as for carrying a full glass."""
 
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """In the tool's frame."""
+    """Axis in the tool's frame."""
     direction: tuple[float, float, float] | None = None
-    """In the world; None: as at the start."""
+    """Direction in the world; None for that of the axis at the start."""
     tolerance: float = math.radians(2)
-    """rad."""
+    """Largest angle, rad."""
     moving = False
 
     def __post_init__(self) -> None:
@@ -92,23 +92,23 @@ class ToolDirection(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "tool direction"
 
-    def told(self, use: float) -> str:
-        """Return a use of the limit in words."""
-        return _told_angle(use, self.tolerance)
+    def use_text(self, use: float) -> str:
+        """Return a use of the limit as text."""
+        return _angle_use_text(use, self.tolerance)
 
     def size(self, description: Description) -> int:
-        """Return how many parameters it takes."""
+        """Return the number of parameters."""
         return 3
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return its parameters, shape (size,)."""
+        """Return the parameters, shape (size,), without unit."""
         return T_start[:3, :3] @ np.array(self.axis) if self.direction is None else np.array(self.direction)
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         import casadi
 
         axis = point.T_world_tool[:3, :3] @ casadi.DM(self.axis)
@@ -116,7 +116,7 @@ class ToolDirection(Constraint):
         return share
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         cosine = (states.T_world_tool[:, :3, :3] @ np.array(self.axis)) @ parameters
         return np.asarray(_share_of_angle(cosine, self.tolerance))[:, None]
 
@@ -126,10 +126,10 @@ class ToolDirection(Constraint):
 
 @dataclass(frozen=True)
 class ToolOrientation(Constraint):
-    """The tool keeps the orientation that it has at the start up to an angle."""
+    """Limit of the angle between the tool's orientation and that at the start."""
 
     tolerance: float = math.radians(2)
-    """rad."""
+    """Largest angle, rad."""
     moving = False
 
     def __post_init__(self) -> None:
@@ -137,23 +137,23 @@ class ToolOrientation(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "tool orientation"
 
-    def told(self, use: float) -> str:
-        """Return a use of the limit in words."""
-        return _told_angle(use, self.tolerance)
+    def use_text(self, use: float) -> str:
+        """Return a use of the limit as text."""
+        return _angle_use_text(use, self.tolerance)
 
     def size(self, description: Description) -> int:
-        """Return how many parameters it takes."""
+        """Return the number of parameters."""
         return 9
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return its parameters, shape (size,)."""
+        """Return the parameters, shape (size,), without unit."""
         return T_start[:3, :3].ravel(order="F")
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         import casadi
 
         trace = casadi.dot(casadi.vec(point.T_world_tool[:3, :3]), parameters)
@@ -161,7 +161,7 @@ class ToolOrientation(Constraint):
         return share
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the same of samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k)."""
         trace = np.einsum("kij,ij->k", states.T_world_tool[:, :3, :3], parameters.reshape(3, 3, order="F"))
         return np.asarray(_share_of_angle((trace - 1) / 2, self.tolerance))[:, None]
 
@@ -171,7 +171,7 @@ def _share_of_angle(cosine: Any, tolerance: float) -> Any:
     return (1 - cosine) / (1 - math.cos(tolerance))
 
 
-def _told_angle(use: float, tolerance: float) -> str:
+def _angle_use_text(use: float, tolerance: float) -> str:
     angle = math.acos(max(-1.0, 1 - use * (1 - math.cos(tolerance))))
     return f"{math.degrees(angle):.4g} deg off, {math.degrees(tolerance):.4g} deg are"
 

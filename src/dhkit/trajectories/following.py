@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, takes_robot
-from dhkit.description.joint_words import degrees_hint, joint_words
+from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.errors import PlanningError
 from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
 from dhkit.kinematics.newton import Newton
@@ -279,7 +279,7 @@ def _require_inside(path: JointPath, limits: Limits) -> None:
     limit = limits.lower[i] if q[row, i] < limits.lower[i] else limits.upper[i]
     name = path.description.joints[i].name
     slides = bool(path.description.numbers.prismatic[i])
-    bound, found = joint_words(limit, slides=slides), joint_words(q[row, i], slides=slides)
+    bound, found = joint_text(limit, slides=slides), joint_text(q[row, i], slides=slides)
     raise PlanningError(
         f"{name} leaves its limit, {bound}, along the path: it comes to {found}"
         f"{degrees_hint(q[row, i], slides=slides)} at s = {s[row, i]:.4g}"

@@ -138,7 +138,7 @@ class JointPath:
 
 
 def quintic_law() -> tuple[Array, Array]:
-    """Return breaks and coefficients of s(t) = 10 t^3 - 15 t^4 + 6 t^5: from rest to rest in one second."""
+    """Return breaks (2,), s, and coefficients (1, 6) of s(t) = 10 t^3 - 15 t^4 + 6 t^5: from rest to rest in 1 s."""
     return np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0, 10.0, -15.0, 6.0]])
 
 

@@ -31,7 +31,7 @@ class Pieces:
 
     @classmethod
     def of(cls, breaks: ArrayLike, coefficients: ArrayLike, columns: int) -> Pieces:
-        """Return pieces from copies of checked arrays.
+        """Return pieces from copies of breaks (K+1,), s, and coefficients (K, p+1, columns), which are checked.
 
         Raises
         ------
@@ -136,7 +136,7 @@ class Pieces:
 
 
 def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:
-    """Return breaks and coefficients of a function followed by another."""
+    """Return breaks (K+1,), s, and coefficients (K, p+1, m) of one function followed by another."""
     both = (first.coefficients, second.coefficients)
     degrees = max(c.shape[1] for c in both)
     padded = [np.pad(c, ((0, 0), (0, degrees - c.shape[1]), (0, 0))) for c in both]

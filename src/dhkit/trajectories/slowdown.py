@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
-from dhkit.description.joint_words import degrees_hint, joint_words
+from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.dynamics import gravity_torque, inverse_dynamics
 from dhkit.errors import PlanningError
 from dhkit.trajectories.limits import Limits
@@ -118,7 +118,7 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     below = q[row, i] < limits.lower[i]
     side, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
     slides = bool(trajectory.description.numbers.prismatic[i])
-    bound, found = joint_words(limit, slides=slides), joint_words(q[row, i], slides=slides)
+    bound, found = joint_text(limit, slides=slides), joint_text(q[row, i], slides=slides)
     raise PlanningError(
         f"{trajectory.description.joints[i].name} leaves its {side} limit, {bound}: it comes to {found}"
         f"{degrees_hint(q[row, i], slides=slides)} at {t[row, i]:.4g} s"

@@ -21,7 +21,7 @@ Table = tuple[tuple[str, ...], Array]
 
 
 def table_text(columns: tuple[str, ...], rows: Array, comments: tuple[str, ...]) -> str:
-    """Return a CSV with 17 digits; comments begin with '# '."""
+    """Return a CSV of rows (N, columns), in any units, with 17 digits; comments begin with '# '."""
     lines = [*(f"# {comment}" for comment in comments), ",".join(columns)]
     lines += [",".join(f"{value:.17g}" for value in row) for row in rows.tolist()]
     return "\n".join(lines) + "\n"

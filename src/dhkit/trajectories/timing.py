@@ -81,7 +81,7 @@ def check_duration(duration: float | None) -> None:
 
 
 def configuration(description: Description, value: ArrayLike | None, name: str) -> Array:
-    """Return a joint vector, shape (n,), 0 for None.
+    """Return joint values, shape (n,), rad and m; zeros for None.
 
     Raises
     ------

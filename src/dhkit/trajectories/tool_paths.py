@@ -99,7 +99,7 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
     Parameters
     ----------
     T0, T1
-        Poses of the tool in the world, shape (4, 4).
+        Poses of the tool in the world, shape (4, 4), m.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, Robot, description_of
 from dhkit.description.arrays import number_array
-from dhkit.description.joint_words import joint_words
+from dhkit.description.joint_text import joint_text
 from dhkit.errors import DescriptionError
 from dhkit.formats import format_function
 from dhkit.kernels import check_whole
@@ -249,7 +249,7 @@ class Trajectory:
         if len(apart):
             i = int(apart[0])
             name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])
-            here, there = (joint_words(x, slides=slides, digits=9) for x in (end[i], start[i]))
+            here, there = (joint_text(x, slides=slides, digits=9) for x in (end[i], start[i]))
             raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
         return self._moved(*join(self.pieces, other.pieces))
 

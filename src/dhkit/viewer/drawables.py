@@ -1,8 +1,9 @@
-"""Parts of an arm, triads and the floor's grid as meshcat objects, lowered to plain data."""
+"""Parts of an arm, triads and the floor's grid as meshcat objects, written as plain data."""
 
 from __future__ import annotations
 
 import io
+import math
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -22,17 +23,17 @@ Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dty
 """meshcat's cylinders stand along y, dhkit's along z: a quarter turn about x."""
 
 AXIS_COLORS = np.array([[0.898, 0.282, 0.302], [0.188, 0.643, 0.424], [0.231, 0.510, 0.965]])
-"""Red, green and blue for x, y and z: readable on white and on black."""
+"""Red, green and blue, from 0 to 1, of x, y and z, readable on white and on black."""
 
 ROUND_SIDES = 48
-"""Sides of what is round; a multiple of 4, so that the silhouette has the true radius."""
+"""Sides of round solids; a multiple of 4, so that the silhouette has the true radius."""
 
-FRONT, DOUBLE = 0, 2
-"""three.js's sides of a surface: files may have triangles the wrong way round, at twice the cost."""
+FRONT_SIDE, BOTH_SIDES = 0, 2
+"""three.js's sides of a surface: both are drawn, at twice the cost, where a file's triangles may be reversed."""
 
 ARROW_SIDES = 8
-GRID_FADE = 3
-"""Pieces of a half grid line: opacity is linear along each, and every piece costs time without a graphics card."""
+HALF_LINE_PIECES = 3
+"""Pieces of half a grid line: opacity is linear along each, and each costs time without a graphics processor."""
 
 
 def part_object(part: Part, name: str) -> Lowered:
@@ -43,45 +44,45 @@ def part_object(part: Part, name: str) -> Lowered:
     part
         A drawn part of a link.
     name
-        What its pieces are called in place of random identifiers, so that equal scenes are equal bytes.
+        Name of its pieces, in place of meshcat's random identifiers, so that equal scenes are equal bytes.
 
     Raises
     ------
     ModelError
-        A mesh without a readable file.
+        A mesh has no readable file.
     """
     meshcat = _meshcat()
-    side = DOUBLE if isinstance(part.geometry, Mesh) else FRONT
+    side = BOTH_SIDES if isinstance(part.geometry, Mesh) else FRONT_SIDE
     material = meshcat.MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
     return _lowered("Mesh", _geometry(part), material, name)
 
 
 def part_transform(part: Part) -> Array:
-    """Return what maps the coordinates of a part's meshcat object to its link's DH frame, shape (4, 4).
+    """Return the map from the coordinates of a part's meshcat object to its link's DH frame, shape (4, 4), m.
 
-    That is the part's own pose with the mesh's scale or, for cylinders and capsules, the turn from y to z.
+    It is the part's own pose with the mesh's scale or, for cylinders and capsules, the turn from y to z.
     """
     T = part.T_link_part.copy()
     if isinstance(part.geometry, Mesh):
-        T[:3, :3] *= [float(factor) for factor in part.geometry.scale]  # mirrors too: both sides of it are drawn
+        T[:3, :3] *= [float(factor) for factor in part.geometry.scale]  # may mirror: both sides are drawn
     if isinstance(part.geometry, Cylinder | Capsule):
         T = np.matmul(T, Y_TO_Z)
     return T
 
 
 def triad_object(length: float, name: str) -> Lowered:
-    """Return three arrows along x, y and z, red, green and blue, drawn over everything that hides them.
+    """Return three arrows along x, y and z, red, green and blue, drawn over everything in front of them.
 
     Parameters
     ----------
     length
-        From the origin to the arrows' tips, m.
+        Length of the arrows, m.
     name
         As for :func:`part_object`.
     """
     meshcat = _meshcat()
     vertices, faces = _arrow()
-    along = [np.roll(vertices, axis, axis=1) for axis in range(3)]  # cyclic: x, y and z keep the triangles' sense
+    along = [np.roll(vertices, axis, axis=1) for axis in range(3)]  # a cyclic change of axes keeps the triangles' sense
     geometry = meshcat.TriangularMeshGeometry(
         length * np.concatenate(along),
         np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
@@ -92,7 +93,7 @@ def triad_object(length: float, name: str) -> Lowered:
 
 
 def grid_step(size: float) -> float:
-    """Return a round distance between grid lines, about a sixth of a size: 1, 2 or 5 times a power of ten, m.
+    """Return the distance between grid lines, m: about a sixth of a size (m), and 1, 2 or 5 times a power of ten.
 
     Examples
     --------
@@ -105,7 +106,7 @@ def grid_step(size: float) -> float:
 
 
 def grid_object(size: float, name: str) -> Lowered:
-    """Return a square grid in the plane z = 0 that fades out towards its edge; the page gives it its color.
+    """Return a square grid in the plane z = 0 that fades towards its edge; the page gives it its color.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ def grid_object(size: float, name: str) -> Lowered:
     lines = int(np.ceil(1.3 * size / step))
     half = lines * step
     across = step * np.arange(-lines, lines + 1)
-    along = np.linspace(-half, half, 2 * GRID_FADE + 1)
+    along = np.linspace(-half, half, 2 * HALF_LINE_PIECES + 1)
     x, y = np.meshgrid(along, across)
     line = np.stack([x, y, np.zeros_like(x)], axis=-1)
     segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 3)
@@ -132,7 +133,7 @@ def grid_object(size: float, name: str) -> Lowered:
 
 
 def _meshcat() -> Any:
-    """Return meshcat's geometry module; its package imports half a second of things, and warns about one of them."""
+    """Return meshcat's geometry module; importing the package takes half a second, and warns about zmq."""
     import warnings
 
     with warnings.catch_warnings():
@@ -186,7 +187,7 @@ def _mesh(part: Part, shape: Mesh) -> Any:
 
 
 def _lathe(outline: Array) -> Any:
-    """Return three.js's surface of revolution about y of an outline, shape (k, 2): distance from y, height."""
+    """Return three.js's surface of revolution about y of an outline, shape (k, 2), m: distance from y, and height."""
 
     class Lathe(_meshcat().Geometry):  # type: ignore[misc]  # meshcat-python has none
         def lower(self, object_data: Lowered) -> Lowered:
@@ -197,15 +198,15 @@ def _lathe(outline: Array) -> Any:
 
 
 def _arc(radius: float, height: float, start: float, stop: float) -> Array:
-    """Return a circle's points between two latitudes in degrees, shape (k, 2), at least 0 from the axis."""
+    """Return points of a circle between two latitudes, degrees, shape (k, 2), m: distance from the axis, and height."""
     steps = round(abs(stop - start) / 360 * ROUND_SIDES)
     latitude = np.radians(np.linspace(start, stop, steps + 1))
     return np.stack([radius * np.maximum(np.cos(latitude), 0), height + radius * np.sin(latitude)], axis=1)
 
 
 def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
-    """Return an arrow of length 1 along x: a rod with a cone, vertices (k, 3) and triangles (m, 3)."""
-    turn = 2 * np.pi * np.arange(ARROW_SIDES) / ARROW_SIDES
+    """Return an arrow of length 1 along x, a rod with a cone: vertices, shape (k, 3), and triangles, shape (m, 3)."""
+    turn = math.tau * np.arange(ARROW_SIDES) / ARROW_SIDES
     rings = [(0.0, 0.02), (0.8, 0.02), (0.8, 0.055), (1.0, 0.0)]
     vertices = np.concatenate(
         [np.stack([np.full(ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1) for x, r in rings]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import singledispatch
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,40 +11,38 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Convention, Description, takes_robot
 from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
+from dhkit.viewer.diagrams import CURVE_COLORS, GRID_COLOR, joint_color, joint_kinds
 from dhkit.viewer.motion import check_motion
-from dhkit.viewer.notebook_figure import new_figure
+from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.scene import first_configuration, frame_labels, scene_size
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
-"""x, y and z, as in the viewer."""
-CURVE_COLORS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
-"""Tol's bright scheme (SRON/EPS/TN/09-002, 2021), told apart by colour-blind people too."""
-LINK_COLOR, GRID_COLOR, PATH_COLOR = "#3a4252", "#d5d9e0", "#d9480f"
-TRIAD = 0.11
-"""Length of a triad as a share of the arm's size."""
-FLAT = 1e-9
-"""An arm whose frames leave a plane by less than this share of its size is drawn in it."""
-SLIMMEST = 0.5
-"""Shortest edge of the box around an arm, as a share of the longest: slimmer boxes have no room for their ticks."""
+"""Colors of x, y and z, as in the viewer."""
+LINK_COLOR, PATH_COLOR = "#3a4252", "#d9480f"
+TRIAD_SHARE = 0.11
+"""Length of a triad, as a share of the arm's size."""
+FLATNESS = 1e-9
+"""Largest extent across a plane, as a share of the arm's size, of an arm that is drawn in that plane."""
+MIN_EDGE_SHARE = 0.5
+"""Shortest edge of the box around an arm, as a share of the longest: slimmer boxes have no room for tick labels."""
 ZOOM = 0.86
-"""Leaves the labels of a box's axes inside the figure."""
+"""Zoom that leaves the labels of a box's axes inside the figure."""
 
 
 @singledispatch
 def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
     """Return a figure of a value; a notebook shows it.
 
-    An arm, or its description, is drawn at joint values ``q``, shape (n,) or a configuration's name; in its ``ready``
-    configuration, or at zero, unless given. Other values take no ``q``.
+    An arm, or its description, is drawn at joint values ``q``, shape (n,), rad and m, or at a configuration by name; by
+    default in its ``ready`` configuration, or at zero. Other values take no ``q``.
 
     Raises
     ------
     TypeError
-        A type that has no figure; names those that have one.
+        The type has no figure; the message names the types that have one.
 
     Examples
     --------
@@ -51,7 +50,7 @@ def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
     >>> figure = plot(library_robot("puma560"))
     >>> figure.savefig("puma560.png")  # doctest: +SKIP
     """
-    description = getattr(value, "description", None)  # an Arm, which this folder does not know
+    description = getattr(value, "description", None)  # an Arm, which this package must not import
     if isinstance(description, Description):
         return plot(description, q=q)
     known = sorted(kind.__name__ for kind in plot.registry if kind is not object)
@@ -83,63 +82,57 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     if q.ndim != 1:
         raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
-    axes = space(figure, 111)
+    axes = space_axes(figure, 111)
     frames = world_to_frames(description, q)
     tool = world_to_tool(description, q)
     line = skeleton(description, frames, tool)
     _draw_links(axes, description, frames, line)
     _draw_triads(axes, description, np.concatenate([frames, tool[None]]))
-    frame_space(axes, line, margin=1.4 * TRIAD * scene_size(description))
+    set_space_limits(axes, line, margin=1.4 * TRIAD_SHARE * scene_size(description))
     axes.set_title(description.name, fontsize=13, fontweight="bold")
     return figure
 
 
 @takes_robot
 def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Figure:
-    """Return joint curves over time, revolute ones in degrees and prismatic ones in m, beside the tool's path.
+    """Return a figure of joint values over time, in degrees and m, beside the tool's path.
 
     Parameters
     ----------
     description
         The arm.
     times
-        Shape (N,), s, increasing.
+        Times, shape (N,), s, increasing.
     q
         Joint values, shape (N, n), rad and m.
 
     Raises
     ------
     ValueError
-        Other shapes, fewer than two samples, values that are not finite, or times that do not increase.
+        Times or joint values have other shapes, are fewer than two or not finite, or times do not increase.
     """
     times, q = check_motion(description, times, q)
-    prismatic = description.numbers.prismatic
-    kinds = [(~prismatic, 180 / np.pi, "angle [deg]"), (prismatic, 1.0, "offset [m]")]
-    kinds = [kind for kind in kinds if kind[0].any()]
+    kinds = joint_kinds(description)
     figure = new_figure(figsize=(11, 4.8), layout="constrained")
     figure.suptitle(description.name, fontsize=13, fontweight="bold")
     grid = figure.add_gridspec(len(kinds), 2, width_ratios=(1.25, 1))
-    for row, (chosen, unit, label) in enumerate(kinds):
+    for row, (joints, unit, label, _) in enumerate(kinds):
         axes = figure.add_subplot(grid[row, 0])
-        _draw_curves(axes, description, times, q, chosen, unit)
+        for i in joints:
+            style = ("-", "--", ":")[i // len(CURVE_COLORS) % 3]
+            axes.plot(times, unit * q[:, i], style, color=joint_color(i), lw=1.8, label=description.joints[i].name)
+        axes.margins(x=0.01)
+        axes.grid(color=GRID_COLOR, lw=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
         axes.set_ylabel(label)
     axes.set_xlabel("time [s]")
-    draw_path(space(figure, grid[:, 1]), description, q)
+    draw_path(space_axes(figure, grid[:, 1]), description, q)
     return figure
 
 
-def _draw_curves(axes: Axes, description: Description, times: Array, q: Array, chosen: Any, unit: float) -> None:
-    for i in np.flatnonzero(chosen):
-        color, style = CURVE_COLORS[i % len(CURVE_COLORS)], ("-", "--", ":")[i // len(CURVE_COLORS) % 3]
-        axes.plot(times, unit * q[:, i], style, color=color, lw=1.8, label=description.joints[i].name)
-    axes.margins(x=0.01)
-    axes.grid(color=GRID_COLOR, lw=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
-
-
 def draw_path(axes: Any, description: Description, q: Array) -> None:
-    """Draw the tool's path over q, shape (N, n), and the arm where it begins and ends."""
+    """Draw the tool's path at joint values q, shape (N, n), rad and m, and the arm at the first and the last."""
     path = world_to_tool(description, q)[:, :3, 3]
     lines = []
     for state, color, label in ((q[0], "#a9b1bf", "start"), (q[-1], LINK_COLOR, "end")):
@@ -147,7 +140,7 @@ def draw_path(axes: Any, description: Description, q: Array) -> None:
         lines.append(skeleton(description, frames, tool))
         axes.plot(*lines[-1].T, color=color, lw=2.5, solid_capstyle="round", solid_joinstyle="round", label=label)
     axes.plot(*path.T, color=PATH_COLOR, lw=1.8, label="tool")
-    frame_space(axes, np.concatenate([*lines, path]), margin=0.04 * scene_size(description))
+    set_space_limits(axes, np.concatenate([*lines, path]), margin=0.04 * scene_size(description))
     axes.legend(loc="upper left", frameon=False, fontsize=9)
 
 
@@ -165,7 +158,7 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
     """Draw frames 0 ... n and the tool, T of shape (n + 2, 4, 4)."""
     from matplotlib.patheffects import withStroke
 
-    length = TRIAD * scene_size(description)
+    length = TRIAD_SHARE * scene_size(description)
     for k, color in enumerate(AXIS_COLORS):
         start = T[:, :3, 3]
         ends = np.stack([start, start + length * T[:, :3, k]], axis=1)
@@ -180,49 +173,53 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
 
 
 def skeleton(description: Description, frames: Array, tool: Array) -> Array:
-    """Return the way from the base to the tool as a line, shape (k, 3): by d along z, by a along x of every row."""
+    """Return the line from the base to the tool, shape (k, 3), m, world, along d and a of each row.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    frames
+        Poses of DH frames 0 ... n, shape (n + 1, 4, 4), m, world.
+    tool
+        Pose of the tool, shape (4, 4), m, world.
+    """
     points = [frames[0, :3, 3]]
-    for i in range(1, description.n + 1):
-        before, after = frames[i - 1], frames[i]
-        along = before if description.convention is Convention.STANDARD else after
-        step = after[:3, 3] - before[:3, 3]
+    for previous, frame in pairwise(frames):
+        step = frame[:3, 3] - previous[:3, 3]
         if description.convention is Convention.STANDARD:
-            corner = before[:3, 3] + along[:3, 2] * (step @ along[:3, 2])
+            corner = previous[:3, 3] + previous[:3, 2] * (step @ previous[:3, 2])
         else:
-            corner = after[:3, 3] - along[:3, 2] * (step @ along[:3, 2])
-        points += [corner, after[:3, 3]]
+            corner = frame[:3, 3] - frame[:3, 2] * (step @ frame[:3, 2])
+        points += [corner, frame[:3, 3]]
     return np.array([*points, tool[:3, 3]])
 
 
-def space(figure: Figure, place: Any) -> Any:
-    """Return new axes of a figure for things in space."""
+def space_axes(figure: Figure, place: Any) -> Any:
+    """Return new axes in space, in m, at a place of a figure's grid."""
+    from matplotlib.ticker import MaxNLocator
+
     axes: Any = figure.add_subplot(place, projection="3d", proj_type="persp", focal_length=0.6)
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
         axis._axinfo["grid"].update(color=GRID_COLOR, linewidth=0.6)
-        axis.set_major_locator(_few_ticks())
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(labelsize=8)
     return axes
 
 
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4, steps=[1, 2, 2.5, 5, 10])
-
-
-def frame_space(axes: Any, points: Array, margin: float) -> None:
-    """Set equal axes around points, shape (k, 3); look at what lies in a plane z = constant from above."""
+def set_space_limits(axes: Any, points: Array, margin: float) -> None:
+    """Set limits around points, shape (k, 3), with a margin, m, and equal scales; a flat scene is seen from above."""
     low, high = points.min(axis=0), points.max(axis=0)
-    flat = high[2] - low[2] <= FLAT * max(float((high - low).max()), 1e-12)
-    half = np.maximum((high - low) / 2 + margin, SLIMMEST * float((high - low).max() / 2 + margin))
+    is_flat = high[2] - low[2] <= FLATNESS * max(float((high - low).max()), 1e-12)
+    half = np.maximum((high - low) / 2 + margin, MIN_EDGE_SHARE * float((high - low).max() / 2 + margin))
     centre = (low + high) / 2
     for set_limits, c, h in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, half, strict=True):
         set_limits(c - h, c + h)
     axes.set_box_aspect(half, zoom=ZOOM)
     axes.view_init(elev=24, azim=-58)
-    if flat:
+    if is_flat:
         axes.view_init(elev=90, azim=-90)
         axes.set_proj_type("ortho")
         axes.set_zticks([])

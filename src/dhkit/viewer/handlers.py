@@ -1,7 +1,7 @@
-"""What the viewer's server answers, and to whom.
+"""The handlers of the viewer's server: its files, and the websockets of its pages.
 
-Requests must name the server's own address as Host (against DNS rebinding), come from one of its own pages if they
-say where they come from (a websocket must), and know the random token in the path.
+A request is refused unless it names the server's own address as Host (against DNS rebinding), comes from one of the
+server's own pages if it has an Origin (a websocket must have one), and knows the random token in the path.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import hmac
 import json
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Protocol
 
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
@@ -21,19 +21,19 @@ from dhkit.viewer.protocol import ProtocolError
 from dhkit.viewer.requests import Request, Shown, decode_message
 from dhkit.viewer.session import Session
 
-MOST_REQUESTS = 64
-"""Of one page that wait for an answer, or whose answer the page has not taken yet."""
-MOST_PAGES = 100
-"""Pages at a time: each may keep the samples of some minutes waiting."""
+MAX_REQUESTS = 64
+"""Largest number of requests of one page that wait for an answer, or whose answer the page has not taken yet."""
+MAX_PAGES = 100
+"""Largest number of pages at a time: the samples of some minutes may wait for each."""
 
 
 class PageServer(Protocol):
-    """What the handlers ask of the server whose requests they answer."""
+    """The server, as far as the handlers use it."""
 
     token: str
-    """Random part of every address."""
+    """The random part of every address."""
     files: Mapping[str, tuple[str, bytes]]
-    """Content type and content of the page's files, by name."""
+    """Content type and content of each file of the page, by name."""
     pages: set[Page]
     """Open pages."""
 
@@ -45,21 +45,21 @@ class PageServer(Protocol):
         """Return a session that has everything shown so far to send."""
 
     def ask(self, page: Page, request: Request) -> None:
-        """Have a page's request answered."""
+        """Queue a page's request, to be answered after those before it."""
 
     def forget(self, page: Page) -> None:
-        """Drop a page that is closed, and what waits for it."""
+        """Drop a page that is closed, and its requests."""
 
 
 class Guarded(RequestHandler):
     """A request that is refused unless it comes from our own page and knows the token."""
 
     def initialize(self, server: PageServer) -> None:
-        """Know the server."""
+        """Keep the server."""
         self.server = server
 
     def prepare(self) -> None:
-        """Refuse strangers before anything else is done."""
+        """Refuse foreign requests before anything else is done."""
         origin = self.request.headers.get("Origin")
         if self.request.host not in self.server.hosts:
             raise HTTPError(403, reason="Foreign Host")
@@ -69,14 +69,14 @@ class Guarded(RequestHandler):
             raise HTTPError(403, reason="Missing token")
 
     def set_default_headers(self) -> None:
-        """Say as little as possible, to as few as possible."""
+        """Send headers that tell little about the server, and keep the content from other sites and from caches."""
         self.clear_header("Server")
         self.set_header("Content-Security-Policy", SECURITY_POLICY)
         self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("Referrer-Policy", "no-referrer")
         self.set_header("Cache-Control", "no-store")
 
-    def write_error(self, status_code: int, **_: Any) -> None:
+    def write_error(self, status_code: int, **_: object) -> None:
         """Answer with one line."""
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code} {self._reason}\n")
@@ -111,69 +111,72 @@ class Page(Guarded, WebSocketHandler):
     """Requests that wait for an answer."""
 
     def prepare(self) -> None:
-        """Refuse strangers, who does not say where it comes from (browsers do), and more pages than we can serve."""
+        """Refuse foreign requests, those without an Origin, which browsers send, and pages beyond MAX_PAGES."""
         super().prepare()
         if "Origin" not in self.request.headers:
             raise HTTPError(403, reason="Missing Origin")
-        if len(self.server.pages) >= MOST_PAGES:
+        if len(self.server.pages) >= MAX_PAGES:
             raise HTTPError(503, reason="Too many pages")
 
     def check_origin(self, origin: str) -> bool:
-        """Accept: :meth:`prepare` has looked at it."""
+        """Accept every origin: :meth:`prepare` has checked it."""
         return True
 
     def open(self, *_: str) -> None:
-        """Send the page everything."""
+        """Send the whole state to the page."""
         self.set_nodelay(True)
         self.session = self.server.replay()
         self.server.pages.add(self)
         self.send()
 
     async def on_message(self, message: str | bytes) -> None:
-        """Take an acknowledgement, and send what has come up meanwhile; or have a request answered.
+        """Take an acknowledgement, and send the next messages; or queue a request.
 
-        Nothing more is read from a page that does not take what it is told, so that nothing piles up for it.
+        No more is read from a page until it has taken the errors that it is sent, so that nothing piles up for it.
         """
         try:
-            found = decode_message(message)
+            received = decode_message(message)
         except ProtocolError as error:
-            await _taken(self.say({"type": "error", "error": str(error)}))
+            await self._send_and_wait({"type": "error", "error": str(error)})
             return
-        if isinstance(found, Shown):
-            self.session.shown(found.sequence)
+        if isinstance(received, Shown):
+            self.session.acknowledge(received.sequence)
             self.send()
-        elif self._unanswered >= MOST_REQUESTS:
-            text = f"{MOST_REQUESTS} requests wait for an answer; expected at most so many"
-            await _taken(self.say({"type": "error", "id": found.id, "error": text}))
+        elif self._unanswered >= MAX_REQUESTS:
+            text = f"{MAX_REQUESTS} requests wait for an answer; expected at most so many"
+            await self._send_and_wait({"type": "error", "id": received.id, "error": text})
         else:
             self._unanswered += 1
-            self.server.ask(self, found)
+            self.server.ask(self, received)
 
-    def answered(self, answer: str) -> None:
+    def send_answer(self, answer: str) -> None:
         """Send the answer to a request; until the page takes it the request counts as unanswered."""
         written = self._write(answer, binary=False)
         if written is not None:
             written.add_done_callback(self._count_answered)
 
     def beat(self) -> None:
-        """Give a sign of life, unless the page has not even taken what it was told before."""
+        """Send a sign of life, unless the page has not even taken the message before."""
         connection = self.ws_connection
         stream = None if connection is None else connection.stream
         if stream is not None and not stream.writing():
-            self.say({"type": "beat"})
+            self._write(json.dumps({"type": "beat"}), binary=False)
 
     def on_close(self) -> None:
-        """Forget the page."""
+        """Drop the page."""
         self.server.forget(self)
 
     def send(self) -> None:
-        """Send what may be sent."""
+        """Send the messages that may be sent now."""
         while (message := self.session.next()) is not None:
             self._write(message, binary=True)
 
-    def say(self, message: dict[str, Any]) -> asyncio.Future[None] | None:
-        """Send a line of JSON; what is returned is done when the page has taken it."""
-        return self._write(json.dumps(message), binary=False)
+    async def _send_and_wait(self, message: Mapping[str, object]) -> None:
+        """Send a line of JSON, and wait until the page has taken it or is gone."""
+        written = self._write(json.dumps(message), binary=False)
+        if written is not None:
+            with suppress(WebSocketClosedError):
+                await written
 
     def _count_answered(self, _: asyncio.Future[None]) -> None:
         self._unanswered -= 1
@@ -184,18 +187,11 @@ class Page(Guarded, WebSocketHandler):
         except WebSocketClosedError:
             self.server.forget(self)
             return None
-        written.add_done_callback(_note)
+        written.add_done_callback(_ignore_error)
         return written
 
 
-async def _taken(written: asyncio.Future[None] | None) -> None:
-    """Wait until a page has taken a message, or is gone."""
-    if written is not None:
-        with suppress(WebSocketClosedError):
-            await written
-
-
-def _note(written: asyncio.Future[None]) -> None:
-    """Take note of how a write ended: that a page is gone is not worth a line in the log."""
+def _ignore_error(written: asyncio.Future[None]) -> None:
+    """Retrieve the error of a write, if any: that a page is gone is not worth a line in the log."""
     if not written.cancelled():
         written.exception()

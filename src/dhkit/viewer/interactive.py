@@ -1,10 +1,10 @@
-"""What a page without Python needs to know: the arm, its table and its motions as numbers and text."""
+"""Data for pages: the arm, its table and its motions as numbers and text, which a page without Python reads too."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,31 +13,28 @@ from dhkit.control import SimulationResult
 from dhkit.description import Array, Description
 from dhkit.kinematics import classify
 from dhkit.trajectories import Trajectory
-from dhkit.viewer.motion import Motion, check_motion, exceeded_limit, played_motion
+from dhkit.viewer.motion import Motion, check_motion, exceeded_limit, interpolate, played_motion
 from dhkit.viewer.scene import frame_labels
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 COLUMNS = ("theta", "d", "a", "alpha")
-RATE = 30.0
-"""Samples a second of a motion in a page, which draws straight lines between them."""
+SAMPLE_RATE = 30.0
+"""Samples per second of a motion in a page, Hz; the page draws straight lines between them."""
 MIN_SAMPLES, MAX_SAMPLES = 121, 6001
-CHECKED = 4_001
-"""Samples of a trajectory at which its limits are looked at."""
+LIMIT_SAMPLES = 4_001
+"""Samples of a trajectory at which its limits are checked."""
 DIGITS = 6
-"""Of joint values in a page: 1e-6 rad are 6 um on an arm of 6 m."""
+"""Decimals of joint values in a page: 1e-6 rad are 6 um on an arm of 6 m."""
 
 
 def listed(array: Array | None) -> list[Any] | None:
-    """Return an array as JSON has it: infinities and NaN are null."""
+    """Return an array of any shape as nested lists for JSON, in which infinity and NaN are null."""
     if array is None:
         return None
     return [listed(row) if np.ndim(row) else (float(row) if np.isfinite(row) else None) for row in array]
 
 
 def table_texts(description: Description) -> tuple[tuple[str, ...], ...]:
-    """Return theta, d, a and alpha of each row as the robot file has them."""
+    """Return theta, d, a and alpha of each row as the robot file writes them."""
     return tuple(tuple(str(getattr(joint, name)) for name in COLUMNS) for joint in description.joints)
 
 
@@ -48,10 +45,10 @@ def limits_state(description: Description) -> dict[str, Any]:
 
 
 def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, Any]:
-    """Return what panels know of an arm: joints with limits, configurations by name, family, reach."""
+    """Return what panels show of an arm: joints with limits, configurations by name, family, reach (m)."""
     limits, numbers = limits_state(description), description.numbers
     fit = classify(description)
-    named = {"zero": np.zeros(description.n)} | dict(numbers.configurations)
+    configurations = {"zero": np.zeros(description.n)} | dict(numbers.configurations)
     return {
         "name": description.name,
         "n": description.n,
@@ -60,8 +57,8 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
             | {name: values[i] for name, values in limits.items()}
             for i, joint in enumerate(description.joints)
         ],
-        "configurations": [*named, *([] if "random" in named else ["random"])],
-        "named": {name: q.tolist() for name, q in named.items()},
+        "configurations": [*configurations, *([] if "random" in configurations else ["random"])],
+        "named": {name: q.tolist() for name, q in configurations.items()},
         "family": fit.words,
         "closed_form": fit.fit is not None,
         "bodies": all(joint.bodies for joint in description.joints),
@@ -81,22 +78,22 @@ def interactive_data(
     ghosts: Sequence[tuple[str, str]],
     overlays: Sequence[tuple[str, str]],
 ) -> dict[str, Any]:
-    """Return what ``static/offline/desk.js`` reads.
+    """Return the data that ``static/offline/desk.js`` reads.
 
     Parameters
     ----------
     description
         The arm.
     q
-        Joint values that the page begins with, shape (n,), rad and m.
+        Joint values at the beginning, shape (n,), rad and m.
     motions
-        By the name that the page gives them.
+        Motions, by the names that the page gives them.
     caption
-        Paragraphs, one a line.
+        Text about the page: paragraphs, one a line.
     links
-        Addresses by the text that leads there.
+        Addresses of further pages, by the texts that lead there.
     ghosts, overlays
-        Names and colors (``#rrggbb``) of what is drawn beside the arm.
+        Names and colors (``#rrggbb``) of ghosts, and of other things that are drawn beside the arm.
     """
     numbers, limits = description.numbers, limits_state(description)
     rows = [
@@ -130,25 +127,32 @@ def interactive_data(
 def _motion_state(description: Description, name: str, motion: Motion) -> dict[str, Any]:
     """Return a motion at equal steps of time, with rates and torques where they are known."""
     times, q, reference_q = played_motion(description, motion)
-    excess = _exceeded(description, motion)
-    grid = np.linspace(0.0, times[-1], int(np.clip(math.ceil(RATE * times[-1]) + 1, MIN_SAMPLES, MAX_SAMPLES)))
+    count = int(np.clip(math.ceil(SAMPLE_RATE * times[-1]) + 1, MIN_SAMPLES, MAX_SAMPLES))
+    grid = np.linspace(0.0, times[-1], count)
+    sampled_q = interpolate(times, q, grid)
     tau: Array | None = None
+    # Limits are checked at the motion's own samples, of which the page may have fewer.
     if isinstance(motion, Trajectory):
-        qd = motion.qd(grid)
-        tau = motion.tau(grid) if all(joint.bodies for joint in description.joints) else None
+        checked = np.linspace(0.0, motion.duration, LIMIT_SAMPLES)
+        has_bodies = all(joint.bodies for joint in description.joints)
+        qd, tau = motion.qd(grid), motion.tau(grid) if has_bodies else None
+        checked_tau = motion.tau(checked) if has_bodies else None
+        excess = exceeded_limit(description, motion.q(checked), motion.qd(checked), checked_tau)
     elif isinstance(motion, SimulationResult):
-        qd, tau = _at(grid, motion.t, motion.qd), _at(grid, motion.t, motion.tau)
+        qd, tau = (interpolate(motion.t, rows, grid + motion.t[0]) for rows in (motion.qd, motion.tau))
+        excess = exceeded_limit(description, motion.q, motion.qd, motion.tau)
     else:
-        qd = np.gradient(_at(grid, times, q), grid, axis=0)
-    q = _at(grid, times, q)
+        qd = np.gradient(sampled_q, grid, axis=0)
+        given_times, given_q = check_motion(description, *motion)
+        excess = exceeded_limit(description, given_q, np.gradient(given_q, given_times, axis=0), None)
     return {
         "name": name,
         "duration": float(grid[-1]),
         "times": grid.tolist(),
-        "q": _rounded(q),
+        "q": _rounded(sampled_q),
         "qd": _rounded(qd),
         "tau": None if tau is None else _rounded(tau),
-        "reference": None if reference_q is None else _rounded(_at(grid, times, reference_q)),
+        "reference": None if reference_q is None else _rounded(interpolate(times, reference_q, grid)),
         "limits": limits_state(description),
         "touching": None,
         "excess": excess,
@@ -156,22 +160,6 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
     }
 
 
-def _exceeded(description: Description, motion: Motion) -> str | None:
-    """Return the limit that a motion exceeds most, at its own samples, which a page may have fewer of."""
-    if isinstance(motion, Trajectory):
-        times = np.linspace(0.0, motion.duration, CHECKED)
-        bodies = all(joint.bodies for joint in description.joints)
-        return exceeded_limit(description, motion.q(times), motion.qd(times), motion.tau(times) if bodies else None)
-    if isinstance(motion, SimulationResult):
-        return exceeded_limit(description, motion.q, motion.qd, motion.tau)
-    times, q = check_motion(description, *motion)
-    return exceeded_limit(description, q, np.gradient(q, times, axis=0), None)
-
-
-def _at(grid: Array, times: Array, rows: Array) -> Array:
-    """Return rows, shape (N, n), at times of a grid that begins at 0."""
-    return np.stack([np.interp(grid + times[0], times, column) for column in rows.T], axis=1)
-
-
-def _rounded(values: NDArray[Any]) -> Any:
-    return np.round(values, DIGITS).tolist()
+def _rounded(values: Array) -> list[list[float]]:
+    rounded: list[list[float]] = np.round(values, DIGITS).tolist()
+    return rounded

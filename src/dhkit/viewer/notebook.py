@@ -1,13 +1,23 @@
-"""A view in a notebook: its page in a frame that reaches nothing else, moved by Python where anywidget is installed."""
+"""Views and figures in a notebook.
+
+A view is its page in a frame that reaches nothing else; Python moves it where anywidget is installed. Figures that are
+made without pyplot do not show themselves; those of :func:`new_figure` do.
+"""
 
 from __future__ import annotations
 
 import html
+import io
 from functools import cache
 from importlib import resources
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RESOLUTION = 100
+"""Resolution of a figure in a notebook, dots per inch."""
 STYLE = "width: 100%; height: 560px; border: 0; border-radius: 8px"
 NOTE = (
     "A copy of the state when this cell ran. With the package anywidget "
@@ -23,14 +33,14 @@ def framed_page(page: str, title: str) -> str:
 
 
 def notebook_widget(page: str, title: str) -> Any:
-    """Return what shows a page in a notebook and relays messages to it; None where anywidget is not installed."""
-    make = _widget_class()
-    return None if make is None else make(page=page, title=title)
+    """Return a widget that shows a page in a notebook and relays messages to it; None without anywidget."""
+    widget_class = _widget_class()
+    return None if widget_class is None else widget_class(page=page, title=title)
 
 
 @cache
 def _widget_class() -> Any:
-    """Return the widget's class: its package is not needed elsewhere, and imports a second of others."""
+    """Return the class of widgets; its package is imported here, since that takes a second."""
     if find_spec("anywidget") is None:
         return None
     import anywidget
@@ -45,3 +55,22 @@ def _widget_class() -> Any:
         style = traitlets.Unicode(STYLE).tag(sync=True)
 
     return NotebookView
+
+
+def new_figure(**options: Any) -> Figure:
+    """Return an empty ``matplotlib.figure.Figure``, with its options, that Jupyter shows as a picture."""
+    return _figure_class()(**options)
+
+
+@cache
+def _figure_class() -> type[Figure]:
+    """Return the class of figures; matplotlib is imported here, since that takes 0.3 s."""
+    from matplotlib.figure import Figure
+
+    class NotebookFigure(Figure):
+        def _repr_png_(self) -> bytes:
+            picture = io.BytesIO()
+            self.savefig(picture, format="png", dpi=RESOLUTION)
+            return picture.getvalue()
+
+    return NotebookFigure

@@ -1,4 +1,4 @@
-"""What is drawn beside the arm, as the numbers that a page takes: colors, ellipsoids as balls, obstacles as solids."""
+"""Overlays beside the arm, as the numbers that a page takes: colors, ellipsoids as balls, obstacles as boxes."""
 
 from __future__ import annotations
 
@@ -16,26 +16,31 @@ if TYPE_CHECKING:
 GREY = (0.5, 0.55, 0.62)
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""
-HEAT = ("viridis", 0.87)
-"""A scale of even steps, told apart by colour-blind people too, and where to end it: its palest is lost on white."""
-FLOOR = 1.2
-"""Half an edge of a floor as it is drawn, of the arm's size: it has no end."""
-THINNEST = 0.01
-"""Half axes below this share of the longest are drawn as this: a ball pressed flat has no normals."""
+HEAT_COLORMAP, HEAT_END = "viridis", 0.87
+"""matplotlib's colormap of even steps, which colour-blind people can tell apart too, and the share of it that is used:
+its lightest colors are lost on white."""
+FLOOR_SHARE = 1.2
+"""Half an edge of the square that a floor without end is drawn as, as a share of the arm's size."""
+MIN_AXIS_SHARE = 0.01
+"""Smallest half axis that is drawn, as a share of the longest: a flat ball has no normals, and no light on it."""
 
 
 def color_bytes(colors: ArrayLike | None, count: int, name: str = "colors") -> NDArray[np.uint8]:
-    """Return colors as bytes, shape (count, 3).
+    """Return colors as bytes from 0 to 255, shape (count, 3).
 
     Parameters
     ----------
     colors
         Red, green and blue from 0 to 1, shape (count, 3), or (3,) for all; grey if not given.
+    count
+        Number of colors.
+    name
+        Name of the argument, for messages.
 
     Raises
     ------
     ValueError
-        Another shape, or values that are not from 0 to 1.
+        The colors have another shape, or values that are not from 0 to 1.
     """
     given = np.asarray(GREY if colors is None else colors, dtype=float)
     if given.shape not in ((3,), (count, 3)):
@@ -46,17 +51,17 @@ def color_bytes(colors: ArrayLike | None, count: int, name: str = "colors") -> N
 
 
 def heat_colors(values: ArrayLike) -> Array:
-    """Return a color for each value, from dark (0) to bright (the largest): red, green and blue from 0 to 1.
+    """Return a color for each value, from dark (0) to bright (the largest value).
 
     Parameters
     ----------
     values
-        Shape (...), 0 or more, such as a workspace's manipulability; NaN counts as 0.
+        Values of 0 or more, shape (...), such as the manipulability of a workspace's points; NaN counts as 0.
 
     Returns
     -------
     Array
-        Shape (..., 3).
+        Red, green and blue from 0 to 1, shape (..., 3).
 
     Examples
     --------
@@ -66,38 +71,37 @@ def heat_colors(values: ArrayLike) -> Array:
     import matplotlib
 
     known = np.nan_to_num(np.asarray(values, dtype=float))
-    name, end = HEAT
-    share = end * known / (float(known.max(initial=0.0)) or 1.0)
-    return np.asarray(matplotlib.colormaps[name](share))[..., :3]
+    share = HEAT_END * known / (float(known.max(initial=0.0)) or 1.0)
+    return np.asarray(matplotlib.colormaps[HEAT_COLORMAP](share))[..., :3]
 
 
 def ghost_tints(count: int) -> NDArray[np.uint8]:
-    """Return as many colors, shape (count, 3), eight of them unlike."""
+    """Return colors of ghosts as bytes, shape (count, 3); they repeat after eight."""
     tints = [list(bytes.fromhex(TINTS[k % len(TINTS)][1:])) for k in range(count)]
     return np.array(tints, dtype=np.uint8).reshape(count, 3)
 
 
 def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -> Array:
-    """Return what maps the unit ball to each of a batch of ellipsoids that is not NaN.
+    """Return the maps of the unit ball to each of a batch of ellipsoids; those that are NaN or points are left out.
 
     Parameters
     ----------
     ellipsoid
-        Of any shape.
+        Ellipsoids in a batch of any shape.
     scale
-        What a half axis of length 1 is drawn as, m; if not given, one that makes the longest of all ``longest``.
+        Length that a half axis of 1 is drawn with, m; by default the longest one of all is drawn with ``longest``.
     longest
-        m.
+        Length of the longest half axis, m.
 
     Returns
     -------
     Array
-        Shape (k, 4, 4).
+        The maps, shape (k, 4, 4), m, world.
 
     Raises
     ------
     ValueError
-        An infinite half axis, or a scale that is not positive.
+        A half axis is infinite, or the scale is not positive.
     """
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise ValueError(f"scale is {scale}; expected a positive number")
@@ -107,38 +111,38 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
         raise ValueError("the ellipsoid is infinite in a direction that the tool cannot move in; expected a finite one")
     known = np.isfinite(lengths).all(axis=1)
     centers, axes, lengths = centers[known], axes[known], lengths[known]
-    most = lengths.max(axis=1, keepdims=True)
-    drawn = np.maximum(lengths, THINNEST * most)
+    longest_axes = lengths.max(axis=1, keepdims=True)
+    drawn = np.maximum(lengths, MIN_AXIS_SHARE * longest_axes)
     if scale is None:
-        scale = longest / (float(most.max(initial=0.0)) or 1.0)
+        scale = longest / (float(longest_axes.max(initial=0.0)) or 1.0)
     T: Array = np.zeros((len(centers), 4, 4))
     T[:, 3, 3] = 1.0
     T[:, :3, 3] = centers
     T[:, :3, :3] = axes * (scale * drawn)[:, None, :]
-    return np.asarray(T[most[:, 0] > 0])
+    return np.asarray(T[longest_axes[:, 0] > 0])
 
 
-def solids(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
-    """Return obstacles as :class:`dhkit.viewer.protocol.Obstacles` has them.
+def rounded_boxes(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
+    """Return obstacles as :func:`dhkit.viewer.protocol.encode_obstacles` takes them: boxes with a radius around them.
 
     Parameters
     ----------
     obstacles
-        Of :mod:`dhkit.planning`.
+        Obstacles and floors of :mod:`dhkit.planning`.
     size
-        The arm's, m: floors reach a little farther.
+        The arm's size, m: floors are drawn a little larger.
 
     Returns
     -------
     tuple
-        Transforms, half edges and radii, shapes (k, 4, 4), (k, 3) and (k,), m.
+        Poses in the world, half edges and radii, shapes (k, 4, 4), (k, 3) and (k,), m.
 
     Raises
     ------
     TypeError
-        Something else than obstacles and floors.
+        The scene has something else than obstacles and floors.
     ValueError
-        More than one floor.
+        The scene has more than one floor.
     """
     from dhkit.planning.obstacles import Floor, check_obstacles
 
@@ -147,7 +151,7 @@ def solids(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
     for k, obstacle in enumerate(scene):
         if isinstance(obstacle, Floor):
             T[k, 2, 3] = obstacle.height
-            half_edges[k, :2] = FLOOR * size
+            half_edges[k, :2] = FLOOR_SHARE * size
         else:
             T[k], half_edges[k], radii[k] = obstacle.T_world_obstacle, obstacle.half_sizes, obstacle.radius
     return T, half_edges, radii

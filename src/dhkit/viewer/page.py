@@ -1,4 +1,4 @@
-"""The viewer's page: its files as the server hands them out, and the same page as one offline file."""
+"""The viewer's page: its files as the server sends them, and the same page as one offline file."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ LAB_FILES = (
     "uplot.js",
     "uplot.css",
 )
-"""Of the panels, in the folder ``lab``: loaded where Python answers requests. uPlot is a copy of 1.6.32 from npm."""
+"""Files of the panels, in the folder ``lab``, for pages whose requests Python answers. uPlot is 1.6.32 from npm."""
 
 OFFLINE_MODULES = (
     "offline/panels.js",
@@ -78,19 +78,19 @@ OFFLINE_MODULES = (
     "lab/curves.js",
     "lab/plot.js",
 )
-"""Of a page with panels and without Python."""
+"""Modules of a page with panels and without Python."""
 
 IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
-PLAIN = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
-"""What stands in a ``data:`` address as it is: base64 would be a quarter longer."""
-SPARED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
-"""Indentation, empty lines and comments of whole lines; no text of the modules goes over several lines."""
+UNQUOTED = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
+"""Characters that a ``data:`` address has unquoted: base64 would be a quarter longer."""
+REMOVED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
+"""Indentation, empty lines and whole-line comments, which offline modules lack; no string has several lines."""
 CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
 )
-"""For the live page: nothing from any other host. meshcat's bundle writes style elements."""
+"""Policy of the live page: it loads nothing from other hosts. meshcat's bundle writes style elements."""
 
 OFFLINE_POLICY = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
 
@@ -101,7 +101,7 @@ def meshcat_bundle() -> bytes:
     Raises
     ------
     ModelError
-        meshcat is not installed, or its viewer is not the one we know.
+        meshcat is not installed, or its viewer is not that of meshcat 0.3.
     """
     spec = find_spec("meshcat")
     if spec is None or spec.origin is None:
@@ -120,7 +120,7 @@ def meshcat_bundle() -> bytes:
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """Return the live page's files by name: content type and bytes; the page itself is ``""``.
+    """Return the content type and the bytes of the live page's files, by name; the page itself is ``""``.
 
     Raises
     ------
@@ -135,28 +135,28 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str, Any] | None = None) -> str:
-    """Return one HTML file that shows messages without a server: no request leaves it.
+    """Return one HTML file that shows messages without a server; it makes no requests.
 
     Parameters
     ----------
     messages
-        As :mod:`dhkit.viewer.protocol` encodes them, in the order a page needs them.
+        Messages of :mod:`dhkit.viewer.protocol`, in the order a page needs them.
     title
         The page's title.
     interactive
-        What the panels of a page without Python know, as :func:`dhkit.viewer.interactive.interactive_data` gives it;
-        a page without panels if None.
+        Data of the panels, as :func:`dhkit.viewer.interactive.interactive_data` returns it; None for a page without
+        panels.
     """
     data = [base64.b64encode(message).decode() for message in messages]
     style, extra, modules = _static("viewer.css"), "", list(MODULES)
     if interactive is not None:
         style += _static("lab/lab.css")
         extra = _script(_json(interactive), ' type="application/json" id="offline"')
-        if interactive["motions"]:  # whose curves it draws
+        if interactive["motions"]:  # the page draws their curves
             style += _static("lab/uplot.css")
             extra += _script(_static("lab/uplot.js"))
         modules += OFFLINE_MODULES
-    return _replaced(
+    return _replace_marks(
         _static("index.html"),
         {
             "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{OFFLINE_POLICY}">',
@@ -170,21 +170,23 @@ def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str
 
 
 def _modules(names: Sequence[str]) -> str:
-    """Return modules as an import map of ``data:`` addresses and the first of them inline."""
-    sources = {name: _absolute(name, _static(name)) for name in names}
+    """Return modules as an import map of ``data:`` addresses, and ``main.js`` as an inline script."""
+    sources = {name: _with_absolute_imports(name, _static(name)) for name in names}
     first = sources.pop("main.js")
-    imports = {f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=PLAIN)}" for name, source in sources.items()}
+    imports = {
+        f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=UNQUOTED)}" for name, source in sources.items()
+    }
     return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(first, ' type="module"')
 
 
-def _absolute(name: str, source: str) -> str:
-    """Return a module with its imports named as the import map names them, without comments and indentation."""
+def _with_absolute_imports(name: str, source: str) -> str:
+    """Return a module whose imports are named as in the import map, without comments and indentation."""
     folder = posixpath.dirname(name)
 
-    def named(found: re.Match[str]) -> str:
-        return f'{found[1]}"dhkit/{posixpath.normpath(posixpath.join(folder, found[2]))}"'
+    def absolute(match: re.Match[str]) -> str:
+        return f'{match[1]}"dhkit/{posixpath.normpath(posixpath.join(folder, match[2]))}"'
 
-    return IMPORT.sub(named, SPARED.sub("", source))
+    return IMPORT.sub(absolute, REMOVED.sub("", source))
 
 
 def _json(data: Any) -> str:
@@ -197,7 +199,7 @@ def _script(content: str, attributes: str = "") -> str:
     return f"<script{attributes}>{inert}</script>"
 
 
-def _replaced(text: str, pieces: dict[str, str]) -> str:
+def _replace_marks(text: str, pieces: dict[str, str]) -> str:
     for mark, piece in pieces.items():
         before, after = text.split(mark)
         text = before + piece + after

@@ -1,31 +1,29 @@
-"""Pictures of an arm and of its motions as files: PNG and GIF."""
+"""Files of pictures: PNG of an arm, GIF and series of PNG of its motions."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dhkit.description import Description, write_atomically
-from dhkit.viewer.motion import Motion, played_motion
+from dhkit.viewer.motion import Motion, interpolate, played_motion
 from dhkit.viewer.pictures import Ghost, pictures
 from dhkit.viewer.scene import node_transforms
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-COLORS = 128
-"""Of a GIF."""
+GIF_COLORS = 128
 MAX_PICTURES = 900
-"""Of one file, or of one series of files."""
+"""Most pictures of one GIF, or of one series of files."""
 
 
 def write_png(image: Picture, path: str | Path) -> Path:
-    """Write a picture, whole or not at all, and return the path."""
+    """Write a picture as PNG, whole or not at all, and return the path."""
     content = io.BytesIO()
     image.save(content, format="PNG", optimize=True)
     write_atomically(Path(path), content.getvalue())
@@ -34,12 +32,12 @@ def write_png(image: Picture, path: str | Path) -> Path:
 
 def write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path:
     """Write pictures, ``rate`` of them a second, as a GIF that repeats, and return the path."""
-    # One palette for all: what does not move does not flicker.
+    # All pictures share one palette, so that still parts do not flicker.
     from PIL import Image
 
     first, *others = images
-    palette = first.quantize(COLORS, dither=Image.Dither.NONE)
-    frames = [palette, *(image.quantize(COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
+    palette = first.quantize(GIF_COLORS, dither=Image.Dither.NONE)
+    frames = [palette, *(image.quantize(GIF_COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
     content = io.BytesIO()
     palette.save(
         content, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0, disposal=1
@@ -59,27 +57,27 @@ def write_motion_gif(
     ghosts: Sequence[Ghost] = (),
     progress: Callable[[int, int], None] = lambda done, whole: None,
 ) -> Path:
-    """Write a motion as a GIF in real time, with the tool's path; the reference of a simulation moves along as a ghost.
+    """Write a motion as a GIF in real time, with the tool's path, and a ghost at the reference of a simulation.
 
     Parameters
     ----------
     description
         The arm.
     motion
-        As :meth:`dhkit.viewer.View.play` takes it.
+        The motion, as :meth:`dhkit.viewer.View.play` takes it.
     path
         The file.
     rate
-        Pictures a second.
+        Pictures per second, Hz.
     size, frames, ghosts
         As for :func:`dhkit.viewer.pictures.picture`.
     progress
-        Called with how many of how many pictures are drawn.
+        Called with the number of pictures that are drawn, and of all.
 
     Raises
     ------
     ValueError
-        A rate that is no number from 1 to 50, or more than 900 pictures.
+        The rate is not from 1 to 50, or there are more than 900 pictures.
     """
     if not 1 <= rate <= 50:
         raise ValueError(f"rate is {rate:g}; expected 1 to 50 pictures a second")
@@ -90,8 +88,13 @@ def write_motion_gif(
             f"{duration:g} s at {rate:g} pictures a second are {count} pictures; expected at most {MAX_PICTURES}: "
             "a lower rate, or a shorter motion"
         )
-    drawn = _motion_pictures(description, motion, count, size, frames, ghosts)
-    return write_gif(_told(drawn, count, progress), path, rate)
+
+    def images() -> Iterator[Picture]:
+        for k, image in enumerate(_motion_pictures(description, motion, count, size, frames, ghosts), start=1):
+            yield image
+            progress(k, count)
+
+    return write_gif(images(), path, rate)
 
 
 def write_motion_pngs(
@@ -104,11 +107,11 @@ def write_motion_pngs(
     frames: bool = False,
     ghosts: Sequence[Ghost] = (),
 ) -> list[Path]:
-    """Write so many pictures of a motion at equal steps of time, ``path`` with a number before its suffix each."""
+    """Write ``count`` pictures of a motion at equal steps of time; each file is ``path`` with a number in its name."""
     path, digits = Path(path), len(str(count))
-    drawn = _motion_pictures(description, motion, count, size, frames, ghosts)
+    images = _motion_pictures(description, motion, count, size, frames, ghosts)
     return [
-        write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}")) for k, image in enumerate(drawn, 1)
+        write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}")) for k, image in enumerate(images, 1)
     ]
 
 
@@ -124,16 +127,7 @@ def _motion_pictures(
         raise ValueError(f"{count} pictures; expected 2 to {MAX_PICTURES}")
     times, q, reference_q = played_motion(description, motion)
     path = node_transforms(description, q)[:, -1, :3, 3]
-
-    def at(rows: ArrayLike) -> np.ndarray:
-        grid = np.linspace(0.0, times[-1], count)
-        return np.stack([np.interp(grid, times, column) for column in np.asarray(rows).T], axis=1)
-
-    references = None if reference_q is None else at(reference_q)
-    return pictures(description, at(q), size=size, frames=frames, ghosts=ghosts, path=path, references=references)
-
-
-def _told(images: Iterable[Picture], count: int, progress: Callable[[int, int], None]) -> Iterable[Picture]:
-    for k, image in enumerate(images, start=1):
-        yield image
-        progress(k, count)
+    grid = np.linspace(0.0, times[-1], count)
+    references = None if reference_q is None else interpolate(times, reference_q, grid)
+    shown_q = interpolate(times, q, grid)
+    return pictures(description, shown_q, size=size, frames=frames, ghosts=ghosts, path=path, references=references)

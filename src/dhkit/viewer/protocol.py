@@ -1,7 +1,7 @@
-"""What Python and a page say to each other, as bytes; nothing here does input or output.
+"""Messages from Python to a page, as bytes; nothing here does input or output.
 
-Python to page: binary, little-endian. Every message begins with a header of 16 bytes: type (u8), flags (u8), number
-of joints n (u16), sequence (u32), time (f64, s). What follows depends on the type:
+Messages are binary, little-endian. Every message begins with a header of 16 bytes: type (u8), flags (u8), number of
+joints n (u16), sequence (u32), time (f64, s). What follows depends on the type:
 
 - scene: length (u32) and JSON about the arm; then, to the end, length (u32) and a meshcat command in msgpack;
 - pose: q (f32, n), transforms (f32, (n + 2) x 12);
@@ -17,17 +17,16 @@ of joints n (u16), sequence (u32), time (f64, s). What follows depends on the ty
 - samples: length (u32) and JSON ``{"name": ..., "columns": [...], "restart": false}``, padded to a multiple of 4, then
   rows (f32) to the end.
 
-A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Page to
-Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been drawn, and where there are panels requests
-(:mod:`dhkit.viewer.requests`), each with an answer as JSON text.
+A transform is the upper three rows of a node's pose in the world, row by row: links 0 ... n, then the tool. Encoders
+take transforms of shape (..., 4, 4). Page to Python: JSON ``{"type": "shown", "sequence": 7}`` once a message has been
+drawn, and where there are panels requests (:mod:`dhkit.viewer.requests`), each with an answer as JSON text.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
@@ -37,13 +36,18 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 
 if TYPE_CHECKING:
-    from dhkit.viewer.drawables import Lowered
     from dhkit.viewer.scene import Scene
 
 HEADER = struct.Struct("<BBHId")
 LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32
-FLAG, GHOST_FLAG = 1, 2
+VISIBLE_FLAG, GHOST_FLAG = 1, 2
+"""Flags of a message: the frames or the tool's path are drawn; a ghost moves along."""
+MAX_SAMPLE_NUMBERS = 100_000
+"""Largest number of floats in samples that wait for a slow page, and that a new page gets: half an hour of a robot's
+errors are 60 kB."""
+WORD = 4
+"""Bytes of a float: samples begin at a multiple of them."""
 
 
 class ProtocolError(ValueError):
@@ -51,7 +55,7 @@ class ProtocolError(ValueError):
 
 
 class MessageType(IntEnum):
-    """What a message to a page is about."""
+    """The type of a message to a page."""
 
     SCENE = 1
     POSE = 2
@@ -66,99 +70,18 @@ class MessageType(IntEnum):
     SAMPLES = 11
 
 
-@dataclass(frozen=True)
-class Header:
-    """The first 16 bytes of a message."""
-
-    type: MessageType
-    flags: int
-    joints: int
-    sequence: int
-    time: float
-
-
-@dataclass(frozen=True, eq=False)
-class Pose:
-    """One state of the arm."""
-
-    q: Array
-    """Shape (n,), rad and m."""
-    transforms: Array
-    """Shape (n + 2, 3, 4): links and tool in the world."""
-
-
-@dataclass(frozen=True, eq=False)
-class Animation:
-    """States of the arm over time."""
-
-    times: Array
-    """Shape (N,), s."""
-    q: Array
-    """Shape (N, n), rad and m."""
-    transforms: Array
-    """Shape (N, n + 2, 3, 4)."""
-    trace: bool
-    """Whether the tool's path is drawn as it plays."""
-    ghost: Array | None
-    """A second arm that moves along, translucent: shape (N, n + 2, 3, 4), or None."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cloud:
-    """Colored points."""
-
-    points: Array
-    """Shape (N, 3), m, in the world."""
-    colors: NDArray[np.uint8]
-    """Shape (N, 3): red, green and blue."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ghosts:
-    """Further states of the arm, shown beside the one that moves."""
-
-    transforms: Array
-    """Shape (k, n + 2, 3, 4): links and tool in the world."""
-    tints: NDArray[np.uint8]
-    """Shape (k, 3): red, green and blue."""
-
-
-@dataclass(frozen=True, eq=False)
-class Obstacles:
-    """Solids that stand still: all that is within a radius of a box.
-
-    A ball has no edges, a capsule only one along z; a level square without a third edge stands for a floor.
-    """
-
-    transforms: Array
-    """Shape (k, 3, 4): the boxes in the world."""
-    half_edges: Array
-    """Shape (k, 3), m."""
-    radii: Array
-    """Shape (k,), m."""
-
-
 def encode_scene(scene: Scene) -> bytes:
     """Return a scene message."""
     import msgpack
 
-    def array(value: Any) -> Any:
+    def packed_array(value: Any) -> Any:
         """Return what meshcat gives for an array as msgpack writes it."""
         return msgpack.ExtType(value.type, value.data)
 
-    about = json.dumps(scene.about, separators=(",", ":"), allow_nan=False).encode()
-    blocks = [about, *(msgpack.packb(command, default=array) for command in scene.commands)]
+    about = _json(scene.about)
+    blocks = [about, *(msgpack.packb(command, default=packed_array) for command in scene.commands)]
     body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
-    return message_header(MessageType.SCENE, joints=len(scene.about["joints"])) + body
-
-
-def decode_scene(message: bytes) -> tuple[Lowered, list[Lowered]]:
-    """Return what a scene message says about the arm, and its commands."""
-    import umsgpack
-
-    _expect(message, MessageType.SCENE)
-    about, *commands = _blocks(message[HEADER.size :])
-    return json.loads(about), [umsgpack.unpackb(command) for command in commands]
+    return _message(MessageType.SCENE, body, joints=len(scene.about["joints"]))
 
 
 def encode_pose(q: Array, transforms: Array, time: float = 0.0) -> bytes:
@@ -167,20 +90,13 @@ def encode_pose(q: Array, transforms: Array, time: float = 0.0) -> bytes:
     Parameters
     ----------
     q
-        Shape (n,), rad and m.
+        Joint values, shape (n,), rad and m.
     transforms
-        Shape (n + 2, 4, 4): links and tool in the world.
+        Poses of links and tool, shape (n + 2, 4, 4), m, world.
     time
-        When, s.
+        Time of the state, s.
     """
-    return message_header(MessageType.POSE, joints=len(q), time=time) + _floats(q) + _floats(transforms[:, :3, :])
-
-
-def decode_pose(message: bytes) -> Pose:
-    """Return the state in a pose message."""
-    n = _expect(message, MessageType.POSE).joints
-    numbers = _array(message[HEADER.size :], "<f4")
-    return Pose(numbers[:n], numbers[n:].reshape(n + 2, 3, 4))
+    return _message(MessageType.POSE, q, transforms[:, :3], joints=len(q), time=time)
 
 
 def encode_animation(
@@ -196,74 +112,36 @@ def encode_animation(
     Parameters
     ----------
     times
-        Shape (N,), s, increasing.
+        Times, shape (N,), s, increasing.
     q
-        Shape (N, n), rad and m.
+        Joint values, shape (N, n), rad and m.
     transforms
-        Shape (N, n + 2, 4, 4).
+        Poses of links and tool, shape (N, n + 2, 4, 4), m, world.
     trace
         Whether the tool's path is drawn as it plays.
     ghost
-        A second arm that moves along: transforms of the same shape, and red, green and blue, shape (3,).
+        A second, translucent arm that moves along: poses of the same shape, and red, green and blue, shape (3,).
     """
-    flags = FLAG * trace + GHOST_FLAG * (ghost is not None)
-    header = message_header(MessageType.ANIMATION, flags=flags, joints=q.shape[1])
+    flags = VISIBLE_FLAG * trace + GHOST_FLAG * (ghost is not None)
     count = LENGTH.pack(len(times)) + LENGTH.pack(0)  # the zero keeps the times on a multiple of 8
-    body = header + count + times.astype("<f8").tobytes() + _floats(q) + _floats(transforms[:, :, :3, :])
-    return body if ghost is None else body + _floats(ghost[0][:, :, :3, :]) + _bytes(ghost[1])
-
-
-def decode_animation(message: bytes) -> Animation:
-    """Return the states in an animation message."""
-    header = _expect(message, MessageType.ANIMATION)
-    (count,) = LENGTH.unpack_from(message, HEADER.size)
-    n, start = header.joints, HEADER.size + 2 * LENGTH.size
-    times = _array(message[start : start + 8 * count], "<f8")
-    floats, placed = start + 8 * count, (count, n + 2, 3, 4)
-    arms = 2 if header.flags & GHOST_FLAG else 1
-    numbers = _array(message[floats : floats + 4 * count * (n + arms * 12 * (n + 2))], "<f4")
-    q, transforms, ghost = np.split(numbers, [count * n, count * (n + 12 * (n + 2))])
-    return Animation(
-        times,
-        q.reshape(count, n),
-        transforms.reshape(placed),
-        bool(header.flags & FLAG),
-        ghost.reshape(placed) if arms == 2 else None,
-    )
+    ghost_parts = () if ghost is None else (ghost[0][:, :, :3], ghost[1])
+    parts = (count, times.astype("<f8").tobytes(), q, transforms[:, :, :3], *ghost_parts)
+    return _message(MessageType.ANIMATION, *parts, flags=flags, joints=q.shape[1])
 
 
 def encode_trace(points: Array) -> bytes:
-    """Return a trace message: a polyline in the world, shape (N, 3), m; no points take it away."""
-    return message_header(MessageType.TRACE) + _floats(points)
-
-
-def decode_trace(message: bytes) -> Array:
-    """Return the points of a trace message, shape (N, 3), m."""
-    _expect(message, MessageType.TRACE)
-    return _array(message[HEADER.size :], "<f4").reshape(-1, 3)
+    """Return a trace message: a line through points, shape (N, 3), m, world; no points take it away."""
+    return _message(MessageType.TRACE, points)
 
 
 def encode_points(points: Array, colors: NDArray[np.uint8]) -> bytes:
-    """Return a message of colored points, shapes (N, 3), m and red, green, blue; none take them away."""
-    return message_header(MessageType.POINTS) + LENGTH.pack(len(points)) + _floats(points) + _bytes(colors)
-
-
-def decode_points(message: bytes) -> Cloud:
-    """Return the points in a message of them."""
-    _expect(message, MessageType.POINTS)
-    numbers, colors = _counted(message, 3)
-    return Cloud(numbers, colors)
+    """Return a message of points, shape (N, 3), m, world, with colors, shape (N, 3); no points take them away."""
+    return _message(MessageType.POINTS, LENGTH.pack(len(points)), points, colors)
 
 
 def encode_ellipsoids(transforms: Array) -> bytes:
-    """Return a message of ellipsoids: what maps the unit ball to each, shape (k, 4, 4); none take them away."""
-    return message_header(MessageType.ELLIPSOIDS) + LENGTH.pack(len(transforms)) + _floats(transforms[:, :3, :])
-
-
-def decode_ellipsoids(message: bytes) -> Array:
-    """Return the transforms in a message of ellipsoids, shape (k, 3, 4)."""
-    _expect(message, MessageType.ELLIPSOIDS)
-    return _counted(message, 12)[0].reshape(-1, 3, 4)
+    """Return a message of ellipsoids: the maps of the unit ball to them, shape (k, 4, 4), m; none take them away."""
+    return _message(MessageType.ELLIPSOIDS, LENGTH.pack(len(transforms)), transforms[:, :3])
 
 
 def encode_ghosts(transforms: Array, tints: NDArray[np.uint8]) -> bytes:
@@ -272,42 +150,73 @@ def encode_ghosts(transforms: Array, tints: NDArray[np.uint8]) -> bytes:
     Parameters
     ----------
     transforms
-        Shape (k, n + 2, 4, 4): links and tool in the world; none take the ghosts away.
+        Poses of links and tool, shape (k, n + 2, 4, 4), m, world; none take the ghosts away.
     tints
-        Shape (k, 3): red, green and blue.
+        Red, green and blue, shape (k, 3).
     """
-    header = message_header(MessageType.GHOSTS, joints=transforms.shape[1] - 2)
-    return header + LENGTH.pack(len(transforms)) + _floats(transforms[:, :, :3, :]) + _bytes(tints)
-
-
-def decode_ghosts(message: bytes) -> Ghosts:
-    """Return the states in a message of ghosts."""
-    nodes = _expect(message, MessageType.GHOSTS).joints + 2
-    transforms, tints = _counted(message, 12 * nodes)
-    return Ghosts(transforms.reshape(-1, nodes, 3, 4), tints)
+    count = LENGTH.pack(len(transforms))
+    return _message(MessageType.GHOSTS, count, transforms[:, :, :3], tints, joints=transforms.shape[1] - 2)
 
 
 def encode_obstacles(transforms: Array, half_edges: Array, radii: Array) -> bytes:
-    """Return a message of :class:`Obstacles`, shapes (k, 4, 4), (k, 3) and (k,), m; none take them away."""
+    """Return a message of solids that stand still: all that is within a radius of a box; none take them away.
+
+    A ball has no edges, a capsule only one along z; a level square without a third edge stands for a floor.
+
+    Parameters
+    ----------
+    transforms
+        Poses of the boxes, shape (k, 4, 4), m, world.
+    half_edges
+        Half edges of the boxes, shape (k, 3), m.
+    radii
+        Radii, shape (k,), m.
+    """
     rows = np.concatenate([transforms[:, :3, :].reshape(-1, 12), half_edges, radii[:, None]], axis=1)
-    return message_header(MessageType.OBSTACLES) + LENGTH.pack(len(rows)) + _floats(rows)
-
-
-def decode_obstacles(message: bytes) -> Obstacles:
-    """Return the solids in a message of them."""
-    _expect(message, MessageType.OBSTACLES)
-    rows = _counted(message, 16)[0]
-    return Obstacles(rows[:, :12].reshape(-1, 3, 4), rows[:, 12:15], rows[:, 15])
+    return _message(MessageType.OBSTACLES, LENGTH.pack(len(rows)), rows)
 
 
 def encode_frames(visible: bool) -> bytes:
     """Return a message that shows or hides the triads with their labels."""
-    return message_header(MessageType.FRAMES, flags=FLAG * visible)
+    return _message(MessageType.FRAMES, flags=VISIBLE_FLAG * visible)
 
 
-def decode_frames(message: bytes) -> bool:
-    """Return whether a message shows the triads."""
-    return bool(_expect(message, MessageType.FRAMES).flags & FLAG)
+def encode_state(name: str, data: object) -> bytes:
+    """Return a message with a panel's state, of what JSON can hold: it replaces the state of the same name."""
+    return _message(MessageType.STATE, _json({"name": name, "data": data}))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Rows of numbers, added to those of the same name.
+
+    Attributes
+    ----------
+    name, columns
+        Names of the samples and of the numbers of a row.
+    rows
+        The numbers, shape (k, columns).
+    restart
+        Whether the rows replace all earlier ones.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    rows: NDArray[np.float32]
+    restart: bool = False
+
+    def followed_by(self, later: Samples) -> Samples:
+        """Return the rows of both; of more than :data:`MAX_SAMPLE_NUMBERS` numbers the oldest rows are dropped."""
+        if later.restart or later.columns != self.columns:
+            return replace(later, restart=True)
+        rows = np.concatenate([self.rows, later.rows])
+        return replace(self, rows=rows[-max(1, MAX_SAMPLE_NUMBERS // max(1, len(self.columns))) :])
+
+    def encoded(self) -> bytes:
+        """Return the samples as a message."""
+        text = _json({"name": self.name, "columns": self.columns, "restart": self.restart})
+        text += b" " * (-len(text) % WORD)
+        return _message(MessageType.SAMPLES, LENGTH.pack(len(text)), text, self.rows)
 
 
 def stamped(message: bytes, sequence: int) -> bytes:
@@ -315,58 +224,17 @@ def stamped(message: bytes, sequence: int) -> bytes:
     return message[:4] + LENGTH.pack(sequence % MAX_SEQUENCE) + message[8:]
 
 
-def decode_header(message: bytes) -> Header:
-    """Return a message's header.
-
-    Raises
-    ------
-    ProtocolError
-        Too short, or of an unknown type.
-    """
-    try:
-        kind, flags, joints, sequence, time = HEADER.unpack_from(message)
-        return Header(MessageType(kind), flags, joints, sequence, time)
-    except (struct.error, ValueError) as error:
-        raise ProtocolError(f"no message: {error}") from None
+def _message(
+    kind: MessageType, *parts: bytes | NDArray[Any], flags: int = 0, joints: int = 0, time: float = 0.0
+) -> bytes:
+    """Return a message with sequence 0; arrays become floats of four bytes, except those of bytes."""
+    arrays = (part if isinstance(part, bytes) else _bytes(part) for part in parts)
+    return HEADER.pack(kind, flags, joints, 0, time) + b"".join(arrays)
 
 
-def message_header(kind: MessageType, flags: int = 0, joints: int = 0, time: float = 0.0) -> bytes:
-    """Return the first 16 bytes of a message that is not stamped yet."""
-    return HEADER.pack(kind, flags, joints, 0, time)
+def _bytes(array: NDArray[Any]) -> bytes:
+    return (array if array.dtype == np.uint8 else array.astype("<f4")).tobytes()
 
 
-def _expect(message: bytes, kind: MessageType) -> Header:
-    header = decode_header(message)
-    if header.type is not kind:
-        raise ProtocolError(f"message type is {header.type.name}; expected {kind.name}")
-    return header
-
-
-def _floats(array: Array) -> bytes:
-    return array.astype("<f4").tobytes()
-
-
-def _array(content: bytes, kind: str) -> Array:
-    return np.frombuffer(content, dtype=kind).astype(float)
-
-
-def _bytes(colors: NDArray[np.uint8]) -> bytes:
-    return colors.astype(np.uint8).tobytes()
-
-
-def _counted(message: bytes, width: int) -> tuple[Array, NDArray[np.uint8]]:
-    """Return a message's floats, so many for each of what it counts, and its colors, shapes (k, width) and (., 3)."""
-    (count,) = LENGTH.unpack_from(message, HEADER.size)
-    start = HEADER.size + LENGTH.size
-    end = start + 4 * width * count
-    colors = np.frombuffer(message[end:], dtype=np.uint8).reshape(-1, 3)
-    return _array(message[start:end], "<f4").reshape(count, width), colors
-
-
-def _blocks(body: bytes) -> Iterable[bytes]:
-    at = 0
-    while at < len(body):
-        (length,) = LENGTH.unpack_from(body, at)
-        at += LENGTH.size
-        yield body[at : at + length]
-        at += length
+def _json(data: object) -> bytes:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).encode()

@@ -1,4 +1,4 @@
-"""An arm as a meshcat scene: what is drawn, under which paths, and where its nodes stand for a joint vector.
+"""An arm as a meshcat scene: objects, their paths, and the poses of its nodes at joint values.
 
 Links are nodes ``/dhkit/link0`` ... ``/dhkit/linkn`` that stand at their DH frames in the world; their parts and
 triads are children that never move. ``/dhkit/tool`` stands at the tool's frame.
@@ -26,54 +26,63 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 ROOT = "/dhkit"
-COINCIDE = 1e-9
-"""Frames nearer than this times the arm's size coincide: far above the rounding of a chain, far below what is seen."""
-TRIAD = 0.13
-"""Length of a triad as a share of the arm's size."""
-NESTED = 0.72
-"""How much shorter the next triad at the same origin is, so that both are seen."""
-STEPS = 8
-"""Of sizes in an octave."""
-LEAST_SIZE = 0.1
-"""What an arm without lengths is drawn as, m."""
+COINCIDENCE = 1e-9
+"""Largest distance of origins, as a share of the arm's size, and largest difference of rotation entries, of frames that
+coincide: far above the rounding of a chain, far below what is seen."""
+TRIAD_SHARE = 0.13
+"""Length of a triad, as a share of the arm's size."""
+NESTED_RATIO = 0.72
+"""Length of a triad over that of the one before it at the same origin, so that both are seen."""
+SIZES_PER_OCTAVE = 8
+"""Sizes of grid and triads within a factor of 2: an edit that changes the reach a little does not change them."""
+MIN_SIZE = 0.1
+"""Smallest size of an arm, m, for one without lengths."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """What is written at the origin of a frame."""
+    """A text at the origin of a frame."""
 
     frame: int
-    """0 ... n, or n + 1 for the tool."""
+    """Number of the frame, 0 ... n, or n + 1 for the tool."""
     text: str
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene that a page builds once, and then only moves."""
+    """A scene that a page builds once, and then only moves.
+
+    Attributes
+    ----------
+    about
+        What the page shows of the arm: name, joints, labels, size (m), the upward direction (world); and the node that
+        each command gives an object, empty for other commands.
+    commands
+        meshcat's commands, in order.
+    """
 
     about: Lowered
-    """What the page says of the arm: name, joints, labels, size (m), which way is up (world); and the node that each
-    command gives an object, empty for commands that do not."""
     commands: tuple[Lowered, ...]
-    """meshcat's commands, in order."""
 
 
 def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
-    """Return the scene of an arm in its first configuration; triads are there, and hidden.
+    """Return the scene of an arm in its first configuration, with hidden triads.
 
     Parameters
     ----------
     description
         The arm.
     parts
-        What its links look like, as ``dhkit.model.shapes.link_parts`` gives it.
+        The parts of its links, as ``dhkit.model.shapes.link_parts`` returns them.
 
     Raises
     ------
     ModelError
-        A mesh that cannot be read.
+        A mesh cannot be read.
     """
-    size, places = _in_steps(scene_size(description)), _shared_origins(description)
+    # The next of the sizes that grow in equal ratios.
+    steps = math.ceil(SIZES_PER_OCTAVE * math.log2(scene_size(description)))
+    size, places = float(2.0 ** (steps / SIZES_PER_OCTAVE)), _shared_origins(description)
     commands = [_set_object(f"{ROOT}/grid", grid_object(size, "grid"))]
     commands += _part_commands(parts)
     commands += _triad_commands(description, places, size)
@@ -85,14 +94,14 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
         "joints": [{"name": j.name, "unit": "deg" if j.is_revolute else "m"} for j in description.joints],
         "labels": [{"frame": label.frame, "text": label.text} for label in _labels(description, places)],
         "size": size,
-        "up": _up(description),
+        "up": _upward(description),
         "nodes": [c["path"].removeprefix(f"{ROOT}/") if c["type"] == "set_object" else "" for c in commands],
     }
     return Scene(about, tuple(commands))
 
 
 def node_transforms(description: Description, q: ArrayLike) -> Array:
-    """Return where the nodes stand in the world: links 0 ... n and the tool.
+    """Return the poses of the nodes: links 0 ... n and the tool.
 
     Parameters
     ----------
@@ -102,7 +111,7 @@ def node_transforms(description: Description, q: ArrayLike) -> Array:
     Returns
     -------
     Array
-        Shape (..., n + 2, 4, 4).
+        Poses, shape (..., n + 2, 4, 4), m, world.
     """
     frames = world_to_frames(description, q)
     tool = frames[..., -1:, :, :] @ description.numbers.T_last_tool
@@ -110,55 +119,49 @@ def node_transforms(description: Description, q: ArrayLike) -> Array:
 
 
 def first_configuration(description: Description) -> Array:
-    """Return the joint vector an arm is first shown in: ``ready`` where the robot file has one, else zero; (n,)."""
+    """Return the joint values that an arm is first shown at, shape (n,), rad and m: its ``ready``, or else zero."""
     ready = description.configurations.get("ready")
     return np.zeros(description.n) if ready is None else np.array([float(value) for value in ready])
 
 
 def scene_size(description: Description) -> float:
-    """Return a length that bounds how far the tool gets from the world's origin, m."""
+    """Return a bound of the tool's distance from the world's origin, m."""
     numbers = description.numbers
     offsets = np.linalg.norm([numbers.T_world_base[:3, 3], numbers.T_last_tool[:3, 3]], axis=1)
-    return max(float(numbers.reach + offsets.sum()), LEAST_SIZE)
-
-
-def _in_steps(size: float) -> float:
-    """Return the next of the sizes that grow by 9 %: an edit that changes the reach a little leaves grid and triads."""
-    return float(2.0 ** (math.ceil(STEPS * math.log2(size)) / STEPS))
+    return max(float(numbers.reach + offsets.sum()), MIN_SIZE)
 
 
 def frame_labels(description: Description) -> tuple[Label, ...]:
-    """Return one label per place that frames share in every configuration.
+    """Return one label for each place that frames share in every configuration.
 
-    Frames that are the same one are joined by ``=``, those that share only their origin by a comma:
-    ``4, 5, 6 = tool`` at a wrist's centre.
+    Frames that coincide are joined by ``=``, those that share only their origin by a comma: ``4, 5, 6 = tool`` at a
+    wrist's centre.
     """
     return _labels(description, _shared_origins(description))
 
 
 def _labels(description: Description, places: list[list[list[int]]]) -> tuple[Label, ...]:
-    labels = []
-    for group in places:
-        text = ", ".join(" = ".join(_name(description, i) for i in same) for same in group)
-        labels.append(Label(group[0][0], text))
-    return tuple(labels)
+    def text(place: list[list[int]]) -> str:
+        return ", ".join(" = ".join(_frame_name(description, i) for i in same) for same in place)
+
+    return tuple(Label(place[0][0], text(place)) for place in places)
 
 
 def _shared_origins(description: Description) -> list[list[list[int]]]:
-    """Return frames 0 ... n + 1 by common origin and, within it, by common axes.
+    """Return frames 0 ... n + 1, grouped by common origin and, within a group, by common axes.
 
-    What holds in two random configurations holds in all: a coincidence by chance has probability 0.
+    Frames are compared in two random configurations, where a coincidence by chance has probability 0.
     """
     q = np.random.default_rng(0).uniform(0.3, 1.2, (2, description.n))
     T = node_transforms(description, q)
-    near = COINCIDE * scene_size(description)
+    near = COINCIDENCE * scene_size(description)
     places: list[list[list[int]]] = []
     for i in range(description.n + 2):
         place = next((p for p in places if np.abs(T[:, p[0][0], :3, 3] - T[:, i, :3, 3]).max() < near), None)
         if place is None:
             places.append([[i]])
             continue
-        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < COINCIDE), None)
+        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < COINCIDENCE), None)
         if same is None:
             place.append([i])
         else:
@@ -166,7 +169,7 @@ def _shared_origins(description: Description) -> list[list[list[int]]]:
     return places
 
 
-def _name(description: Description, frame: int) -> str:
+def _frame_name(description: Description, frame: int) -> str:
     return "tool" if frame == description.n + 1 else str(frame)
 
 
@@ -178,7 +181,7 @@ def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
         path = f"{ROOT}/link{part.link}/part{k}"
         try:
             drawn = part_object(part, f"link{part.link}/part{k}")
-        except ModelError as error:  # a mesh whose header is in order and whose content is not
+        except ModelError as error:  # the mesh has a valid header, and content that is not valid
             log.warning("%s; it is left out", error)
             continue
         commands.append(_set_object(path, drawn))
@@ -190,9 +193,9 @@ def _triad_commands(description: Description, places: list[list[list[int]]], siz
     commands: list[Lowered] = []
     for place in places:
         for k, same in enumerate(place):
-            name = _name(description, same[0])
+            name = _frame_name(description, same[0])
             node = "tool" if name == "tool" else f"link{name}"
-            triad = triad_object(TRIAD * size * NESTED**k, f"{node}/frame")
+            triad = triad_object(TRIAD_SHARE * size * NESTED_RATIO**k, f"{node}/frame")
             commands.append(_set_object(f"{ROOT}/{node}/frame", triad))
             commands.append(
                 {"type": "set_property", "path": f"{ROOT}/{node}/frame", "property": "visible", "value": False}
@@ -200,8 +203,8 @@ def _triad_commands(description: Description, places: list[list[list[int]]], siz
     return commands
 
 
-def _up(description: Description) -> list[float]:
-    """Return the direction against gravity; z where there is none."""
+def _upward(description: Description) -> list[float]:
+    """Return the unit vector against gravity, world; z if there is no gravity."""
     gravity = description.numbers.gravity
     strength = float(np.linalg.norm(gravity))
     return [0.0, 0.0, 1.0] if strength == 0 else [float(0.0 - g) / strength for g in gravity]

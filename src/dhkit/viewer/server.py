@@ -17,7 +17,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream
@@ -27,36 +27,37 @@ from tornado.web import Application
 from dhkit.errors import DhkitError, ModelError
 from dhkit.viewer.handlers import File, Page, Refused
 from dhkit.viewer.page import page_files
-from dhkit.viewer.protocol import stamped
+from dhkit.viewer.protocol import Samples, encode_state, stamped
 from dhkit.viewer.requests import Request
 from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
-from dhkit.viewer.streams import Samples, encode_state
 
-Answer = Callable[[str, dict[str, Any]], Any]
+Answer: TypeAlias = Callable[[str, Mapping[str, object]], object]
+"""Answers a request, given its name and data, with what JSON can hold."""
 
 LOG = logging.getLogger(__name__)
 ADDRESS = "127.0.0.1"
-START_TIMEOUT = 10.0
-CLOSE_TIMEOUT = 5.0
-BEAT = 2.0
-"""Seconds between signs of life to a page; the page gives up on us after three are missing."""
-PING = 15.0
-"""Seconds after which a browser that vanished without a word is dropped."""
+START_TIMEOUT, CLOSE_TIMEOUT = 10.0, 5.0
+"""Longest times that the server's thread may take to start and to stop, s."""
+BEAT_PERIOD = 2.0
+"""Time between two signs of life to a page, s; the page gives the server up when three are missing."""
+PING_PERIOD = 15.0
+"""Time between two pings, s: a browser that vanished without closing its connection is dropped."""
 MAX_MESSAGE = 1_000_000
-"""Bytes of a message from a page."""
+"""Largest message from a page, bytes."""
 MAX_BODY = 1_000
-"""Bytes of the body of a request by HTTP: ours have none."""
+"""Largest body of an HTTP request, bytes: requests of our pages have none."""
 MAX_BUFFER = 2 * MAX_MESSAGE
-"""Bytes that are read ahead of a connection."""
-IDLE = 60.0
-"""Seconds that a connection may take to say what it wants."""
-MOST_CONNECTIONS = 150
-"""Connections at a time, with those of pages."""
-POLL = 0.005
+"""Largest number of bytes that are read ahead of a connection."""
+IDLE_TIMEOUT = 60.0
+"""Longest time that a connection may take to send its request, s."""
+MAX_CONNECTIONS = 150
+"""Largest number of connections at a time, those of pages included."""
+POLL_PERIOD = 0.005
+"""Time between two looks at whether pages have drawn everything, s."""
 
 
 class BoundedServer(HTTPServer):
-    """A server that closes connections beyond a number: each takes a descriptor, of which a process has few."""
+    """A server that closes connections beyond MAX_CONNECTIONS: each needs a descriptor, of which a process has few."""
 
     def initialize(self, *arguments: Any, **options: Any) -> None:
         """Begin without connections."""
@@ -65,14 +66,14 @@ class BoundedServer(HTTPServer):
 
     def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
         """Serve a connection, unless there are too many."""
-        if self._open >= MOST_CONNECTIONS:
+        if self._open >= MAX_CONNECTIONS:
             stream.close()
             return
         self._open += 1
         super().handle_stream(stream, address)
 
     def on_close(self, server_conn: object) -> None:
-        """Take note of a connection's end."""
+        """Note the end of a connection."""
         self._open -= 1
         super().on_close(server_conn)
 
@@ -85,15 +86,16 @@ class ViewerServer:
     state
         The latest message of every slot.
     answer
-        What answers pages' requests, called with a request's name and data in a thread of its own, one after the
-        other: returns what JSON can hold, or raises an error whose line the page shows. None for pages without panels.
+        Answers requests of pages: it is called with a request's name and data in a thread of its own, one request after
+        the other, and returns what JSON can hold, or raises an error whose line the page shows. None for pages without
+        panels.
     port, token
-        Where the page is, for pages that are to find it again; any free port and a new token unless given.
+        Address of the page, for pages that are to find it again; by default any free port and a new token.
 
     Raises
     ------
     ModelError
-        No viewer in the meshcat wheel, or the server did not start.
+        The meshcat wheel has no viewer, or the server did not start.
     """
 
     def __init__(
@@ -102,7 +104,7 @@ class ViewerServer:
         self.token = token or secrets.token_urlsafe(16)
         self._answer = answer
         self._worker = ThreadPoolExecutor(1, "dhkit-answers") if answer else None
-        self._wanted_port = port
+        self._requested_port = port
         self.files = page_files()
         self._lock = threading.Lock()
         self._sequence = 0
@@ -119,37 +121,37 @@ class ViewerServer:
 
     @property
     def url(self) -> str:
-        """Where the page is; the token in it is the permission to see it."""
+        """Address of the page; the token in it is the permission to see the page."""
         return f"http://{ADDRESS}:{self.port}/{self.token}/"
 
     @property
     def hosts(self) -> tuple[str, str]:
-        """What a browser may call us."""
+        """Values of the Host header that are the server's own: address and port."""
         return f"{ADDRESS}:{self.port}", f"localhost:{self.port}"
 
-    def publish_state(self, name: str, data: Any) -> None:
+    def publish_state(self, name: str, data: object) -> None:
         """Make a panel's state, of what JSON can hold, the latest of its name; see :meth:`publish`."""
-        self.publish(self._panel(name), encode_state(name, data))
+        self.publish(self._panel_slot(name), encode_state(name, data))
 
     def append(self, samples: Samples) -> None:
         """Add rows to those of the same name, on every page and for later ones; see :meth:`publish`."""
-        self.publish(self._panel(f"samples {samples.name}"), samples)
+        self.publish(self._panel_slot(f"samples {samples.name}"), samples)
 
     def ask(self, page: Page, request: Request) -> None:
-        """Have a page's request answered, after those that were there before."""
+        """Queue a page's request, to be answered after those before it."""
         if self._worker is None or self._answer is None:
             text = "this page only shows; it has nothing to ask for"
-            page.answered(json.dumps({"type": "error", "id": request.id, "error": text}))
+            page.send_answer(json.dumps({"type": "error", "id": request.id, "error": text}))
             return
         with self._lock:
             self._asked.setdefault(page, deque()).append(request)
         try:
             self._worker.submit(self._answer_next, self._answer)
         except RuntimeError:
-            return  # closed meanwhile
+            return  # the server was closed meanwhile
 
     def forget(self, page: Page) -> None:
-        """Leave what a page that is gone has asked for."""
+        """Drop a page that is gone, and its requests."""
         self.pages.discard(page)
         with self._lock:
             self._asked.pop(page, None)
@@ -157,7 +159,7 @@ class ViewerServer:
     def publish(self, slot: int, message: bytes | Samples) -> None:
         """Make a message the latest of its slot and send it to every page that has drawn the one before.
 
-        Returns at once; many calls in a row are one transmission of the latest.
+        It returns at once; of many messages in a row only the latest is sent.
 
         Raises
         ------
@@ -168,30 +170,30 @@ class ViewerServer:
             scheduled = bool(self._changed)
             self._keep(slot, message)
         if not scheduled:
-            self._soon(self._flush)
+            self._call_soon(self._flush)
 
     def wait(self, timeout: float) -> None:
-        """Return when at least one page is connected and every page has drawn everything.
+        """Wait until at least one page is connected and every page has drawn everything.
 
         Raises
         ------
         TimeoutError
-            Not within so many seconds.
+            That takes longer than ``timeout``, s.
         ModelError
             The server is closed.
         """
-        self._soon(lambda: None)
+        self._call_soon(lambda: None)
         deadline = time.monotonic() + timeout
         while not self.pages or self._changed or not all(page.session.settled for page in tuple(self.pages)):
             if time.monotonic() > deadline:
-                what = "no page is connected" if not self.pages else "a page has not drawn the latest state"
-                raise TimeoutError(f"{what} after {timeout:g} s; it is at {self.url}")
+                problem = "no page is connected" if not self.pages else "a page has not drawn the latest state"
+                raise TimeoutError(f"{problem} after {timeout:g} s; it is at {self.url}")
             if not self._thread.is_alive():
                 raise ModelError("the viewer's server has ended")
-            time.sleep(POLL)
+            time.sleep(POLL_PERIOD)
 
     def close(self) -> None:
-        """Say good-bye to every page and stop the thread; a second time, nothing."""
+        """Close the pages' connections and stop the thread; a second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -206,11 +208,11 @@ class ViewerServer:
             LOG.warning("the viewer's server did not stop within %g s", CLOSE_TIMEOUT)
 
     def replay(self) -> Session:
-        """Return a session that has everything still to send."""
+        """Return a session that has the whole state still to send."""
         with self._lock:
             return Session(self._state)
 
-    def _panel(self, name: str) -> int:
+    def _panel_slot(self, name: str) -> int:
         with self._lock:
             return self._panels.setdefault(name, Slot.PANELS + len(self._panels))
 
@@ -221,15 +223,15 @@ class ViewerServer:
                 self._state.pop(other, None)
                 self._changed.pop(other, None)
         if isinstance(message, Samples):
-            _, before = self._state.get(slot, (0, None))
-            self._state[slot] = (self._sequence, _joined(before, replace(message, restart=before is None)))
-            self._changed[slot] = _joined(self._changed.get(slot), message)
+            _, earlier = self._state.get(slot, (0, None))
+            self._state[slot] = (self._sequence, _join(earlier, replace(message, restart=earlier is None)))
+            self._changed[slot] = _join(self._changed.get(slot), message)
             return
         self._state[slot] = (self._sequence, stamped(message, self._sequence))
         self._changed[slot] = self._state[slot][1]
 
     def _answer_next(self, answer: Answer) -> None:
-        """Answer a request of the page whose turn it is: one that asks for much does not keep the others waiting."""
+        """Answer a request of the page whose turn it is: a page with many requests does not delay the others."""
         with self._lock:
             if not self._asked:
                 return
@@ -238,11 +240,11 @@ class ViewerServer:
             request = requests.popleft()
             if requests:
                 self._asked[page] = requests
-        text = _answered(answer, request)
-        with suppress(ModelError):  # closed meanwhile
-            self._soon(lambda: page.answered(text))
+        text = _answer_text(answer, request)
+        with suppress(ModelError):  # the server was closed meanwhile
+            self._call_soon(lambda: page.send_answer(text))
 
-    def _soon(self, call: Any) -> None:
+    def _call_soon(self, call: Callable[[], None]) -> None:
         try:
             if self._closed:
                 raise RuntimeError
@@ -286,12 +288,12 @@ class ViewerServer:
             default_handler_class=Refused,
             default_handler_args={"server": self},
             log_function=lambda handler: LOG.debug("%s %s", handler.get_status(), handler.request.method),
-            websocket_ping_interval=PING,
+            websocket_ping_interval=PING_PERIOD,
             websocket_max_message_size=MAX_MESSAGE,
         )
-        self.sockets = bind_sockets(self._wanted_port, ADDRESS)
+        self.sockets = bind_sockets(self._requested_port, ADDRESS)
         http = BoundedServer(
-            application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE
+            application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE_TIMEOUT
         )
         http.add_sockets(self.sockets)
         self.port = self.sockets[0].getsockname()[1]
@@ -306,14 +308,14 @@ class ViewerServer:
 
     async def _beat(self) -> None:
         while True:
-            await asyncio.sleep(BEAT)
+            await asyncio.sleep(BEAT_PERIOD)
             for page in tuple(self.pages):
                 page.beat()
 
 
-def _answered(answer: Answer, request: Request) -> str:
+def _answer_text(answer: Answer, request: Request) -> str:
     """Return the answer to a request as JSON, or its error in one line."""
-    reply: dict[str, Any] = {"id": request.id}
+    reply: dict[str, object] = {"id": request.id}
     try:
         return json.dumps(reply | {"type": "answer", "data": answer(request.name, request.data)}, allow_nan=False)
     except (DhkitError, ValueError, TypeError) as error:
@@ -324,5 +326,5 @@ def _answered(answer: Answer, request: Request) -> str:
     return json.dumps(reply | {"type": "error", "error": text})
 
 
-def _joined(before: bytes | Samples | None, later: Samples) -> Samples:
-    return before.followed_by(later) if isinstance(before, Samples) else later
+def _join(earlier: bytes | Samples | None, later: Samples) -> Samples:
+    return earlier.followed_by(later) if isinstance(earlier, Samples) else later

@@ -1,23 +1,22 @@
-"""What one page has been sent and has drawn: a state machine without input or output."""
+"""A session: the messages that one page has been sent and has drawn; a state machine without input or output."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
 
-from dhkit.viewer.protocol import stamped
-from dhkit.viewer.streams import Samples
+from dhkit.viewer.protocol import Samples, stamped
 
-STATES = 16
-"""Messages of panels under way: an edit of the table changes the state of most panels."""
-LAST_SLOT = 1_000
-"""Slots are below."""
+MAX_PANEL_MESSAGES = 16
+"""Largest number of panel messages under way: an edit of the table changes the state of most panels."""
+MAX_SLOT = 1_000
+"""A bound above all slots, so that messages are sent by their age after the scene."""
 
 
 class Slot(IntEnum):
-    """What the messages of a scene replace each other by, in the order a new page needs them.
+    """Slots of messages, in the order a new page needs them: a message replaces the one before it in its slot.
 
-    A page's state is the latest message of every slot: replaying them is a full resynchronisation.
+    A page's state is the latest message of every slot: replaying them synchronises a page fully.
     """
 
     SCENE = 0
@@ -34,14 +33,14 @@ class Slot(IntEnum):
 
 
 OF_ONE_ARM = (Slot.TRACE, Slot.POINTS, Slot.ELLIPSOIDS, Slot.GHOSTS, Slot.MOTION)
-"""What a new scene takes away: it was drawn for the arm before."""
+"""Slots that a new scene clears: their messages were about the arm before."""
 
 
 class Session:
     """Messages on their way to one page, in two lanes: pictures, and the states and samples of panels.
 
-    One picture at most is under way, which the display takes its time for, and :data:`STATES` messages of panels, which
-    the page takes at once; neither lane waits for the other. Per slot only the latest waits.
+    At most one picture is under way, since drawing takes time, and at most :data:`MAX_PANEL_MESSAGES` messages of
+    panels, which a page takes at once; neither lane waits for the other. In each slot only the latest message waits.
 
     Examples
     --------
@@ -56,17 +55,17 @@ class Session:
     >>> session.offer(Slot.PANELS, 4, b"a panel's state")
     >>> session.next()
     b"a panel's state"
-    >>> session.shown(1)
+    >>> session.acknowledge(1)
     >>> session.next()
     b'third'
     """
 
     def __init__(self, state: Mapping[int, tuple[int, bytes | Samples]]) -> None:
-        # A new page needs the slots in their order; later whatever has waited longest is next, or poses that come as
-        # fast as they are drawn would leave nothing else a turn.
+        # A new page needs the slots in their order. Later the message that has waited longest is next: poses that come
+        # as fast as they are drawn would otherwise leave no turn to anything else.
         self._waiting = {slot: (slot, sequence, message) for slot, (sequence, message) in state.items()}
         self._unshown: dict[bool, set[int]] = {False: set(), True: set()}
-        """Sequence numbers under way, by whether they are of a panel."""
+        """Sequence numbers under way, by whether their slot is a panel's."""
 
     @property
     def settled(self) -> bool:
@@ -74,37 +73,29 @@ class Session:
         return not self._waiting and not any(self._unshown.values())
 
     def offer(self, slot: int, sequence: int, message: bytes | Samples) -> None:
-        """Take a message in place of the one that waits in its slot; samples join those that wait."""
+        """Queue a message in place of the one that waits in its slot; samples are added to those that wait."""
         if slot == Slot.SCENE:
             for other in OF_ONE_ARM:
                 self._waiting.pop(other, None)
-        turn, _, waiting = self._waiting.get(slot, (_turn(slot, sequence), 0, None))
+        new_turn = slot if slot == Slot.SCENE else MAX_SLOT + sequence
+        turn, _, waiting = self._waiting.get(slot, (new_turn, 0, None))
         if isinstance(message, Samples) and isinstance(waiting, Samples):
             message = waiting.followed_by(message)
         self._waiting[slot] = (turn, sequence, message)
 
     def next(self) -> bytes | None:
-        """Return a message to send now; None where enough are under way, or nothing waits."""
-        full = {lane: len(self._unshown[lane]) >= most for lane, most in ((False, 1), (True, STATES))}
-        free = [slot for slot in self._waiting if not full[_of_panel(slot)]]
-        if not free:
+        """Return a message to send now; None if enough are under way, or nothing waits."""
+        capacity = {False: 1, True: MAX_PANEL_MESSAGES}
+        free_lanes = {lane for lane, unshown in self._unshown.items() if len(unshown) < capacity[lane]}
+        sendable = [slot for slot in self._waiting if (slot >= Slot.PANELS) in free_lanes]
+        if not sendable:
             return None
-        slot = min(free, key=lambda slot: self._waiting[slot][0])
+        slot = min(sendable, key=lambda slot: self._waiting[slot][0])
         _, sequence, message = self._waiting.pop(slot)
-        self._unshown[_of_panel(slot)].add(sequence)
+        self._unshown[slot >= Slot.PANELS].add(sequence)
         return stamped(message.encoded(), sequence) if isinstance(message, Samples) else message
 
-    def shown(self, sequence: int) -> None:
-        """Take note that the page has drawn a message; of one that is not under way, nothing."""
+    def acknowledge(self, sequence: int) -> None:
+        """Note that the page has drawn a message; the number of a message that is not under way is ignored."""
         for lane in self._unshown.values():
             lane.discard(sequence)
-
-
-def _of_panel(slot: int) -> bool:
-    """Return whether a slot is a panel's."""
-    return slot >= Slot.PANELS
-
-
-def _turn(slot: int, sequence: int) -> int:
-    """Return when a message of a slot is next: the scene first, others by their age."""
-    return Slot.SCENE if slot == Slot.SCENE else LAST_SLOT + sequence

@@ -5,42 +5,38 @@ from __future__ import annotations
 import threading
 import time
 import webbrowser
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Description, Robot, description_of
-from dhkit.description.files import write_atomically
+from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.frames import joint_array
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
 from dhkit.viewer import protocol
+from dhkit.viewer.exports import Exportable, Snapshot
 from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.notebook import framed_page, notebook_widget
-from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, solids
-from dhkit.viewer.picture_files import write_png
+from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, rounded_boxes
+from dhkit.viewer.pictures import Ghost
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
 from dhkit.viewer.session import OF_ONE_ARM, Slot
-from dhkit.viewer.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from PIL.Image import Image
-
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
+    from dhkit.viewer.protocol import Samples
     from dhkit.viewer.server import Answer, ViewerServer
-    from dhkit.viewer.streams import Samples
 
-ELLIPSOID = 0.25
-"""What an ellipsoid's longest half axis is drawn as, of the arm's size."""
+ELLIPSOID_SHARE = 0.25
+"""Length that the longest half axis of ellipsoids is drawn with, as a share of the arm's size."""
 
 
-class View:
+class View(Exportable):
     """A view of an arm, first in its ``ready`` configuration or at zero.
 
     The server starts with the first use of :attr:`url` or :meth:`open`; a page that opens then shows the present
@@ -53,15 +49,15 @@ class View:
     frames
         Whether the DH frames are drawn as triads with labels; a page can switch them too.
     answer
-        What answers requests of a page with panels: see :class:`dhkit.viewer.server.ViewerServer`. A page has panels
-        where this is given.
+        Answers requests of pages with panels: see :class:`dhkit.viewer.server.ViewerServer`. Pages have panels where
+        this is given.
     port, token
-        Where the page is, for pages that are to find it again; any free port and a new token unless given.
+        Address of the page, for pages that are to find it again; by default any free port and a new token.
 
     Raises
     ------
     ModelError
-        A mesh that cannot be read.
+        A mesh cannot be read.
 
     Examples
     --------
@@ -85,14 +81,15 @@ class View:
         self._answer, self._port, self._token = answer, port, token
         self._server: ViewerServer | None = None
         self._widget: Any = None
-        """What shows this in a notebook."""
+        """The widget of a notebook that shows this view."""
         self._closed = False
         self._lock = threading.RLock()
         self._state: dict[Slot, bytes] = {Slot.SCENE: self._scene(description)}
         self._q = first_configuration(description)
         self._played: Motion | None = None
+        self._ghosts: tuple[Ghost, ...] = ()
         self._ghost_names: tuple[tuple[str, str], ...] = ()
-        """Names and colors of the ghosts."""
+        self._trace: Array | None = None
         self.frames(frames)
         self.show(first_configuration(description))
 
@@ -103,7 +100,7 @@ class View:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the page; starts the server.
+        """Address of the page for a browser on this machine; the first use starts the server.
 
         Raises
         ------
@@ -113,7 +110,7 @@ class View:
         return self._live().url
 
     def open(self, *, block: bool = False) -> str:
-        """Open the page in the default browser and return where it is.
+        """Open the page in the default browser and return its address.
 
         With ``block`` it returns when Ctrl-C is pressed: a script that ends takes its view along.
         """
@@ -168,18 +165,17 @@ class View:
             self._description = description
             for slot in OF_ONE_ARM:
                 self._state.pop(slot, None)
-            self._ghost_names, self._played = (), None
+            self._played, self._trace, self._ghosts, self._ghost_names = None, None, (), ()
             self._q = first_configuration(description) if q is None else joint_array(description, q)
             self._publish(Slot.SCENE, scene)
             self.show(self._q)
 
-    def panel(self, name: str, data: Any) -> None:
-        """Tell pages the state of a panel, of what JSON can hold, in place of the last of this name."""
-        server = self._live()
-        server.publish_state(name, data)
+    def panel(self, name: str, data: object) -> None:
+        """Send the state of a panel, of what JSON can hold, to the pages, in place of the last state of this name."""
+        self._live().publish_state(name, data)
 
     def append(self, samples: Samples) -> None:
-        """Tell pages rows of numbers that follow those of the same name."""
+        """Send rows of numbers to the pages that follow those of the same name."""
         self._live().append(samples)
 
     def play(self, motion: Motion, *, trace: bool = True) -> None:
@@ -226,6 +222,7 @@ class View:
             raise ValueError(f"points has shape {line.shape}; expected (N, 3)")
         if not np.isfinite(line).all():
             raise ValueError("points has values that are not finite")
+        self._trace = line
         self._publish(Slot.TRACE, protocol.encode_trace(line))
 
     def points(self, positions: ArrayLike | None, colors: ArrayLike | None = None) -> None:
@@ -236,7 +233,7 @@ class View:
         positions
             Shape (N, 3), m, in the world. Some ten thousand are drawn at a good rate.
         colors
-            Red, green and blue from 0 to 1, shape (N, 3) or (3,) for all; grey if not given.
+            Red, green and blue from 0 to 1, shape (N, 3), or (3,) for all points; grey if not given.
 
         Raises
         ------
@@ -258,17 +255,16 @@ class View:
         ellipsoid
             As :func:`dhkit.kinematics.manipulability.velocity_ellipsoid` gives it; what is NaN is left out.
         scale
-            What a half axis of length 1 is drawn as, m; by default such that the longest is a quarter of the
-            arm's size.
+            Length that a half axis of 1 is drawn with, m; by default such that the longest half axis is a quarter of
+            the arm's size.
 
         Raises
         ------
         ValueError
             An infinite half axis, or a scale that is not positive.
         """
-        none = np.zeros((0, 4, 4))
-        longest = ELLIPSOID * scene_size(self._description)
-        transforms = none if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
+        longest = ELLIPSOID_SHARE * scene_size(self._description)
+        transforms = np.zeros((0, 4, 4)) if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
         self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
 
     def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None, names: Sequence[str] | None = None) -> None:
@@ -280,9 +276,9 @@ class View:
             Joint values, shape (k, n), rad and m; rows with NaN are left out, so that the branches of an inverse
             kinematics solution can be given as they are.
         tints
-            Red, green and blue from 0 to 1, shape (k, 3) or (3,) for all; each its own if not given.
+            Red, green and blue from 0 to 1, shape (k, 3), or (3,) for all ghosts; by default each has its own.
         names
-            What they are, k texts, which a page with panels says beside them.
+            Names of the k ghosts, which a page with panels writes beside them.
 
         Raises
         ------
@@ -299,10 +295,11 @@ class View:
         shown = np.atleast_1d(np.isfinite(states).all(axis=1))
         self._ghost_names = tuple(
             (str(name), f"#{bytes(color).hex()}")
-            for name, color, drawn in zip(names or (), colors, shown, strict=names is not None)
-            if drawn
+            for name, color, is_shown in zip(names or (), colors, shown, strict=names is not None)
+            if is_shown
         )
         transforms = node_transforms(self._description, states[shown])
+        self._ghosts = tuple(Ghost(T, tuple(tint)) for T, tint in zip(transforms, colors[shown].tolist(), strict=True))
         self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
 
     def obstacles(self, obstacles: Scene | None) -> None:
@@ -316,15 +313,16 @@ class View:
         Raises
         ------
         TypeError
-            Something else than obstacles and floors.
+            The scene has something else than obstacles and floors.
         ValueError
-            More than one floor.
+            The scene has more than one floor.
         """
-        drawn = solids(() if obstacles is None else obstacles, scene_size(self._description))
-        self._publish(Slot.OBSTACLES, protocol.encode_obstacles(*drawn))
+        boxes = rounded_boxes(() if obstacles is None else obstacles, scene_size(self._description))
+        self._publish(Slot.OBSTACLES, protocol.encode_obstacles(*boxes))
 
     def frames(self, visible: bool) -> None:
         """Show or hide the DH frames."""
+        self._frames = visible
         self._publish(Slot.FRAMES, protocol.encode_frames(visible))
 
     def wait(self, timeout: float = 10.0) -> None:
@@ -336,89 +334,6 @@ class View:
             Not within so many seconds.
         """
         self._live().wait(timeout)
-
-    def html(
-        self,
-        *,
-        interactive: bool = False,
-        motions: Mapping[str, Motion] | None = None,
-        title: str | None = None,
-        caption: str = "",
-        links: Mapping[str, str] | None = None,
-    ) -> str:
-        """Return the present state as one HTML page that needs no server and no network.
-
-        Parameters
-        ----------
-        interactive
-            With panels: sliders of the joints, the tool's pose, a table that can be edited, and the motions.
-        motions
-            What an interactive page plays, by name, as :meth:`play` takes them; the motion on show if not given.
-        title
-            The page's title; the arm's name if not given.
-        caption
-            What an interactive page says about itself: paragraphs, one a line.
-        links
-            Addresses of further pages, relative to this one, by the text that leads there.
-
-        Raises
-        ------
-        ValueError, TypeError, DescriptionError
-            A motion that cannot be played: see :meth:`play`.
-        """
-        return self._snapshot().page(interactive, motions, title, caption, links or {})
-
-    def save_html(
-        self,
-        path: str | Path,
-        *,
-        interactive: bool = False,
-        motions: Mapping[str, Motion] | None = None,
-        title: str | None = None,
-        caption: str = "",
-        links: Mapping[str, str] | None = None,
-    ) -> Path:
-        """Write :meth:`html` to a file and return its path.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> from dhkit.description.library import library_robot
-        >>> view = View(library_robot("planar2r"))
-        >>> motions = {"up": ([0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]])}
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     page = view.save_html(f"{folder}/arm.html", interactive=True, motions=motions)
-        ...     print(page.name)
-        arm.html
-        """
-        path = Path(path)
-        text = self.html(interactive=interactive, motions=motions, title=title, caption=caption, links=links)
-        write_atomically(path, text)
-        return path
-
-    def picture(self, size: tuple[int, int] = (960, 720)) -> Image:
-        """Return the present state as a picture, with ghosts, path and frames, drawn without a browser.
-
-        Parameters
-        ----------
-        size
-            Width and height, px.
-        """
-        return self._snapshot().picture(size)
-
-    def save_png(self, path: str | Path, size: tuple[int, int] = (960, 720)) -> Path:
-        """Write :meth:`picture` as PNG and return the path."""
-        return write_png(self.picture(size), path)
-
-    def save_gif(self, path: str | Path, size: tuple[int, int] = (480, 360), rate: float = 15.0) -> Path:
-        """Write the motion that was last given to :meth:`play` as a GIF, so many pictures a second; return the path.
-
-        Raises
-        ------
-        ValueError
-            No motion is on show, or one of more than 900 pictures.
-        """
-        return self._snapshot().write_gif(path, size, rate)
 
     def close(self) -> None:
         """Stop the server; pages say that the connection is lost, and the view cannot be moved any more."""
@@ -455,12 +370,22 @@ class View:
 
     def __repr__(self) -> str:
         # Without the token: a notebook that is passed on would show it.
-        where = "closed" if self._closed else "no server yet" if self._server is None else f"port {self._server.port}"
-        return repr_line("View", self._description.name, where)
+        state = "closed" if self._closed else "no server yet" if self._server is None else f"port {self._server.port}"
+        return repr_line("View", self._description.name, state)
 
-    def _snapshot(self) -> Snapshot:
+    def snapshot(self) -> Snapshot:
+        """Return what the view shows now."""
         with self._lock:
-            return Snapshot(self._description, dict(self._state), self._q, self._played, self._ghost_names)
+            return Snapshot(
+                self._description,
+                dict(self._state),
+                self._q,
+                self._played,
+                self._frames,
+                self._ghosts,
+                self._ghost_names,
+                self._trace,
+            )
 
     def _scene(self, description: Description) -> bytes:
         from dhkit.model.shapes import link_parts

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,38 +14,39 @@ from dhkit.description import Array, Description, joint_array, takes_robot, worl
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
-from dhkit.viewer.figures import GRID_COLOR, LINK_COLOR, frame_space, plot, skeleton, space
-from dhkit.viewer.notebook_figure import new_figure
+from dhkit.viewer.diagrams import GRID_COLOR
+from dhkit.viewer.figures import LINK_COLOR, plot, set_space_limits, skeleton, space_axes
+from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.scene import first_configuration, scene_size
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = "viridis"
+COLORMAP = "viridis"
 BEST_COLOR, ELLIPSOID_COLOR, BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
-DASHES = {"outer": "--", "inner": ":", "shoulder": "-."}
-"""How boundaries are drawn, by name."""
-FINEST = 160
-"""Pixels along a view's longer side at most."""
-PER_PIXEL = 12
-"""Samples for each pixel of the box around them: with few, the largest of their values is noise."""
-BESIDE = 2
-"""Pixels that are left free at a view's edges; one fewer is smoothed over to each side."""
-BESIDE_TICKS = 0.8
-"""Room for a view's numbers and label, inches."""
-LEGEND_ROW = 0.25
-"""Room for two more names in the legend, inches."""
-LARGEST = (9.5, 5.0)
-"""Width and height of a figure's views together, inches."""
-PIECES = 24
+BOUNDARY_STYLES = {"outer": "--", "inner": ":", "shoulder": "-."}
+"""Line styles of boundaries, by name."""
+MAX_PIXELS = 160
+"""Most pixels along the longer side of a view."""
+SAMPLES_PER_PIXEL = 12
+"""Samples for each pixel of the box around them: with fewer, the largest value in a pixel is noise."""
+PIXEL_MARGIN = 2
+"""Pixels that are left free at the edges of a view; pixels are smoothed over one fewer to each side."""
+TICK_MARGIN = 0.8
+"""Width of a view's tick labels and axis label, inches."""
+LEGEND_ROW_HEIGHT = 0.25
+"""Height of a row of the legend, two names, inches."""
+MAX_SIZE = (9.5, 5.0)
+"""Largest width and height of a figure's views together, inches."""
+LINK_PIECES = 24
 """Pieces of a link: straight in space, it is curved in a section about an axis."""
-ROOM = 0.04
-"""Left free around what is drawn, as a share of its size."""
-DRAWN = 0.3
-"""What the longest half axis of an ellipsoid is drawn as, of the arm's size."""
-MESH = 33
-"""Lines of an ellipsoid's mesh each way."""
+SPACE_MARGIN = 0.04
+"""Room around what is drawn, as a share of its size."""
+ELLIPSOID_SHARE = 0.3
+"""Length that the longest half axis of an ellipsoid is drawn with, as a share of the arm's size."""
+MESH_LINES = 33
+"""Lines of an ellipsoid's mesh in each direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,27 +55,27 @@ class _Plane:
 
     title: str
     labels: tuple[str, str]
-    flatten: Any
-    """Takes points (..., 3) in the world and returns them in the view, (..., 2), m."""
-    along_axis: bool = True
+    flatten: Callable[[Array], Array]
+    """Maps points in the world, shape (..., 3), m, to points of the view, shape (..., 2), m."""
+    is_along_axis: bool = True
     """Whether a surface about axis 1 is seen as its circle; in a section it is a curve."""
 
     def border(self, boundary: Boundary) -> Array:
-        """Return what a boundary looks like, shape (k, 2), NaN between pieces."""
-        return np.asarray(self.flatten(boundary.circle if self.along_axis else boundary.section))
+        """Return the line of a boundary in the view, shape (k, 2), m, NaN between its pieces."""
+        return self.flatten(boundary.circle if self.is_along_axis else boundary.section)
 
 
 @dataclass(frozen=True, eq=False)
-class _Reach:
-    """What is reached in a flat view, in pixels."""
+class _Pixels:
+    """The best manipulability in a flat view, in pixels."""
 
     plane: _Plane
     corner: Array
-    """Of pixel (0, 0), shape (2,), m."""
+    """Corner of pixel (0, 0), shape (2,), m."""
     edge: float
-    """Of a pixel, m."""
+    """Edge of a pixel, m."""
     best: Array
-    """The best manipulability in each pixel, NaN where none was reached, shape (nx, ny)."""
+    """The best manipulability in each pixel, NaN where no sample is, shape (nx, ny)."""
 
     def shape(self, points: Array) -> tuple[float, float]:
         """Return the width and height of the view with points (k, 2) in it, m."""
@@ -84,7 +87,7 @@ class _Reach:
         """Draw the pixels and the border of what is reached; return the image."""
         x, y = (self.corner[k] + self.edge * np.arange(self.best.shape[k] + 1) for k in range(2))
         pixels = np.ma.masked_invalid(self.best).T
-        image = axes.pcolormesh(x, y, pixels, cmap=COLORS, vmin=0, vmax=most or 1.0, rasterized=True)
+        image = axes.pcolormesh(x, y, pixels, cmap=COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True)
         centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
         reached = np.isfinite(self.best).astype(float).T
         axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
@@ -97,11 +100,11 @@ class _Reach:
 
 
 def plot_workspace(workspace: Workspace) -> Figure:
-    """Return what an arm reaches, colored by the best manipulability found there, with the arm in it.
+    """Return a figure of an arm's workspace, colored by the best manipulability at each place, with the arm in it.
 
-    An arm in space is seen from the side, as distance from the first joint's axis and height along it, and along
-    that axis; one with a sliding first joint along y and z. A tool that keeps to a plane is seen in it. Thin lines are
-    how far the arm would reach without limits of its turning joints, where that has a closed form
+    An arm in space is seen in a section, as distance from the first joint's axis and height along it, and along that
+    axis; an arm with a sliding first joint is seen along y and z. A tool that stays in a plane is seen in it. Thin
+    lines are the boundaries of the workspace without limits of turning joints, where they have a closed form
     (:func:`dhkit.kinematics.boundaries.boundaries`).
     """
     description = workspace.description
@@ -111,31 +114,31 @@ def plot_workspace(workspace: Workspace) -> Figure:
     borders = boundaries(description)
     drawn = [np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)]) for reach in reaches]
     widths, heights = np.transpose([reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)])
-    scale = min(LARGEST[0] / widths.sum(), LARGEST[1] / heights.max())
-    columns = scale * widths + BESIDE_TICKS
+    scale = min(MAX_SIZE[0] / widths.sum(), MAX_SIZE[1] / heights.max())
+    columns = scale * widths + TICK_MARGIN
     rows = (len(borders) + 1) // 2
-    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + LEGEND_ROW * rows
+    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + LEGEND_ROW_HEIGHT * rows
     figure = new_figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
     for ax, reach in zip(axes, reaches, strict=True):
         image = reach.draw(ax, float(workspace.manipulability.max()))
         _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
         for boundary in borders:
-            _draw_border(ax, reach.plane.border(boundary), DASHES[boundary.name])
+            _draw_border(ax, reach.plane.border(boundary), BOUNDARY_STYLES[boundary.name])
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
     bar.set_label("best translational manipulability (SI)", fontsize=9)
     bar.outline.set_visible(False)
     name = "ready" if "ready" in description.configurations else "zero"
     handles = axes[0].lines[1:]
-    labels = [f"the arm at {name}", "best manipulability", *map(_border_words, borders)]
+    labels = [f"the arm at {name}", "best manipulability", *map(_boundary_label, borders)]
     figure.legend(handles, labels, loc="outside lower center", frameon=False, fontsize=9, ncols=2)
-    figure.suptitle(_headline(workspace), fontsize=12, fontweight="bold")
+    figure.suptitle(_title(workspace), fontsize=12, fontweight="bold")
     return figure
 
 
 @takes_robot
 def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
-    """Return an arm with the velocity ellipsoid of its tool's origin; the title says its scale.
+    """Return a figure of an arm with the velocity ellipsoid of its tool's origin; the title says its scale.
 
     Parameters
     ----------
@@ -147,7 +150,7 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     Raises
     ------
     ValueError
-        Another shape, or values that are not finite.
+        The joint values have another shape or are not finite.
     """
     q = joint_array(description, q)
     if q.ndim != 1:
@@ -157,12 +160,14 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     ellipsoid = velocity_ellipsoid(description, q)
     longest = float(ellipsoid.lengths[0])
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
-    axes = space(figure, 111)
+    axes = space_axes(figure, 111)
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
     axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85)
-    surface = _surface(ellipsoid, DRAWN * scene_size(description) / longest if longest else 1.0)
+    surface = _surface(ellipsoid, ELLIPSOID_SHARE * scene_size(description) / longest if longest else 1.0)
     _draw_surface(axes, surface)
-    frame_space(axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=ROOM * scene_size(description))
+    set_space_limits(
+        axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=SPACE_MARGIN * scene_size(description)
+    )
     axes.set_title(f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12)
     return figure
 
@@ -174,18 +179,17 @@ def _(value: Workspace) -> Figure:
 
 @plot.register(Ellipsoid)
 def _(value: Ellipsoid) -> Figure:
-
-    centers, axes = value.center.reshape(-1, 3), value.axes.reshape(-1, 3, 3)
-    surfaces = [_surface(Ellipsoid(*one), 1.0) for one in zip(centers, axes, value.lengths.reshape(-1, 3), strict=True)]
+    batch = zip(value.center.reshape(-1, 3), value.axes.reshape(-1, 3, 3), value.lengths.reshape(-1, 3), strict=True)
+    surfaces = [_surface(Ellipsoid(*parts), 1.0) for parts in batch]
     surfaces = [surface for surface in surfaces if np.isfinite(surface).all()]
     if not surfaces:
         raise ValueError("no ellipsoid is finite: expected one to draw")
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
-    room = space(figure, 111)
+    axes_3d = space_axes(figure, 111)
     for surface in surfaces:
-        _draw_surface(room, surface)
+        _draw_surface(axes_3d, surface)
     points = np.concatenate(surfaces).reshape(-1, 3)
-    frame_space(room, points, margin=ROOM * float(np.ptp(points, axis=0).max()))
+    set_space_limits(axes_3d, points, margin=SPACE_MARGIN * float(np.ptp(points, axis=0).max()))
     return figure
 
 
@@ -209,7 +213,7 @@ def _planes(workspace: Workspace) -> list[_Plane]:
 
     title, labels = "section, all turns of the first joint in one", ("distance from axis 1 [m]", "height [m]")
     return [
-        _Plane(title, labels, section, along_axis=False),
+        _Plane(title, labels, section, is_along_axis=False),
         _Plane("along axis 1", ("x₀ [m]", "y₀ [m]"), lambda points: local(points)[..., :2]),
     ]
 
@@ -220,21 +224,21 @@ def _in_plane(axes: Array) -> _Plane:
     return _Plane("", (names[0], names[1]), lambda points: points @ axes.T)
 
 
-def _reach(plane: _Plane, workspace: Workspace) -> _Reach:
+def _reach(plane: _Plane, workspace: Workspace) -> _Pixels:
     """Return the best manipulability in each pixel of a view, smoothed over its neighbours."""
     from scipy.ndimage import binary_closing, maximum_filter
 
     places = plane.flatten(workspace.positions)
     low, high = places.min(axis=0), places.max(axis=0)
     span = float((high - low).max()) or scene_size(workspace.description)
-    edge = span / float(np.clip(np.sqrt(len(places) / PER_PIXEL), 8, FINEST))
-    counts = np.ceil((high - low) / edge).astype(int) + 2 * BESIDE
+    edge = span / float(np.clip(np.sqrt(len(places) / SAMPLES_PER_PIXEL), 8, MAX_PIXELS))
+    counts = np.ceil((high - low) / edge).astype(int) + 2 * PIXEL_MARGIN
     corner = (low + high - edge * counts) / 2
     best = np.full(tuple(counts), -np.inf)
     np.maximum.at(best, tuple(((places - corner) / edge).astype(int).T), workspace.manipulability)
     # A single pixel has too few samples for the best of them to be smooth, and some have none.
-    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=BESIDE - 1)
-    return _Reach(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * BESIDE - 1), np.nan))
+    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=PIXEL_MARGIN - 1)
+    return _Pixels(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * PIXEL_MARGIN - 1), np.nan))
 
 
 def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
@@ -249,21 +253,21 @@ def _draw_border(axes: Axes, points: Array, dashes: str) -> None:
     axes.plot(*points.T, dashes, color=BOUNDARY_COLOR, lw=1.3, zorder=1.9)
 
 
-def _border_words(boundary: Boundary) -> str:
+def _boundary_label(boundary: Boundary) -> str:
     if boundary.name == "shoulder":
         return f"least distance of the {boundary.point} from axis 1"
     return f"{boundary.name} boundary of the {boundary.point}, turning freely"
 
 
 def _arm_in_pieces(description: Description, q: Array) -> Array:
-    """Return the way from the base to the tool as a line of short pieces, shape (k, 3), m, world."""
+    """Return the line from the base to the tool at joint values (n,) as short pieces, shape (k, 3), m, world."""
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
-    share = np.linspace(0, 1, PIECES, endpoint=False)[:, None]
+    share = np.linspace(0, 1, LINK_PIECES, endpoint=False)[:, None]
     pieces = line[:-1, None] + share * (line[1:, None] - line[:-1, None])
     return np.concatenate([pieces.reshape(-1, 3), line[-1:]])
 
 
-def _headline(workspace: Workspace) -> str:
+def _title(workspace: Workspace) -> str:
     estimate = workspace.estimate
     if estimate is None or workspace.grid is None:
         return workspace.description.name
@@ -271,8 +275,8 @@ def _headline(workspace: Workspace) -> str:
 
 
 def _surface(ellipsoid: Ellipsoid, scale: float) -> Array:
-    """Return an ellipsoid's mesh, shape (MESH, MESH, 3), m."""
-    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, MESH), np.linspace(0, np.pi, MESH))
+    """Return an ellipsoid's mesh, shape (MESH_LINES, MESH_LINES, 3), m."""
+    turn, height = np.meshgrid(np.linspace(0, math.tau, MESH_LINES), np.linspace(0, np.pi, MESH_LINES))
     sphere = np.stack([np.cos(turn) * np.sin(height), np.sin(turn) * np.sin(height), np.cos(height)], axis=-1)
     return np.asarray(ellipsoid.center + scale * (sphere * ellipsoid.lengths) @ ellipsoid.axes.T)
 

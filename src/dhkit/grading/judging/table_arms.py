@@ -146,7 +146,7 @@ class TableArm:
         return np.array(frames)
 
     def screws(self, q: Array, scale: float) -> Array:
-        """Return the joint axes as screws (direction; moment / scale), shape (n, 6), in frame 0."""
+        """Return the joint axes as screws (direction; moment / scale), without unit, shape (n, 6), in frame 0."""
         frames = self.frames(q)
         moving = frames[:-1] if self.convention is Convention.STANDARD else frames[1:]
         z = moving[:, :3, 2] * self.senses[:, None]

@@ -68,7 +68,7 @@ class ArmPlane:
 
     @property
     def T(self) -> Array:
-        """The world in this frame, shape (4, 4)."""
+        """Pose of the world in this frame, shape (4, 4), m."""
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = self.R, -self.R @ self.origin
         return T

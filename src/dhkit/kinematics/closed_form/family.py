@@ -56,7 +56,7 @@ class Fit:
     """Index, from 0, of the joint that is free where two axes of the wrist coincide; None if there is none."""
 
     def vector(self) -> Array:
-        """Return all parameters, shape (parameters,)."""
+        """Return all parameters, shape (parameters,), rad and m."""
         return np.concatenate([np.ravel(value) for value in self.parameters.values()]).astype(float)
 
     def named(self, row: ca.SX) -> dict[str, SX]:

@@ -29,7 +29,7 @@ ELBOWS = ("up", "down")
 
 
 def link_parameters(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parameter] | None:
-    """Return the parameters of the links from axis 2 to axis 3 to ``end`` (world, m); None if one has no length."""
+    """Return the parameters of the links from axis 2 to 3 to ``end`` (3,), world, m; None if one has no length."""
     second, third, last = (plane.coordinates(point) for point in (axes.point(2), axes.point(3), end))
     upper, fore = third[:2] - second[:2], last[:2] - third[:2]
     if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:

@@ -28,7 +28,7 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
 
 
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
-    """Return the same program with an arm's numbers in place of the parameters."""
+    """Return the program with an arm's parameters and ``limits`` (2n,), rad and m, as constants."""
     return _graph(family, fit, prismatic, fit.named(ca.SX(fit.vector())), ca.SX(limits), {})
 
 

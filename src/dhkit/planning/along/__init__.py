@@ -1,4 +1,4 @@
-"""Motions along a given path: how fast, by a program in the squares of its speed."""
+"""Time-optimal and other motions along a given path, by a program in the squared path speed."""
 
 from dhkit.planning.along.path_motion import along_path
 

@@ -1,4 +1,4 @@
-"""Why there is no motion along a path: said before a solver would find out, or of what it came to."""
+"""Checks of a path before a solution, and error messages from a solution that did not converge."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
-from dhkit.planning.along.grid import CORNER, jumps
+from dhkit.planning.along.grid import JUMP_ROUNDING, jumps
 from dhkit.planning.along.timing_task import POINTS, TimingTask
-from dhkit.planning.feasibility import BARELY, require_holdable, require_inside_limits
-from dhkit.planning.search import FEASIBLE
+from dhkit.planning.feasibility import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
+from dhkit.planning.search import FEASIBILITY_TOLERANCE
 from dhkit.planning.solver import Solution
 from dhkit.trajectories import JointPath, Limits
 
-STANDS_STILL, TOO_STEEP = 1e-6, 1e4
-"""Of the path's mean derivative: below the one the path stands still, above the other it is singular."""
+MIN_DERIVATIVE_RATIO, MAX_DERIVATIVE_RATIO = 1e-6, 1e4
+"""Ratios of the path's derivative to its mean: below the first the path stops, above the second it is singular."""
 
 
 def require_path(description: Description, path: JointPath, limits: Limits) -> None:
-    """Refuse a path that no motion can follow from rest to rest without stopping.
+    """Require a path that a motion can follow from rest to rest without stopping.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def require_path(description: Description, path: JointPath, limits: Limits) -> N
 
 def _require_no_corner(path: JointPath) -> None:
     steps = np.abs(jumps(path, 1))
-    if steps.size and steps.max() > CORNER * np.abs(path.qs(path.breaks)).max():
+    if steps.size and steps.max() > JUMP_ROUNDING * np.abs(path.qs(path.breaks)).max():
         k, i = np.unravel_index(int(np.argmax(steps)), steps.shape)
         raise PlanningError(
             f"the path has a corner at s = {path.breaks[k + 1]:.4g}, where joint {path.description.joints[i].name} "
@@ -50,22 +50,22 @@ def _require_no_corner(path: JointPath) -> None:
 
 
 def _require_regular(path: JointPath) -> None:
-    """Refuse a path whose derivative by s vanishes somewhere, or is huge."""
+    """Require a path whose derivative by s is neither near zero nor very large."""
     s, slopes = path.pieces.derivative.inside(POINTS)
     steepness = np.abs(slopes).max(axis=2)
     mean = float(np.sum(steepness.mean(axis=1) * np.diff(path.breaks)))
-    if not steepness.min() > STANDS_STILL * mean:
+    if not steepness.min() > MIN_DERIVATIVE_RATIO * mean:
         raise PlanningError(
             f"the path stands still at s = {s.flat[int(np.argmin(steepness))]:.4g}: no joint moves there"
         )
-    if steepness.max() > TOO_STEEP * mean:
+    if steepness.max() > MAX_DERIVATIVE_RATIO * mean:
         k, j, i = np.unravel_index(int(np.argmax(np.abs(slopes))), slopes.shape)
         name = path.description.joints[i].name
         raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there")
 
 
 def require_kept(task: TimingTask) -> None:
-    """Refuse a path that breaks a constraint at any speed, and one that nothing keeps from being jumped along.
+    """Require that a path keeps the constraints at rest, and that some limit bounds the speed along it.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def require_kept(task: TimingTask) -> None:
     """
     resting = {constraint.what for constraint in task.checker.constraints if not constraint.moving}
     for what, use in task.checker.measured(task.still) if resting else []:
-        if what in resting and use.max() > 1 + BARELY:
+        if what in resting and use.max() > 1 + CONSTRAINT_ROUNDING:
             s = task.states.s.flat[int(np.argmax(use.max(axis=1)))]
             raise PlanningError(f"{what} is exceeded by {100 * (use.max() - 1):.2g} % at s = {s:.4g}, at any speed")
     moves = np.abs(task.states.qs).max(axis=(0, 1)) > 0
@@ -86,7 +86,9 @@ def require_kept(task: TimingTask) -> None:
 
 
 def refuse(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) -> NoReturn:
-    """Say what stands in the way: a joint that cannot hold the arm, or else the row that misses its bounds most.
+    """Raise the reason of a failed solution: a joint that cannot hold the arm, or the row with the largest violation.
+
+    ``bounds`` are the lower and upper bounds of the rows, shape (rows,) each, without unit.
 
     Raises
     ------
@@ -101,7 +103,7 @@ def refuse(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) ->
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)[: 2 * task.intervals * len(rows)]
     where = ""
-    if misses.size and misses.max() > FEASIBLE:
+    if misses.size and misses.max() > FEASIBILITY_TOLERANCE:
         end, k, i = np.unravel_index(int(np.argmax(misses)), (2, task.intervals, len(rows)))
         what, joint = rows[i]
         where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {states.s[end, k]:.4g}"

@@ -1,4 +1,4 @@
-"""The best motion along a given joint path: only when it is where remains to be found."""
+"""The best motion along a given joint path: optimization of the path parameter s(t)."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from dataclasses import replace
 from dhkit.description import Description, Payload, takes_robot
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_kept, require_path
-from dhkit.planning.along.search import MOST, solved
+from dhkit.planning.along.search import MAX_INTERVALS, solve_steps
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.costs import cost_of
 from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
 from dhkit.planning.report import PlanReport
+from dhkit.planning.request import checked_limits
 from dhkit.planning.solver import ProgressCall
-from dhkit.planning.wish import checked_limits
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
-FEWEST = 6
-"""Intervals."""
+MIN_INTERVALS = 6
+"""Smallest number of intervals."""
 
 
 @takes_robot
@@ -38,39 +38,39 @@ def along_path(
     progress: ProgressCall | None = None,
     payload: Payload | None = None,
 ) -> Trajectory:
-    """Return the best motion along a path, from rest to rest; it stays on the path exactly.
+    """Return the best motion along a path, from rest to rest, which stays exactly on the path.
 
     With s(t) of piecewise constant acceleration the motion is q(s(t)). Its limits are checked at eight states of each
-    interval, and by parabolas between them, with torques by Pinocchio where that is installed; where they are missed
-    the grid is refined, limits are tightened or, for less than a thousandth, the motion is slowed down.
+    interval, and by parabolas between them, with torques by Pinocchio if it is installed. Where limits are exceeded,
+    the grid is refined and limits are tightened or, if a thousandth suffices, the motion is slowed down.
 
     Parameters
     ----------
     description
         The robot; torque limits and objectives of torque need a body on every link.
     path
-        Of :func:`dhkit.trajectories.joint_path`, say. It must not have corners.
+        A path without corners, such as one of :func:`dhkit.trajectories.joint_path`.
     objective
         ``"time"``, ``"effort"``, or a sum such as ``Time() + 0.01 * Effort()``.
     duration
-        In s; needed where the time does not count.
+        Duration, s; required for objectives without time.
     limits
-        The robot's own if not given. Jerk is infinite at the intervals' ends and cannot be limited.
+        Limits; the robot's own if not given. Jerk is infinite at the intervals' ends and cannot be limited.
     constraints
-        What else must be kept: :class:`dhkit.planning.ToolSpeed` and the like.
+        Further constraints, such as :class:`dhkit.planning.ToolSpeed`.
     intervals
-        Of s, at first; they take about the same time each.
+        Initial number of intervals of s, which take about the same time each.
     time_limit
-        For all solutions together, s.
+        Time limit of all solutions together, s.
     progress
-        Called once an iteration.
+        Called once in each iteration.
     payload
-        What the tool carries.
+        Payload of the tool.
 
     Returns
     -------
     Trajectory
-        Its ``report`` is a :class:`dhkit.planning.PlanReport`.
+        The motion; its ``report`` is a :class:`dhkit.planning.PlanReport`.
 
     Raises
     ------
@@ -93,9 +93,9 @@ def along_path(
     True
     """
     began = time.perf_counter()
-    check_whole("intervals", intervals, FEWEST)
-    if intervals > MOST:
-        raise ValueError(f"intervals is {intervals!r}; expected a whole number from {FEWEST} to {MOST}")
+    check_whole("intervals", intervals, MIN_INTERVALS)
+    if intervals > MAX_INTERVALS:
+        raise ValueError(f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}")
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
@@ -111,7 +111,7 @@ def along_path(
     for step in task.steps:
         _ = step.program
     built = time.perf_counter() - building
-    found, *before = solved(task, began + time_limit, progress)
+    found, *before = solve_steps(task, began + time_limit, progress)
     cost = cost_of(wanted, found.trajectory, loaded)
     report = PlanReport(
         objective=str(wanted),

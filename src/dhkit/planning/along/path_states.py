@@ -1,4 +1,4 @@
-"""A path and its arm's mechanics on a grid: torques along it are tau = m sdd + c sd^2 + g.
+"""A path and the arm's dynamics along it on a grid: torques are tau = m sdd + c sd^2 + g.
 
 Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths.
 """
@@ -17,28 +17,28 @@ from dhkit.trajectories.pieces import Side
 
 @dataclass(frozen=True, eq=False)
 class PathStates:
-    """A path and its arm's mechanics at both ends of K intervals: shapes (2, K, ...), left ends first."""
+    """A path and the arm's dynamics at both ends of K intervals: shapes (2, K, ...), left ends first."""
 
     s: Array
-    """Shape (2, K)."""
+    """Path parameter, shape (2, K)."""
     q: Array
-    """Shape (2, K, n), rad and m."""
+    """Joint values, shape (2, K, n), rad and m."""
     qs: Array
-    """Their derivatives by s."""
+    """First derivatives of q by s, shape (2, K, n)."""
     qss: Array
     m: Array
-    """Torque for each sdd, shape (2, K, n); zeros without bodies."""
+    """Torque per sdd, shape (2, K, n); zeros without bodies."""
     c: Array
-    """Torque for each sd^2."""
+    """Torque per sd^2, shape (2, K, n)."""
     g: Array
-    """Torque that holds the arm."""
+    """Gravity torque, shape (2, K, n), N m and N."""
     ps: Array
-    """The tool's derivatives by s, shape (2, K, 3), m; zeros where they are not asked for."""
+    """Derivatives of the tool's position by s, shape (2, K, 3), m; zeros unless requested."""
     pss: Array
 
     @classmethod
     def of(cls, description: Description, path: JointPath, knots: Array, *, torque: bool, tool: bool) -> PathStates:
-        """Work a path out on a grid; where it bends suddenly, each interval has its own side."""
+        """Evaluate a path (rad and m) on knots (K+1,); at jumps of curvature each interval has its side's value."""
         first, second = path.pieces.derivative, path.pieces.derivative.derivative
         ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
         q, qs, qss = (np.stack([piece(s, side) for s, side in ends]) for piece in (path.pieces, first, second))
@@ -57,13 +57,13 @@ class PathStates:
 
     @property
     def steps(self) -> Array:
-        """The intervals' lengths, shape (K,)."""
+        """Lengths of the intervals in s, shape (K,)."""
         steps: Array = self.s[1] - self.s[0]
         return steps
 
     @property
     def coefficients(self) -> Array:
-        """What :class:`PathPoint` takes, a column for each end, shape (6 n + 6, 2 K)."""
+        """Arguments of :class:`PathPoint`, a column for each end of an interval, shape (6 n + 6, 2 K)."""
         parts = (self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss)
         both = np.concatenate(parts, axis=-1)
         return both.reshape(-1, both.shape[-1]).T

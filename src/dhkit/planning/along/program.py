@@ -1,6 +1,6 @@
-"""How fast along a given path, as a program: its squares of speed b = sd^2, and limits that are linear in them.
+"""Timing of a path as a program in the squared path speed b = sd^2, with limits that are linear in b.
 
-In b it is convex: Verscheure et al. 2009, Time-optimal path tracking for robots, section III.
+The time-optimal program is convex in b: Verscheure et al. 2009, Time-optimal path tracking for robots, section III.
 """
 
 from __future__ import annotations
@@ -16,20 +16,19 @@ from dhkit.planning.along.terms import Terms
 from dhkit.planning.objectives import Time
 from dhkit.planning.solver import Solver
 
-SMALLEST = 1e-7
-"""The smallest b inside, where 1 is about the path's mean: ipopt widens bounds by a tenth of it."""
-LEAST_TIME, SMOOTH = 1e-7, 1e-8
-"""Ipopt's tolerances where time counts, which is then 1, and for other objectives; each limit that is reached costs a
-tenth of it."""
+MIN_SQUARED_SPEED = 1e-7
+"""Smallest b at inner knots, relative to about the path's mean: Ipopt relaxes bounds by a tenth of it."""
+TIME_TOLERANCE, SMOOTH_TOLERANCE = 1e-7, 1e-8
+"""Ipopt's tolerances for time (scaled to 1) and for other objectives; each active limit costs a tenth of it."""
 
 
 class TimingProgram:
-    """A program for K intervals with so many linear rows at each end; made once for each combination.
+    """A program for K intervals with a number of linear rows at each end; built once for each combination.
 
-    Its numbers are the duration and b at the knots inside, in units of a time that its caller chooses; its rows are
-    the linear ones, (2, K, rows) flattened; those of ``terms``, a column of rows for each end, left ends first; and by
-    how much the intervals take longer than the duration. In least time it is convex. Other objectives are not: slow
-    motions linger where gravity is least, and logarithms of b follow them over their decades.
+    The variables are the duration and b at the inner knots, in a unit of time that the caller chooses. The rows are the
+    linear ones, (2, K, rows) flattened; those of ``terms``, a column for each end, left ends first; and the excess of
+    the intervals' time over the duration. For least time the program is convex. For other objectives it is not: slow
+    motions stay longest where gravity torques are smallest, and logarithms of b cover their range of decades.
     """
 
     def __init__(self, intervals: int, rows: int, terms: Terms | None) -> None:
@@ -45,7 +44,7 @@ class TimingProgram:
         inside = casadi.exp(x[1:]).T if self.logarithmic else x[1:].T
         duration, rest = x[0], casadi.DM(1, 1)
         b, speed = casadi.horzcat(rest, inside, rest), casadi.horzcat(rest, casadi.sqrt(inside), rest)
-        # Written as a sum of speeds: at rest the square root has no derivative, and there it is a constant.
+        # As a sum of speeds: the square root has no derivative at rest, and there the speed is a constant.
         times = 2 * steps / (speed[:-1] + speed[1:])
         b0, b1 = (casadi.repmat(casadi.horzcat(part, part), rows, 1) for part in (b[:-1], b[1:]))
         g, f = [casadi.vec(left * b0 + right * b1)], scale * duration
@@ -60,22 +59,22 @@ class TimingProgram:
             f = scale / rate * (weight * duration + casadi.dot(casadi.horzcat(times, times) / 2, values[1]))
         g.append(casadi.sum2(times) - duration)
         p = casadi.vertcat(*(casadi.vec(part) for part in (steps, left, right, path, rate, scale)))
-        tolerance = LEAST_TIME if terms is None or terms.objective.has_time else SMOOTH
+        tolerance = TIME_TOLERANCE if terms is None or terms.objective.has_time else SMOOTH_TOLERANCE
         program = {"x": x, "p": p, "f": f, "g": casadi.vertcat(*g)}
         self.solver = Solver(program, 1, tolerance=tolerance, expand=False)
 
     def numbers(self, duration: float, b: Array) -> Array:
-        """Return the program's numbers for b at the knots inside, shape (K-1,)."""
+        """Return the program's variables for b at the inner knots, shape (K-1,)."""
         with np.errstate(divide="ignore"):
             return np.concatenate([[duration], np.log(b) if self.logarithmic else b])
 
     def squares(self, x: Array) -> Array:
-        """Return b at all knots, shape (K+1,), of the program's numbers."""
+        """Return b at all knots, shape (K+1,), from the program's variables."""
         inside = np.exp(x[1:]) if self.logarithmic else np.maximum(x[1:], 0.0)
         return np.concatenate([[0.0], inside, [0.0]])
 
     def parameters(self, states: PathStates, rows: list[TimingRows], unit: float, scale: float) -> Array:
-        """Return the program's parameters; ``unit``: its time, s."""
+        """Return the program's parameters, shape (parameters,); ``unit`` is the unit of time, s."""
         left, right = (self._side(rows, side) / unit**2 for side in ("left", "right"))
         path = states.coefficients.ravel(order="F") if self.terms else np.zeros(0)
         return np.concatenate([states.steps, left.ravel(), right.ravel(), path, [1 / unit, scale]])
@@ -87,5 +86,5 @@ class TimingProgram:
 
 @lru_cache(maxsize=16)
 def timing_program(intervals: int, rows: int, terms: Terms | None) -> TimingProgram:
-    """Return a program, made when it is first asked for."""
+    """Return the program of these sizes, built on first use."""
     return TimingProgram(intervals, rows, terms)

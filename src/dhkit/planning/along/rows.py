@@ -1,6 +1,6 @@
-"""Limits along a path that are linear in b = sd^2, and those that bound it.
+"""Limits along a path that are linear in b = sd^2, and bounds of b.
 
-With b at the ends of intervals and linear between them, sdd = b' / 2 is constant inside an interval.
+With b linear between the ends of an interval, sdd = b' / 2 is constant in it.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from dhkit.trajectories import Limits
 
 @dataclass(frozen=True, eq=False)
 class TimingRows:
-    """Rows of one kind that are linear in b: low <= left b_k + right b_(k+1) <= high; scaled so that 1 is a limit."""
+    """Rows of one kind, linear in b: low <= left b_k + right b_(k+1) <= high, scaled so that the limit is 1."""
 
     what: str
     limited: Array
-    """Which joints have such a limit, shape (n,): one row for each of those."""
+    """Joints that have such a limit, shape (n,): one row for each."""
     left: Array
-    """Shape (2, K, rows)."""
+    """Coefficients of b at the left end, shape (2, K, rows)."""
     right: Array
     rest: Array
-    """What is used already where nothing moves."""
+    """Use of the limit at rest, shape (2, K, rows)."""
 
     @classmethod
     def of(cls, what: str, states: PathStates, by_sdd: Array, by_b: Array, rest: Array, limit: Array) -> TimingRows:
-        """Return the rows |by_sdd sdd + by_b b + rest| <= limit of those joints that have one."""
+        """Return the rows |by_sdd sdd + by_b b + rest| <= limit of limited joints; arrays (2, K, n), SI units."""
         limited = np.isfinite(limit)
         by_sdd, by_b, rest = (array[..., limited] / limit[limited] for array in (by_sdd, by_b, rest))
         slope = by_sdd / (2 * states.steps[:, None])
@@ -39,17 +39,17 @@ class TimingRows:
         return cls(what, limited, left, right, rest)
 
     def bounds(self, shares: Array) -> tuple[Array, Array]:
-        """Return bounds of ``left b_k + right b_(k+1)``, shape (2, K, rows), that keep shares (K, n) in reserve."""
+        """Return bounds of ``left b_k + right b_(k+1)``, shape (2, K, rows), 1/s^2, with reserved shares (K, n)."""
         most = 1 - shares[:, self.limited]
         return -most - self.rest, most - self.rest
 
     def largest(self, shape: Array) -> float:
-        """Return by what b of a shape (K+1,) may be multiplied to keep the rows where standing still keeps them."""
+        """Return the largest factor of b (K+1,), 1/s^2, with which the rows are kept that are kept at rest."""
         return float(self._most(self.left * shape[:-1, None] + self.right * shape[1:, None]).min())
 
     @property
     def even(self) -> Array:
-        """The largest b that keeps the rows where it does not change, shape (2, K)."""
+        """Largest constant b that keeps the rows, shape (2, K), 1/s^2."""
         return self._most(self.left + self.right)
 
     def _most(self, used: Array) -> Array:
@@ -61,7 +61,7 @@ class TimingRows:
 
 
 def timing_rows(states: PathStates, limits: Limits) -> list[TimingRows]:
-    """Return the rows of a path's limits of torque and of acceleration."""
+    """Return the rows of the limits of torque and acceleration along a path."""
     return [
         TimingRows.of("torque", states, states.m, states.c, states.g, limits.torque),
         TimingRows.of("acceleration", states, states.qs, states.qss, 0 * states.q, limits.acceleration),
@@ -69,21 +69,21 @@ def timing_rows(states: PathStates, limits: Limits) -> list[TimingRows]:
 
 
 def tool_speeds(constraints: tuple[Constraint, ...]) -> list[ToolSpeed]:
-    """Return those of the constraints that bound b."""
+    """Return the constraints that bound b."""
     return [constraint for constraint in constraints if isinstance(constraint, ToolSpeed)]
 
 
 def speed_bounds(
     states: PathStates, limits: Limits, shares: Array, constraints: list[tuple[ToolSpeed, Array]]
 ) -> Array:
-    """Return the largest b of each knot by limits of speed, shape (K+1,).
+    """Return the largest b at each knot by limits of speed, shape (K+1,), 1/s^2.
 
     Parameters
     ----------
     shares
-        Of each joint's velocity kept in reserve, shape (K, n).
+        Reserved shares of each joint's speed limit, shape (K, n).
     constraints
-        Speeds of the tool, with the shares of their squares kept in reserve, shape (K, 1).
+        Limits of the tool's speed, with the reserved shares of their squares, shape (K, 1).
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         joints = ((1 - shares) * limits.velocity / np.abs(states.qs)) ** 2

@@ -1,4 +1,4 @@
-"""From a path to a certified motion along it: solve, check, slow down, or refine and tighten, solve again."""
+"""Search for a certified motion along a path: solve, check, slow down or refine and tighten, solve again."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from dhkit.planning.along.checks import refuse
 from dhkit.planning.along.timing_task import TimingTask
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.costs import cost_of
-from dhkit.planning.search import FEASIBLE, SLACK, WIDER
+from dhkit.planning.search import FEASIBILITY_TOLERANCE, MARGIN_FACTOR, TIME_SCALING_MARGIN
 from dhkit.planning.solver import Progress, ProgressCall, Solution, Stopped
 from dhkit.planning.states import States
 from dhkit.trajectories import Trajectory
 
-MOST = 2000
-"""Intervals that may be asked for; refined they may be twice as many."""
+MAX_INTERVALS = 2000
+"""Largest number of requested intervals; after refinement there may be twice as many."""
 SMALL_STEP = 1e-3
-"""A solution that needs less of a slow-down is slowed down; else its limits are tightened first."""
-MOST_RESERVED = 0.95
-"""Share of a limit that margins take at most."""
-ROUNDS = 5
-"""How often limits are tightened at most."""
-LAST_STEP, TRIES = 1.0, 5
-"""What a slow-down may cost after the last round, and how many it may take to find it."""
-LONGER = 1.5
-"""By what factor a motion of another objective is guessed to take longer than the quickest."""
+"""Relative slow-down up to which a solution is slowed down; beyond it, its limits are tightened."""
+MAX_RESERVED_SHARE = 0.95
+"""Largest share of a limit that margins reserve."""
+MAX_ROUNDS = 5
+"""Largest number of solutions."""
+LAST_STEP, MAX_SLOW_DOWNS = 1.0, 5
+"""Largest relative slow-down after the last round, and largest number of steps to determine a slow-down."""
+DURATION_FACTOR = 1.5
+"""Factor of the duration of other objectives over the fastest motion, for the initial guess."""
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A certified motion, and what it took."""
+class TimedMotion:
+    """A certified motion along a path, with its cost and the work of finding it."""
 
     trajectory: Trajectory
     knots: Array
-    """Shape (K+1,)."""
+    """Path parameters of the grid, shape (K+1,)."""
     b: Array
-    """At the knots, 1/s^2."""
+    """Squared path speeds at the knots, shape (K+1,), 1/s^2."""
     certificate: Certificate
     slow_down: float
     tightened: tuple[str, ...]
@@ -47,49 +47,51 @@ class Found:
     solves: int
 
 
-def solved(task: TimingTask, deadline: float, progress: ProgressCall | None) -> list[Found]:
-    """Return what each step of a task has found, the last one first."""
-    found: list[Found] = []
+def solve_steps(task: TimingTask, deadline: float, progress: ProgressCall | None) -> list[TimedMotion]:
+    """Return the motions of a task's steps, the last one first."""
+    found: list[TimedMotion] = []
     for step in task.steps:
-        found.insert(0, _certified(step, found[0] if found else None, deadline, progress))
+        found.insert(0, _solve_step(step, found[0] if found else None, deadline, progress))
         quickest = found[-1].trajectory.duration
-        if task.duration is not None and quickest > task.duration * (1 + SLACK):
+        if task.duration is not None and quickest > task.duration * (1 + TIME_SCALING_MARGIN):
             raise PlanningError(
                 f"{task.duration:.6g} s are too short: the limits allow the motion along the path in {quickest:.6g} s"
             )
     return found
 
 
-def _certified(task: TimingTask, quickest: Found | None, deadline: float, progress: ProgressCall | None) -> Found:
-    """Return a certified motion: where limits are missed between the grid's knots, it is refined or tightened."""
+def _solve_step(
+    task: TimingTask, quickest: TimedMotion | None, deadline: float, progress: ProgressCall | None
+) -> TimedMotion:
+    """Return a certified motion; where limits are exceeded between knots, the grid is refined or limits tightened."""
     if quickest is None:
         unit = task.usual_duration()
         b = (np.pi / unit) ** 2 * task.knots * (1 - task.knots)
     else:
-        unit = task.duration or LONGER * quickest.trajectory.duration
+        unit = task.duration or DURATION_FACTOR * quickest.trajectory.duration
         b = np.interp(task.knots, quickest.knots, quickest.b) * (quickest.trajectory.duration / unit) ** 2
     cost = 1.0 if task.terms is None else cost_of(task.objective, task.motion(b)[0], task.description)
     reserved: dict[str, Array] = {}
     tightened: list[str] = []
     iterations = 0
 
-    def told(now: Progress) -> object:
+    def report_progress(now: Progress) -> object:
         return progress and progress(replace(now, iteration=iterations + now.iteration, duration=now.duration * unit))
 
-    for solves in range(1, ROUNDS + 1):
-        solution = _solution(task, reserved, b, unit, cost, deadline, None if progress is None else told)
+    for solves in range(1, MAX_ROUNDS + 1):
+        solution = _solution(task, reserved, b, unit, cost, deadline, None if progress is None else report_progress)
         iterations += solution.iterations
         b = task.program.squares(solution.x) / unit**2
         trajectory, ends = task.motion(b)
-        made = _made_good(task, trajectory, LAST_STEP if solves == ROUNDS else SMALL_STEP)
-        if made is not None:
-            slower, certificate, c = made
-            return Found(slower, task.knots, b / c**2, certificate, c, tuple(tightened), iterations, solves)
+        slowed_motion = _slow_down_to_limits(task, trajectory, LAST_STEP if solves == MAX_ROUNDS else SMALL_STEP)
+        if slowed_motion is not None:
+            slower, certificate, c = slowed_motion
+            return TimedMotion(slower, task.knots, b / c**2, certificate, c, tuple(tightened), iterations, solves)
         states = task.checker.states(trajectory)
         excess = excesses(task, states, trajectory.breaks, ends)
         tightened += [what for what, share in excess.items() if (share > 0).any() and what not in tightened]
         knots = task.knots
-        task, reserved = _wider(task, reserved, excess)
+        task, reserved = _refine_or_reserve(task, reserved, excess)
         b = np.interp(task.knots, knots, b)
     worst = max(task.checker.check(trajectory, states).checks, key=lambda check: check.excess)
     raise PlanningError(f"{worst.what} stays exceeded by {100 * worst.excess:.2g} % at {worst.time:.4g} s")
@@ -104,7 +106,7 @@ def _solution(
     deadline: float,
     progress: ProgressCall | None,
 ) -> Solution:
-    """Solve a task's program from b at its knots, in units of a time and a cost."""
+    """Return the solution of a task's program from b at its knots, scaled by a unit of time (s) and a cost."""
     program = task.program
     parameters = program.parameters(task.states, task.rows, unit, 1 / cost)
     durations = (0.0, np.inf) if task.duration is None else (1.0, 1.0)
@@ -115,49 +117,51 @@ def _solution(
         solution = program.solver(start, parameters, (low, high), rows, deadline, progress)
     except Stopped:
         raise PlanningError("no motion along the path was found within the time limit") from None
-    if not solution.converged or solution.infeasibility > FEASIBLE:
+    if not solution.converged or solution.infeasibility > FEASIBILITY_TOLERANCE:
         refuse(task, solution, rows)
     return solution
 
 
-def _made_good(task: TimingTask, trajectory: Trajectory, most: float) -> tuple[Trajectory, Certificate, float] | None:
-    """Return a motion slowed down until it keeps its limits, its certificate and by what; None beyond ``most``."""
+def _slow_down_to_limits(
+    task: TimingTask, trajectory: Trajectory, max_slow_down: float
+) -> tuple[Trajectory, Certificate, float] | None:
+    """Return a motion slowed down to its limits, its certificate and factor; None beyond 1 + ``max_slow_down``."""
     c = 1.0
-    for _ in range(TRIES):
+    for _ in range(MAX_SLOW_DOWNS):
         slower = trajectory if c == 1.0 else trajectory.slowed(c)
         states = task.checker.states(slower)
         over = max((float(use.max()) - 1 for _, use in task.checker.peaks(states)), default=0.0)
-        if over <= SLACK:
+        if over <= TIME_SCALING_MARGIN:
             certificate = task.checker.check(slower, states)
             return (slower, certificate, c) if certificate.ok else None
         if task.duration is not None:
             return None
         step = task.checker.slow_down(states)
-        c *= step * (1 + SLACK) if step > 1 else 1 + 2 * over
-        if not c <= 1 + most:
+        c *= step * (1 + TIME_SCALING_MARGIN) if step > 1 else 1 + 2 * over
+        if not c <= 1 + max_slow_down:
             return None
     return None
 
 
-def _wider(
+def _refine_or_reserve(
     task: TimingTask, reserved: dict[str, Array], excess: dict[str, Array]
 ) -> tuple[TimingTask, dict[str, Array]]:
-    """Return a task with intervals halved where limits are exceeded much, and what to keep in reserve elsewhere."""
-    much = np.any([(share > SMALL_STEP).any(axis=1) for share in excess.values()], axis=0)
-    if task.intervals + much.sum() > 2 * MOST:
-        much[:] = False
-    copies, wider = 1 + much, {}
+    """Return a task with intervals halved where limits are exceeded most, and the reserved shares elsewhere."""
+    is_refined = np.any([(share > SMALL_STEP).any(axis=1) for share in excess.values()], axis=0)
+    if task.intervals + is_refined.sum() > 2 * MAX_INTERVALS:
+        is_refined[:] = False
+    copies, reserved_shares = 1 + is_refined, {}
     for what, share in excess.items():
-        # What is missed inside an interval falls with its length squared.
-        more = WIDER * share / np.where(much, 4, 1)[:, None]
-        total = np.minimum(task.shares(reserved, what, share.shape[1]) + more, MOST_RESERVED)
-        wider[what] = np.repeat(total, copies, axis=0)
-    return task.halved(much) if much.any() else task, wider
+        # The excess inside an interval is proportional to the square of its length.
+        more = MARGIN_FACTOR * share / np.where(is_refined, 4, 1)[:, None]
+        total = np.minimum(task.shares(reserved, what, share.shape[1]) + more, MAX_RESERVED_SHARE)
+        reserved_shares[what] = np.repeat(total, copies, axis=0)
+    return task.halved(is_refined) if is_refined.any() else task, reserved_shares
 
 
 def excesses(task: TimingTask, states: States, breaks: Array, ends: Array) -> dict[str, Array]:
-    """Return by what share each kind of limit is exceeded in each interval of the grid, shape (K, rows)."""
-    # Breaks of the path lie between those of the grid.
+    """Return the excess of each kind of limit in each interval, shape (K, rows), without unit (over the limit)."""
+    # Breaks of the trajectory lie between those of the grid.
     interval = np.clip(np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1, 0, task.intervals - 1)
     found = {}
     for what, use in task.checker.peaks(states):

@@ -1,4 +1,4 @@
-"""What is not linear in b = sd^2 along a path: objectives and constraints, written in its states as symbols."""
+"""Objectives and constraints along a path that are not linear in b = sd^2, as expressions in its states."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class PathPoint(Point):
-    """A state on a path as symbols: constraints and objectives are written in it as in any other."""
+    """A state on a path as symbols, in which constraints and objectives are written."""
 
     def __init__(self, description: Description, limits: Limits) -> None:
         import casadi
@@ -44,51 +44,51 @@ class PathPoint(Point):
 
     @cached_property
     def tool_acceleration(self) -> casadi.SX:
-        """Its acceleration, 3 x 1, m/s^2."""
+        """The acceleration of the tool's origin, 3 x 1, m/s^2."""
         return self._tool[1]
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What is not linear in b, written in a :class:`PathPoint`."""
+    """Terms that are not linear in b, as expressions in a :class:`PathPoint`."""
 
     description: Description
     objective: Objective
     constraints: tuple[Constraint, ...]
     torque: tuple[float, ...]
     velocity: tuple[float, ...]
-    """Limits, by which they are measured."""
+    """Velocity limits, which scale the terms, rad/s and m/s."""
 
     @classmethod
     def of(
         cls, description: Description, objective: Objective, constraints: tuple[Constraint, ...], limits: Limits
     ) -> Terms | None:
-        """Return an objective's and constraints' terms, None where all of them are linear."""
+        """Return the terms of an objective and of constraints, or None if all are linear."""
         if objective.only_time and not constraints:
             return None
         return cls(description, objective, constraints, tuple(limits.torque.tolist()), tuple(limits.velocity.tolist()))
 
     @cached_property
     def point(self) -> PathPoint:
-        """Their symbols."""
+        """The symbols of the terms."""
         limits = Limits.of(self.description, torque=self.torque, velocity=self.velocity)
         return PathPoint(self.description, limits)
 
     @cached_property
     def rows(self) -> list[casadi.SX]:
-        """Each constraint's rows."""
+        """The rows of each constraint, k x 1 each, without unit."""
         import casadi
 
         return [constraint.rows(self.point, casadi.SX(0, 1)) for constraint in self.constraints]
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """How many rows each constraint has."""
+        """The number of rows of each constraint."""
         return tuple(int(row.numel()) for row in self.rows)
 
     @cached_property
     def function(self) -> casadi.Function:
-        """From sdd, b, speed and a path's numbers to rows and the cost of each second."""
+        """Function of sdd, b, speed and a path's coefficients that returns the rows and the cost per second."""
         import casadi
 
         point = self.point

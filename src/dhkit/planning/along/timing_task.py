@@ -1,4 +1,4 @@
-"""What a motion along a path must keep, on a grid: bounds of the program's numbers and rows."""
+"""Task of one motion along a path on a grid, and the bounds of the program's variables and rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.planning.along.grid import even_speeds, knots_of
 from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.along.program import SMALLEST, TimingProgram, timing_program
+from dhkit.planning.along.program import MIN_SQUARED_SPEED, TimingProgram, timing_program
 from dhkit.planning.along.rows import TimingRows, speed_bounds, timing_rows, tool_speeds
 from dhkit.planning.along.terms import Terms
 from dhkit.planning.certificate import Checker
@@ -21,14 +21,14 @@ from dhkit.trajectories import JointPath, Limits, Trajectory
 
 QUICKEST = Objective.of("time")
 POINTS = 8
-"""States an interval by which a motion is certified: intervals are many."""
-ROOM = 0.5
-"""Share of the greatest speed at which a guess goes along its path."""
+"""Number of states in an interval for the certificate; few, because there are many intervals."""
+GUESS_SPEED_SHARE = 0.5
+"""Speed of the initial guess as a share of the largest possible."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimingTask:
-    """A path, what its motion must keep, and both on a grid."""
+    """A path with the limits and constraints of its motion, on a grid."""
 
     description: Description
     path: JointPath
@@ -37,12 +37,12 @@ class TimingTask:
     limits: Limits
     checker: Checker
     needs: dict[str, bool]
-    """What is asked of :class:`PathStates`."""
+    """Options of :class:`PathStates`."""
     states: PathStates
     rows: list[TimingRows]
     terms: Terms | None
     quickest_terms: Terms | None
-    """Those of the constraints alone."""
+    """Terms of the constraints alone."""
 
     @classmethod
     def of(
@@ -55,7 +55,7 @@ class TimingTask:
         constraints: tuple[Constraint, ...],
         intervals: int,
     ) -> TimingTask:
-        """Work a path out on a grid; there must be a motion along it, see ``checks.py``."""
+        """Evaluate a path on a grid; a motion along it must exist, see ``checks.py``."""
         needed = (objective.needs_torque, *(constraint.needs_torque for constraint in constraints))
         torque = any((*needed, *np.isfinite(limits.torque)))
         tool = any(isinstance(constraint, ToolSpeed | ToolAcceleration) for constraint in constraints)
@@ -74,36 +74,36 @@ class TimingTask:
 
     @property
     def intervals(self) -> int:
-        """Of the grid."""
+        """Number of intervals of the grid."""
         return len(self.states.steps)
 
     @property
     def knots(self) -> Array:
-        """Where the grid's intervals end, shape (K+1,)."""
+        """Path parameters (without unit) at the ends of intervals, shape (K+1,)."""
         return np.append(self.states.s[0], 1.0)
 
     @property
     def still(self) -> States:
-        """The arm at rest at the grid's ends of intervals."""
+        """The arm at rest at the ends of intervals."""
         q = self.states.q.reshape(-1, self.description.n)
         return States(self.description, self.states.s.ravel(), q, 0 * q, 0 * q)
 
     def shares(self, reserved: dict[str, Array], what: str, count: int) -> Array:
-        """Return what is kept in reserve of a limit in each interval, shape (K, count)."""
+        """Return the reserved shares (without unit) of a limit in each interval, shape (K, count)."""
         return reserved.get(what, np.zeros((self.intervals, count)))
 
     def largest_b(self, reserved: dict[str, Array]) -> Array:
-        """Return the bounds of b by limits of speed, shape (K+1,)."""
+        """Return the upper bounds of b by limits of speed, shape (K+1,), 1/s^2."""
         tools = [(tool, self.shares(reserved, tool.what, 1)) for tool in tool_speeds(self.checker.constraints)]
         return speed_bounds(self.states, self.limits, self.shares(reserved, "velocity", self.description.n), tools)
 
     @property
     def program(self) -> TimingProgram:
-        """The program that it asks for; made once."""
+        """The program of the task, built on first use."""
         return timing_program(self.intervals, sum(int(row.limited.sum()) for row in self.rows), self.terms)
 
     def halved(self, which: Array) -> TimingTask:
-        """Return the task on a grid some of whose intervals (K,) are halved."""
+        """Return the task on a grid with the intervals halved for which ``which`` (K,), whether to halve, is true."""
         middles = (self.knots[1:] + self.knots[:-1])[which] / 2
         knots = np.sort(np.concatenate([self.knots, middles]))
         states = PathStates.of(self.description, self.path, knots, **self.needs)
@@ -111,25 +111,25 @@ class TimingTask:
 
     @property
     def steps(self) -> list[TimingTask]:
-        """The tasks that are solved one after another: the quickest motion is where others start from."""
+        """Tasks that are solved in order: other objectives start from the fastest motion."""
         if self.objective.only_time and self.duration is None:
             return [self]
         return [replace(self, objective=QUICKEST, duration=None, terms=self.quickest_terms), self]
 
     def usual_duration(self) -> float:
-        """Return about how long the motion takes, s: that of b = beta 4 s (1 - s), pi / (2 sqrt beta)."""
+        """Return an estimate of the duration, s: pi / (2 sqrt beta) for b = 4 beta s (1 - s)."""
         shape = 4 * self.knots * (1 - self.knots)
         with np.errstate(divide="ignore"):
             beta = min(float(np.min(self.largest_b({}) / shape)), *(row.largest(shape) for row in self.rows))
-        return float(np.pi / (2 * np.sqrt(ROOM * beta)))
+        return float(np.pi / (2 * np.sqrt(GUESS_SPEED_SHARE * beta)))
 
     def b_bounds(self, reserved: dict[str, Array], unit: float) -> tuple[Array, Array]:
-        """Return the bounds of b at the knots inside, in units of a time, shape (K-1,)."""
-        high = np.maximum(self.largest_b(reserved)[1:-1] * unit**2, 2 * SMALLEST)
-        return np.full_like(high, SMALLEST), high
+        """Return the bounds of b at the inner knots, shape (K-1,), for a unit of time, s."""
+        high = np.maximum(self.largest_b(reserved)[1:-1] * unit**2, 2 * MIN_SQUARED_SPEED)
+        return np.full_like(high, MIN_SQUARED_SPEED), high
 
     def g_bounds(self, reserved: dict[str, Array]) -> tuple[Array, Array]:
-        """Return the bounds of the program's rows."""
+        """Return the lower and upper bounds of the program's rows, shape (rows,) each, without unit."""
         n = self.description.n
         linear = [row.bounds(self.shares(reserved, row.what, n)) for row in self.rows]
         parts = [[np.concatenate(side, axis=-1).ravel() for side in zip(*linear, strict=True)]]
@@ -142,13 +142,13 @@ class TimingTask:
                 low.append(-most if constraint.low == -1 else np.full_like(most, constraint.low))
             if high:
                 parts.append([np.concatenate(side, axis=-1).ravel() for side in (low, high)])
-        # In least time the intervals may as well take less than the duration, which keeps the program convex.
+        # For least time the intervals may take less than the duration, which keeps the program convex.
         parts.append([np.array([-np.inf if self.objective.only_time else 0.0]), np.zeros(1)])
         bounds = [np.concatenate(side) for side in zip(*parts, strict=True)]
         return bounds[0], bounds[1]
 
     def motion(self, b: Array) -> tuple[Trajectory, Array]:
-        """Return the motion with b at all knots, shape (K+1,), 1/s^2, and when its intervals end, likewise, s."""
+        """Return the motion with b at all knots, shape (K+1,), 1/s^2, and the times of its knots, shape (K+1,), s."""
         speed, steps = np.sqrt(b), self.states.steps
         sdd = (speed[1:] - speed[:-1]) * (speed[1:] + speed[:-1]) / (2 * steps)
         ends = np.concatenate([[0.0], np.cumsum(2 * steps / (speed[1:] + speed[:-1]))])

@@ -1,4 +1,4 @@
-"""Obstacles: what users write, capsules around links, exact distances, and smooth ones for an optimizer."""
+"""Obstacles: scenes, capsules around links, exact distances, and smooth distances for an optimizer."""
 
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.clearance import Distances, deficits, distance

@@ -1,4 +1,4 @@
-"""Capsules that contain what an arm's links look like."""
+"""Capsules that contain the shapes of an arm's links."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
 
-MOST = 2
-"""Capsules of a link, at most: each costs an optimizer some hundred operations a point."""
-HARDLY_LARGER = 1.25
-"""Two capsules become one whose volume is at most this multiple of both."""
-SIDES = 24
-"""Corners of the polygon around a cylinder's rim: 0.9 % wider than the rim."""
+MAX_CAPSULES = 2
+"""Largest number of capsules of a link: each costs an optimizer about a hundred operations at every point."""
+MERGE_RATIO = 1.25
+"""Largest ratio of volumes, of a common capsule over two capsules, with which the two are merged."""
+RIM_CORNERS = 24
+"""Number of corners of the polygon around a cylinder's rim, which is 0.9 % wider than the rim."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkCapsule:
-    """A cylinder with half balls on its ends that moves with a link; a ball where start and end coincide."""
+    """A cylinder with half balls on its ends that moves with a link; a ball if start and end coincide."""
 
     link: int
-    """The DH frame that it is fixed to: 0 (the base) to n."""
+    """Index of the DH frame it is fixed to: 0 (the base) to n."""
     start: Array
-    """Shape (3,), in that frame, m: the centre of the half ball at one end."""
+    """Centre of the half ball at one end, in that frame, shape (3,), m."""
     end: Array
-    """Shape (3,), likewise at the other."""
+    """Centre of the half ball at the other end, likewise."""
     radius: float
-    """m."""
+    """Radius, m."""
 
     @property
     def length(self) -> float:
-        """Of its axis, m."""
+        """Length of the axis, m."""
         return float(np.linalg.norm(self.end - self.start))
 
 
 def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
     """Return capsules that contain all that :func:`dhkit.model.shapes.link_parts` draws, at most two a link.
 
-    The solids of a link are gathered into two groups, those first whose common capsule is least larger than theirs;
-    into one where that is hardly larger.
+    The solids of a link are merged into two groups, beginning with the pair whose common capsule is least larger than
+    their own; into one group if its capsule is hardly larger.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
 
 
 def world_axes(description: Description, q: ArrayLike) -> Array:
-    """Return the ends of the axes of an arm's m capsules in the world.
+    """Return the ends of the axes of an arm's m capsules, in the world.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def world_axes(description: Description, q: ArrayLike) -> Array:
     Returns
     -------
     Array
-        Shape (..., m, 2, 3): start and end, m. NaN where q is not finite.
+        Start and end of each axis, shape (..., m, 2, 3), m. NaN where q is not finite.
     """
     capsules = link_capsules(description)
     frames = world_to_frames(description, q)[..., [capsule.link for capsule in capsules], :, :]
@@ -90,7 +90,7 @@ def _link_capsules(description: Description, mesh_folder: Path | None) -> tuple[
         parts.setdefault(part.link, []).append(_balls(part))
     capsules = []
     for link, groups in sorted(parts.items()):
-        for group in _gathered(groups):
+        for group in _merge_groups(groups):
             fit = refine(group)
             for end in (fit.start, fit.end):
                 end.setflags(write=False)
@@ -98,26 +98,26 @@ def _link_capsules(description: Description, mesh_folder: Path | None) -> tuple[
     return tuple(capsules)
 
 
-def _gathered(groups: list[Balls]) -> list[Balls]:
-    """Return few groups of a link's solids: pairs whose capsule is least larger than their own become one."""
+def _merge_groups(groups: list[Balls]) -> list[Balls]:
+    """Return at most ``MAX_CAPSULES`` groups of a link's solids; pairs with the least additional volume are merged."""
     volumes: dict[frozenset[int], float] = {}
 
     def volume(members: frozenset[int]) -> float:
         if members not in volumes:
-            volumes[members] = enclose(_joined(groups, members)).volume
+            volumes[members] = enclose(_merge(groups, members)).volume
         return volumes[members]
 
     sets = [frozenset([i]) for i in range(len(groups))]
     while len(sets) > 1:
         pairs = list(combinations(sets, 2))
         first, second = min(pairs, key=lambda pair: volume(pair[0] | pair[1]) - volume(pair[0]) - volume(pair[1]))
-        if len(sets) <= MOST and volume(first | second) > HARDLY_LARGER * (volume(first) + volume(second)):
+        if len(sets) <= MAX_CAPSULES and volume(first | second) > MERGE_RATIO * (volume(first) + volume(second)):
             break
         sets = [members for members in sets if members not in (first, second)] + [first | second]
-    return [_joined(groups, members) for members in sets]
+    return [_merge(groups, members) for members in sets]
 
 
-def _joined(groups: list[Balls], members: frozenset[int]) -> Balls:
+def _merge(groups: list[Balls], members: frozenset[int]) -> Balls:
     return Balls(
         np.concatenate([groups[i].centres for i in sorted(members)]),
         np.concatenate([groups[i].radii for i in sorted(members)]),
@@ -125,7 +125,7 @@ def _joined(groups: list[Balls], members: frozenset[int]) -> Balls:
 
 
 def _balls(part: Part) -> Balls:
-    """Return balls in the link's frame whose hull contains a part."""
+    """Return balls in the link's frame whose convex hull contains a part."""
     match part.geometry:
         case Sphere(radius):
             local, radii = np.zeros((1, 3)), float(radius)
@@ -144,9 +144,9 @@ def _balls(part: Part) -> Balls:
 
 def _rims(radius: float, length: float) -> Array:
     """Return the corners of polygons around a cylinder's two rims."""
-    angles = 2 * np.pi * np.arange(SIDES) / SIDES
-    x, y = np.array([np.cos(angles), np.sin(angles)]) * radius / np.cos(np.pi / SIDES)
-    return np.concatenate([np.stack([x, y, np.full(SIDES, z)], axis=1) for z in (-length / 2, length / 2)])
+    angles = 2 * np.pi * np.arange(RIM_CORNERS) / RIM_CORNERS
+    x, y = np.array([np.cos(angles), np.sin(angles)]) * radius / np.cos(np.pi / RIM_CORNERS)
+    return np.concatenate([np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)])
 
 
 def _hull(part: Part) -> Array:

@@ -1,4 +1,4 @@
-"""How far an arm is from what it must not touch, exactly."""
+"""Exact distances of an arm from obstacles, and between its links."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_dista
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
 ROUNDING = 1e-7
-"""Bounds that are this near each other, m, count as equal: coal's answers are good to about 1e-9."""
+"""Difference of bounds (m) that counts as equal: coal's distances are accurate to about 1e-9."""
 
 Nearest = tuple[Array, NDArray[np.int_]]
-"""Smallest distances, shape (N,), m, and which of the candidates has each."""
+"""Smallest distances, shape (N,), m, and the index of the candidate of each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """How far the links of an arm, as capsules, are from obstacles and from each other."""
+    """Distances of the capsules around an arm's links from obstacles and from each other."""
 
     distance: Array
-    """Shape (...): the smallest, m; negative where something is penetrated, inf where there is nothing to check."""
+    """Smallest distance, shape (...), m; negative in a penetration, inf if there is nothing to check."""
     pair: tuple[str, str] | None
-    """What is closest in the worst state: a link and an obstacle, or two links; None if there is no such state."""
+    """Names of the closest pair in the worst state: a link and an obstacle, or two links; None without a state."""
     per_obstacle: Array
-    """Shape (..., K), m: the smallest distance from each obstacle, in the order given."""
+    """Smallest distance from each obstacle, in the given order, shape (..., K), m."""
     itself: Array
-    """Shape (...), m: the smallest distance between two links; inf if it was not asked for."""
+    """Smallest distance between two links, shape (...), m; inf unless requested."""
 
     def __repr__(self) -> str:
         if self.pair is None:
@@ -48,22 +48,22 @@ class Distances:
 def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
     """Return exact distances of an arm's capsules from obstacles, and from each other.
 
-    What motion cannot change is left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base above
-    all, and the foot of an arm that stands on the floor.
+    Pairs whose distance does not change in any motion are left out, see
+    :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base, for example, and the foot of an arm on the floor.
 
     Parameters
     ----------
     q
         Joint values, shape (..., n), rad and m.
     obstacles
-        K obstacles, one of them may be a :class:`Floor`.
+        K obstacles, of which at most one is a :class:`Floor`.
     self_collision
-        Whether distances between links count.
+        Whether distances between links are included.
 
     Returns
     -------
     Distances
-        NaN where q is not finite.
+        Distances of shape (...), m; NaN where q is not finite.
 
     Raises
     ------
@@ -113,23 +113,24 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
 def deficits(
     description: Description, q: ArrayLike, obstacles: Scene, clearance: float, self_collision: bool = False
 ) -> Array:
-    """Return by how much a path's gaps are short of a clearance.
+    """Return the largest shortfalls of a path's distances from a clearance.
 
     Parameters
     ----------
     q
-        The path's states, shape (..., n), rad and m: dense.
+        Dense states of the path, shape (..., n), rad and m.
     obstacles
         K obstacles.
     clearance
-        What is asked for, m.
+        Required distance, m.
     self_collision
-        Whether gaps between links count.
+        Whether distances between links are included.
 
     Returns
     -------
     Array
-        Shape (K,), or (K + 1,) with that between links last, m; 0 where nothing is short, NaN for a path with NaN.
+        Shortfalls, shape (K,), or (K + 1,) with that between links last, m; 0 for a kept clearance, NaN for a path with
+        NaN.
     """
     found = distance(description, q, obstacles, self_collision)
     gaps = found.per_obstacle.reshape(-1, len(obstacles))
@@ -142,7 +143,7 @@ def deficits(
 def _from_one(
     description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
 ) -> Nearest:
-    """Return the distances from one obstacle; candidates are those of :func:`_pair_names`."""
+    """Return the distances from one obstacle; the candidates are those of :func:`_pair_names`."""
     pairs = checked_pairs(description)
     if isinstance(obstacle, Floor):
         heights = [axes[:, i, end, 2] - capsules[i].radius - obstacle.height for i, end in pairs.heights]
@@ -154,7 +155,7 @@ def _from_one(
 
 
 def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:
-    """Return the distances between links; candidates are the pairs."""
+    """Return the distances between links; the candidates are the pairs."""
     first, second = [i for i, _ in pairs], [j for _, j in pairs]
     radii = [(capsules[i].radius, capsules[j].radius) for i, j in pairs]
     gaps = segment_distances(axes[:, first], axes[:, second]) - np.array(radii).reshape(-1, 2).sum(axis=1)
@@ -164,7 +165,7 @@ def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tu
 
 
 def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) -> Nearest:
-    """Return the smallest of candidates' distances, measured where their bounds, shape (N, m), leave them a chance."""
+    """Return the smallest distances, measured for candidates that their bounds, shape (N, m), do not exclude."""
     low, high = bounds
     distances = np.full(low.shape, np.inf)
     least = np.min(high, axis=1, initial=np.inf)

@@ -1,4 +1,4 @@
-"""A small capsule around balls: what bounds a link's solids."""
+"""Small capsules around balls, for bounding the solids of a link."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from dhkit.description import Array
 from dhkit.planning.obstacles.scene import rotations_onto
 
 RADII = np.concatenate([[1.0], 1 + np.geomspace(2e-3, 0.5, 13)])
-"""Tried radii, of the smallest about an axis: a wider capsule may be so much shorter that it is smaller."""
-WORTH = 0.98
-"""A tilted axis must save this share of the volume: symmetric links keep their axes."""
+"""Radii tried about an axis, relative to the smallest possible: a wider capsule may be shorter and smaller."""
+TILT_RATIO = 0.98
+"""Largest ratio of volumes with which a tilted axis replaces one of symmetry."""
 
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Balls whose convex hull is to be enclosed; points are balls of radius 0."""
+    """Balls whose convex hull is enclosed; points are balls of radius 0."""
 
     centres: Array
-    """Shape (N, 3), m."""
+    """Centres, shape (N, 3), m."""
     radii: Array
-    """Shape (N,), m."""
+    """Radii, shape (N,), m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """A capsule."""
+    """A capsule around balls."""
 
     start: Array
-    """Shape (3,), m."""
+    """Centre of one half ball, shape (3,), m."""
     end: Array
     radius: float
 
     @property
     def volume(self) -> float:
-        """In m^3."""
+        """Volume, m^3."""
         length = float(np.linalg.norm(self.end - self.start))
         return float(np.pi * self.radius**2 * (length + 4 / 3 * self.radius))
 
@@ -44,13 +44,13 @@ class Enclosure:
 def enclose(balls: Balls) -> Enclosure:
     """Return a small capsule around balls, along a principal or a coordinate axis through the middle of their extent.
 
-    A capsule is convex, so it contains the hull of balls that it contains.
+    A capsule is convex, so it contains the convex hull of the balls that it contains.
     """
     return min((_about(balls, R, _middle(balls, R)) for R in _candidates(balls)), key=lambda c: c.volume)
 
 
 def refine(balls: Balls) -> Enclosure:
-    """Return a smaller capsule around balls than :func:`enclose` does, where a tilt of its axis is worth it."""
+    """Return the capsule of :func:`enclose`, or a smaller one with a tilted axis."""
     from scipy.optimize import minimize
 
     ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R, _middle(balls, R)).volume)
@@ -71,7 +71,7 @@ def refine(balls: Balls) -> Enclosure:
         options={"initial_simplex": steps, "maxfev": 120, "xatol": 1e-4, "fatol": 0.0},
     )
     other = tilted(found.x)
-    return other if other.volume < WORTH * best.volume else best
+    return other if other.volume < TILT_RATIO * best.volume else best
 
 
 def _candidates(balls: Balls) -> list[Array]:
@@ -79,7 +79,7 @@ def _candidates(balls: Balls) -> list[Array]:
     centred = balls.centres - balls.centres.mean(axis=0)
     principal = np.linalg.svd(centred, full_matrices=False)[2] if len(centred) > 2 else np.eye(3)
     axes = [*np.eye(3), *principal]
-    # The longest way through a pair of thin, oblique solids is none of the principal axes.
+    # The longest direction of a pair of thin, oblique solids is not a principal axis.
     far = balls.centres[np.argmax(np.linalg.norm(centred, axis=1))]
     along = balls.centres[np.argmax(np.linalg.norm(balls.centres - far, axis=1))] - far
     if np.linalg.norm(along) > 0:

@@ -1,4 +1,4 @@
-"""Which of an arm's capsules are worth checking against what."""
+"""Pairs of capsules and obstacles that are checked for an arm."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.segments import segment_distances
 
 SAMPLES = 4000
-"""Random configurations that the choice is made from."""
+"""Number of random configurations from which the pairs are chosen."""
 SEED = 0
-STILL = 1e-3
-"""A distance that changes by less than this in all of them, m, is taken not to change."""
-MOSTLY = 0.4
-"""Two capsules that overlap in more than this share of them are neighbours, or too crude for their links."""
-FAR = 0.05
-"""Two capsules that never come this near, of the reach, cost an optimizer more than they are worth."""
+CONSTANT_DISTANCE = 1e-3
+"""Largest change of a distance over all configurations (m) with which it counts as constant."""
+OVERLAP_SHARE = 0.4
+"""Share of configurations with an overlap from which two capsules are not checked: neighbours, or crude capsules."""
+NEAR_SHARE = 0.05
+"""Smallest distance over all configurations, as a share of the reach, beyond which an optimizer ignores a pair."""
 
 
 @dataclass(frozen=True)
 class CheckedPairs:
-    """What is checked, as indices of ``link_capsules(description)``; what motion cannot change is left out.
+    """Checked pairs, as indices of ``link_capsules(description)``, without those whose distance cannot change.
 
-    Decided in 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way):
+    Determined from 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way):
 
     - obstacles: capsules with an end that travels by more than the radius, along some axis of the world; so never the
-      base's, nor a shoulder that turns about itself: what touches these, no motion mends;
-    - floor: ends that rise and fall by more than the radius: an arm may stand on the floor, close above or in it;
-    - itself: capsules of links that do not meet in a joint, unless their distance does not change or they overlap in
+      base's, nor a shoulder's that turns about its own axis: no motion changes their distances;
+    - floor: ends whose height changes by more than the radius: an arm may stand on the floor, close above it or in it;
+    - itself: capsules of links that no joint connects, unless their distance does not change or they overlap in
       more than 40 % of the configurations, as those of a spherical wrist do, or of a slider and its bar.
     """
 
     moving: tuple[int, ...]
-    """Capsules that are checked against obstacles."""
+    """Indices of capsules that are checked against obstacles."""
     heights: tuple[tuple[int, int], ...]
-    """A capsule and which of its ends (0 or 1) is checked against the floor."""
+    """Capsules and their ends (0 or 1) that are checked against the floor."""
     itself: tuple[tuple[int, int], ...]
     """Pairs of capsules that are checked against each other."""
     near: tuple[tuple[int, int], ...]
-    """Those of them that came nearer than 5 % of the reach: what an optimizer looks at."""
+    """The pairs of ``itself`` that came nearer than 5 % of the reach, which an optimizer includes."""
 
 
 def checked_pairs(description: Description) -> CheckedPairs:
-    """Return what is checked for an arm."""
+    """Return the checked pairs of an arm."""
     return _checked_pairs(description, description.mesh_folder)
 
 
@@ -61,12 +61,14 @@ def _checked_pairs(description: Description, mesh_folder: Path | None) -> Checke
     heights = np.argwhere(travels[:, :, 2] > radii[:, None]).tolist()
     apart = [(i, j) for i, j in combinations(range(len(capsules)), 2) if capsules[j].link - capsules[i].link > 1]
     gaps = {(i, j): segment_distances(axes[:, i], axes[:, j]) - radii[i] - radii[j] for i, j in apart}
-    itself = [pair for pair, gap in gaps.items() if np.ptp(gap) > STILL and np.mean(gap < 0) <= MOSTLY]
+    itself = [
+        pair for pair, gap in gaps.items() if np.ptp(gap) > CONSTANT_DISTANCE and np.mean(gap < 0) <= OVERLAP_SHARE
+    ]
     return CheckedPairs(
         moving=tuple(int(i) for i in np.flatnonzero(travels.max(axis=(1, 2)) > radii)),
         heights=tuple((i, end) for i, end in heights),
         itself=tuple(itself),
-        near=tuple(pair for pair in itself if gaps[pair].min() < FAR * description.reach),
+        near=tuple(pair for pair in itself if gaps[pair].min() < NEAR_SHARE * description.reach),
     )
 
 

@@ -1,4 +1,4 @@
-"""What an arm must not touch: boxes, spheres and capsules in the world, and the floor."""
+"""Obstacles in the world: boxes, spheres, capsules and a floor."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from dhkit.display import listed, repr_line, value_line
 from dhkit.expressions import exact
 
 Solid: TypeAlias = Box | Sphere | Capsule
-"""What an obstacle may be."""
+"""Shape of an obstacle."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A solid that stands still in the world.
+    """A solid at rest in the world.
 
-    Made by :meth:`box`, :meth:`sphere` or :meth:`capsule`.
+    Created by :meth:`box`, :meth:`sphere` or :meth:`capsule`.
 
     Examples
     --------
@@ -36,9 +36,9 @@ class Obstacle:
     """
 
     geometry: Solid
-    """Sizes in m; a capsule lies along z, centred."""
+    """Shape with sizes in m; a capsule lies along z, centred."""
     placement: tuple[tuple[float, ...], ...]
-    """The solid in the world: the rows of the 4x4 matrix."""
+    """Pose in the world, rows of the 4x4 matrix, m."""
     name: str
 
     @classmethod
@@ -48,11 +48,11 @@ class Obstacle:
         Parameters
         ----------
         size
-            Its edges, shape (3,), m.
+            Lengths of the edges, shape (3,), m.
         at
-            Its pose in the world, shape (4, 4), or its centre's position, shape (3,), m.
+            Pose in the world, shape (4, 4), or position of the centre, shape (3,), m.
         name
-            What reports call it.
+            Name in reports.
 
         Raises
         ------
@@ -77,11 +77,11 @@ class Obstacle:
         Parameters
         ----------
         radius
-            m.
+            Radius, m.
         centre
-            In the world, shape (3,), m.
+            Position in the world, shape (3,), m.
         name
-            What reports call it.
+            Name in reports.
 
         Raises
         ------
@@ -102,11 +102,11 @@ class Obstacle:
         Parameters
         ----------
         radius
-            m.
+            Radius, m.
         start, end
-            The ends of its axis, the half balls' centres, in the world, shape (3,), m.
+            Ends of the axis, which are the centres of the half balls, in the world, shape (3,), m.
         name
-            What reports call it.
+            Name in reports.
 
         Raises
         ------
@@ -137,17 +137,17 @@ class Obstacle:
 
     @cached_property
     def T_world_obstacle(self) -> Array:
-        """The solid in the world, shape (4, 4), m."""
+        """Pose in the world, shape (4, 4), m."""
         return _frozen(np.array(self.placement))
 
     @cached_property
     def centre(self) -> Array:
-        """Its middle in the world, shape (3,), m."""
+        """Centre in the world, shape (3,), m."""
         return _frozen(self.T_world_obstacle[:3, 3].copy())
 
     @cached_property
     def half_sizes(self) -> Array:
-        """Half the edges of a box, of what a sphere or a capsule is around: shape (3,), m; zeros for a sphere."""
+        """Half the edges of the box around which the solid is rounded, shape (3,), m; zeros for a sphere."""
         match self.geometry:
             case Box(size):
                 return _frozen(np.array([float(edge) for edge in size]) / 2)
@@ -157,7 +157,7 @@ class Obstacle:
 
     @property
     def radius(self) -> float:
-        """How far the surface is from the box, segment or point inside, m: 0 for a box."""
+        """Distance of the surface from the box, segment or point inside, m: 0 for a box."""
         return 0.0 if isinstance(self.geometry, Box) else float(self.geometry.radius)
 
     @cached_property
@@ -169,7 +169,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Floor:
-    """A level floor: everything below ``height`` is forbidden to the links that can get there.
+    """A horizontal floor: the links that can reach below ``height`` must stay above it.
 
     Raises
     ------
@@ -178,7 +178,7 @@ class Floor:
     """
 
     height: float = 0.0
-    """World z, m."""
+    """Height, world z, m."""
     name: str = "floor"
 
     def __post_init__(self) -> None:
@@ -191,7 +191,7 @@ class Floor:
 
 
 Scene: TypeAlias = Sequence[Obstacle | Floor]
-"""What is in an arm's way, one floor at most."""
+"""Obstacles of an arm, with at most one floor."""
 
 
 def check_obstacles(obstacles: Scene) -> tuple[Obstacle | Floor, ...]:
@@ -217,7 +217,7 @@ def check_obstacles(obstacles: Scene) -> tuple[Obstacle | Floor, ...]:
 
 def rotations_onto(directions: Array) -> Array:
     """Return rotations whose third columns are unit vectors: shape (..., 3) to (..., 3, 3)."""
-    # Any second direction will do; the one furthest from the first is never parallel to it.
+    # Any second direction serves; the coordinate axis farthest from the first is never parallel to it.
     helper = np.eye(3)[np.argmin(np.abs(directions), axis=-1)]
     x = np.cross(helper, directions)
     x /= np.linalg.norm(x, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Distances of points and segments in closed form: bounds that say where an exact distance is worth its time."""
+"""Distances of points and segments in closed form, as bounds that exclude pairs before exact distances."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dhkit.description import Array, Box
 from dhkit.planning.obstacles.scene import Obstacle
 
 POINTS = 9
-"""Of an axis, at which the distance to a box is taken for its bounds."""
+"""Number of points of an axis at which its distance from a box is bounded."""
 
-NOTHING = 1e-15
-"""A squared length, m^2, or a squared length times that of a sine, below which there is no direction."""
+ZERO = 1e-15
+"""Squared length (m^2), or that times a squared sine, below which a direction is undefined."""
 
 Bounds = tuple[Array, Array]
-"""What a distance is at least and at most, each of shape (...), m."""
+"""Lower and upper bounds of a distance, shape (...) each, m."""
 
 
 def segment_distances(first: Array, second: Array) -> Array:
@@ -23,12 +23,12 @@ def segment_distances(first: Array, second: Array) -> Array:
     Parameters
     ----------
     first, second
-        Their ends, shape (..., 2, 3), m; batch axes are broadcast. Ends may coincide.
+        Ends of the segments, shape (..., 2, 3), m; batch axes are broadcast. Ends may coincide.
 
     Returns
     -------
     Array
-        Shape (...), m.
+        Distances, shape (...), m.
     """
     p, d1 = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
     other, d2 = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
@@ -43,7 +43,7 @@ def segment_distances(first: Array, second: Array) -> Array:
 
 
 def axis_bounds(obstacle: Obstacle, axes: Array) -> Bounds:
-    """Return bounds of the signed distance from segments, shape (..., 2, 3), to an obstacle."""
+    """Return bounds of the signed distances of segments, shape (..., 2, 3), m, from an obstacle."""
     if isinstance(obstacle.geometry, Box):
         return _box_bounds(obstacle, axes)
     distance = segment_distances(axes, obstacle.axis) - obstacle.radius
@@ -59,13 +59,13 @@ def _box_bounds(obstacle: Obstacle, axes: Array) -> Bounds:
     signed = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
     length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
     least = signed.min(axis=-1)
-    # No point of the segment is further from a taken one than half a step; a segment that is partly inside can only
-    # be bounded by the ball around its middle, since it may have to move its own length to get out.
+    # No point of the segment is farther than half a step from a sampled point. A segment that is partly inside is
+    # bounded only by the ball around its middle, since it may have to move its own length to get out.
     outside = least - length / (2 * (POINTS - 1))
     return np.where(outside > 0, outside, signed[..., POINTS // 2] - length / 2), least
 
 
 def _quotient(numerator: Array, denominator: Array) -> Array:
-    """Return a quotient, 0 where the denominator is."""
-    quotient: Array = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > NOTHING)
+    """Return a quotient, 0 where the denominator is 0."""
+    quotient: Array = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > ZERO)
     return quotient

@@ -1,4 +1,4 @@
-"""Room for obstacles in a program that is built once: which numbers stand for a scene."""
+"""Slots for obstacles in a program that is built once, and their parameters for a scene."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from dhkit.description.arrays import number_array
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 
 CAPSULE, BOX, FLOOR, ITSELF = 7, 16, 2, 1
-"""Parameters of a slot: start (3), end - start (3), radius and margin; R_box_world (9, by rows), centre (3), half
-sizes (3), margin; height, margin; margin."""
+"""Numbers of parameters of a slot. Capsule: start (3), end - start (3), radius plus margin; box: R_box_world (9, by
+rows), centre (3), half sizes (3), margin; floor: height, margin; links: margin."""
 PARKED = (0.0, 0.0, -100.0)
-"""Where unused slots are, m: too far for any arm, near enough for the values to keep ten digits."""
-UNUSED = 0.1
-"""Radius or half size of what is parked, m."""
+"""Position of obstacles in unused slots, m: too far for any arm, near enough for ten correct digits."""
+PARKED_SIZE = 0.1
+"""Radius or half size of obstacles in unused slots, m."""
 
 
 @dataclass(frozen=True)
 class SceneSlots:
-    """How many obstacles a built program has room for; spheres are capsules without length.
+    """Numbers of obstacle slots of a program; spheres are capsules of length 0.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class SceneSlots:
 
     @classmethod
     def of(cls, obstacles: Scene, self_collision: bool = False) -> SceneSlots:
-        """Return just enough room for a scene."""
+        """Return the fewest slots for a scene."""
         boxes = sum(isinstance(item, Obstacle) and isinstance(item.geometry, Box) for item in obstacles)
         floors = sum(isinstance(item, Floor) for item in check_obstacles(obstacles))
         return cls(len(obstacles) - boxes - floors, boxes, floors > 0, self_collision)
@@ -62,32 +62,32 @@ class SceneSlots:
         return CAPSULE * self.capsules + BOX * self.boxes + FLOOR * self.floor + ITSELF * self.self_collision
 
     def fits(self, obstacles: Scene) -> bool:
-        """Return whether there is room for a scene."""
+        """Return whether a scene has no more obstacles than slots."""
         need = SceneSlots.of(obstacles)
         return need.capsules <= self.capsules and need.boxes <= self.boxes and need.floor <= self.floor
 
     def values(self, obstacles: Scene, clearance: float = 0.0, inflation: ArrayLike = 0.0) -> Array:
-        """Return the parameters' values for a scene.
+        """Return the parameters for a scene.
 
         Parameters
         ----------
         obstacles
             K obstacles, in the order of :func:`dhkit.planning.obstacles.deficits`.
         clearance
-            How far the links are to stay away, from each other too, m.
+            Smallest distance of the links from obstacles and from each other, m.
         inflation
-            What is added to the clearance of each, m: a number, or shape (K,), or (K + 1,) with that between links
-            last.
+            Addition to the clearance from each obstacle, m: a number, or shape (K,), or (K + 1,) with that between
+            links last.
 
         Returns
         -------
         Array
-            Shape (size,). Unused slots are far away, an unused floor is far below.
+            Parameters, shape (size,). Obstacles in unused slots are far away, an unused floor far below.
 
         Raises
         ------
         ValueError
-            There is no room for the scene, or another number of inflations.
+            More obstacles than slots, or another number of inflations.
         """
         obstacles = check_obstacles(obstacles)
         if not self.fits(obstacles):
@@ -101,7 +101,7 @@ class SceneSlots:
             else:
                 is_box = isinstance(item.geometry, Box)
                 solids[is_box].append(_box(item, margin) if is_box else _capsule(item, margin))
-        parked = Obstacle.sphere(UNUSED, PARKED), Obstacle.box((2 * UNUSED,) * 3, PARKED)
+        parked = Obstacle.sphere(PARKED_SIZE, PARKED), Obstacle.box((2 * PARKED_SIZE,) * 3, PARKED)
         capsules = solids[False] + [_capsule(parked[0], 0.0)] * (self.capsules - len(solids[False]))
         boxes = solids[True] + [_box(parked[1], 0.0)] * (self.boxes - len(solids[True]))
         rest = [floor] * self.floor + [margins[-1:]] * self.self_collision
@@ -116,7 +116,7 @@ class SceneSlots:
 
 
 def starts(slots: SceneSlots) -> tuple[Iterator[int], Iterator[int], int, int]:
-    """Return where the parameters of capsules, of boxes, of the floor and of the links begin."""
+    """Return the offsets of the parameters of capsules, boxes, the floor and the links."""
     boxes = CAPSULE * slots.capsules
     floor = boxes + BOX * slots.boxes
     return iter(range(0, boxes, CAPSULE)), iter(range(boxes, floor, BOX)), floor, floor + FLOOR * slots.floor

@@ -1,6 +1,6 @@
 """Distances from obstacles as smooth CasADi expressions, for an optimizer.
 
-Smoothing makes a distance differentiable, not safe: a path is checked with :func:`dhkit.planning.obstacles.distance`.
+Smoothing makes distances differentiable and inexact: a path is checked with :func:`dhkit.planning.obstacles.distance`.
 """
 
 from __future__ import annotations
@@ -19,39 +19,40 @@ from dhkit.symbolic.differentiable.frames import SymbolicTable
 if TYPE_CHECKING:
     import casadi
 
-CLAMP = 1e-2
-"""Where a share of a segment is kept in [0, 1], how wide the bends at 0 and 1 are."""
-EDGE = 1e-2
-"""How wide the bends of a box's distance are, m: at a distance r they add about EDGE^2 / r, 1 mm at 10 cm."""
+CLAMP_WIDTH = 1e-2
+"""Width of the smooth transitions at 0 and 1, where a parameter of a segment is clamped to [0, 1]."""
+EDGE_WIDTH = 1e-2
+"""Width of the smooth transitions in the distance from a box, m. At a distance r they add about EDGE_WIDTH^2 / r: 1 mm
+at 10 cm."""
 PARALLEL = 1e-6
-"""Added to the squared area between two segments' directions, m^4: parallel ones have none."""
+"""Addition to the squared area between two segments' directions, m^4, which is 0 for parallel ones."""
 POINT = 1e-8
-"""Added to a segment's squared length, m^2: a sphere has none."""
-ROUNDING = 1e-12
-"""What is less than this, m, is nothing."""
-SAG = 1e-2
-"""How much nearer to a box an axis may be than the points that stand for it, m."""
+"""Addition to a segment's squared length, m^2, which is 0 for a sphere."""
+ZERO = 1e-12
+"""Coordinate (m) below which a value counts as 0."""
+MAX_SAG = 1e-2
+"""Largest amount by which an axis may be nearer to a box than the points that represent it, m."""
 
 
 def clearances(description: Description, q: casadi.SX, parameters: casadi.SX, slots: SceneSlots) -> casadi.SX:
-    """Return how clear an arm is of obstacles, each at least 1 where it is.
+    """Return the clearances of an arm from obstacles, each at least 1 if the clearance is kept.
 
     Parameters
     ----------
     q
         Joint values, n x 1, rad and m.
     parameters
-        size x 1, see :meth:`SceneSlots.values`.
+        Parameters of the slots, size x 1, see :meth:`SceneSlots.values`.
     slots
-        What there is room for.
+        The slots of the program.
 
     Returns
     -------
     casadi.SX
-        k x 1, dimensionless: of each capsule slot for each capsule of the arm that moves; of each box slot for each of
-        a few points of these; of the floor for each end that rises and falls; of each pair of capsules of the arm that
-        may meet. Between two capsules the squared distance of their axes over the squared sum of radii and margin;
-        from a box and the floor the axis's signed distance over radius and margin.
+        k x 1, dimensionless: for each capsule slot and moving capsule of the arm; for each box slot and some points of
+        these capsules; for the floor and each end whose height changes; for each pair of capsules of the arm that may
+        meet. Between two capsules, the squared distance of their axes over the squared sum of radii and margin; from a
+        box or the floor, the axis's signed distance over the sum of radius and margin.
 
     Examples
     --------
@@ -88,18 +89,18 @@ def clearances(description: Description, q: casadi.SX, parameters: casadi.SX, sl
 
 @dataclass(frozen=True, eq=False)
 class _Axis:
-    """The axis of a capsule in the world, expressions or numbers."""
+    """Axis of a capsule in the world, as expressions or numbers."""
 
     start: Any
-    """3 x 1, m."""
+    """Position of the start, 3 x 1, m."""
     along: Any
-    """From the start to the end, 3 x 1, m."""
+    """Vector from the start to the end, 3 x 1, m."""
     square: Any
-    """Of its length, m^2."""
+    """Squared length, m^2."""
     radius: Any
-    """m."""
+    """Radius of the capsule, m."""
     shares: tuple[float, ...] = ()
-    """Where its points for boxes are, 0 at the start, 1 at the end."""
+    """Positions of the points for boxes, from 0 at the start to 1 at the end."""
 
 
 def _world_axes(description: Description, q: casadi.SX) -> list[_Axis]:
@@ -113,19 +114,19 @@ def _world_axes(description: Description, q: casadi.SX) -> list[_Axis]:
 
 
 def _between(first: _Axis, second: _Axis, margin: Any) -> casadi.SX:
-    """Return the squared distance of two segments over the squared radii.
+    """Return the squared distance of two segments over the squared sum of radii and margin.
 
-    The points are those of Ericson, Real-Time Collision Detection, 2005, section 5.1.9, with smooth clamps: on the
-    segments always, so that the distance errs upwards alone.
+    The points are those of Ericson, Real-Time Collision Detection, 2005, section 5.1.9, with smooth clamps. They are
+    always on the segments, so that the distance can only be too large.
     """
     import casadi
 
     d1, d2, r = first.along, second.along, first.start - second.start
     a, b, e = first.square, casadi.dot(d1, d2), second.square
     c, f = casadi.dot(d1, r), casadi.dot(d2, r)
-    s = _clamped((b * f - c * e) / (a * e - b * b + PARALLEL))
-    t = _clamped((b * s + f) / (e + POINT))
-    s = _clamped((b * t - c) / (a + POINT))
+    s = _smooth_clamp((b * f - c * e) / (a * e - b * b + PARALLEL))
+    t = _smooth_clamp((b * s + f) / (e + POINT))
+    s = _smooth_clamp((b * t - c) / (a + POINT))
     share: casadi.SX = casadi.sumsqr(r + s * d1 - t * d2) / (first.radius + second.radius + margin) ** 2
     return share
 
@@ -143,48 +144,48 @@ def _from_box(axis: _Axis, slot: casadi.SX) -> list[casadi.SX]:
 def _signed_distance(point: casadi.SX, half: casadi.SX) -> casadi.SX:
     """Return a point's smooth signed distance from a box in the box's frame, m.
 
-    Outside that is the length of the excess over its half sizes, inside the largest excess: one of the two is nearly 0,
+    Outside it is the length of the excess over the half sizes, inside the largest excess. One of the two is nearly 0,
     and their sum has a gradient everywhere.
     """
     import casadi
 
-    excess = casadi.sqrt(point**2 + EDGE**2) - half
-    beyond = (excess + casadi.sqrt(excess**2 + EDGE**2)) / 2
+    excess = casadi.sqrt(point**2 + EDGE_WIDTH**2) - half
+    beyond = (excess + casadi.sqrt(excess**2 + EDGE_WIDTH**2)) / 2
     x, y, z = casadi.vertsplit(excess)
-    inside = _larger(_larger(x, y), z)
-    signed: casadi.SX = casadi.sqrt(casadi.sumsqr(beyond)) + (inside - casadi.sqrt(inside**2 + EDGE**2)) / 2
+    inside = _smooth_maximum(_smooth_maximum(x, y), z)
+    signed: casadi.SX = casadi.sqrt(casadi.sumsqr(beyond)) + (inside - casadi.sqrt(inside**2 + EDGE_WIDTH**2)) / 2
     return signed
 
 
 def _shares(capsule: LinkCapsule) -> tuple[float, ...]:
-    """Return where along an axis distances to boxes are taken: so densely that none is missed by more than SAG.
+    """Return the positions of an axis's points for distances to boxes, so dense that the error is at most MAX_SAG.
 
-    Halfway between two points whose spheres touch a corner, the axis is nearer to it by sqrt(r^2 + h^2) - r, h half
-    the step.
+    Halfway between two points whose spheres touch a corner, the axis is nearer to it by sqrt(r^2 + h^2) - r, where h
+    is half the step.
     """
-    if capsule.length <= SAG:
+    if capsule.length <= MAX_SAG:
         return (0.5,)
-    step = 2 * float(np.sqrt(2 * capsule.radius * SAG + SAG**2))
+    step = 2 * float(np.sqrt(2 * capsule.radius * MAX_SAG + MAX_SAG**2))
     return tuple(np.linspace(0, 1, 1 + int(np.ceil(capsule.length / step))).tolist())
 
 
-def _clamped(x: casadi.SX) -> casadi.SX:
-    """Return x, kept in (0, 1) smoothly."""
+def _smooth_clamp(x: casadi.SX) -> casadi.SX:
+    """Return x clamped smoothly to (0, 1)."""
     import casadi
 
-    clamped: casadi.SX = (1 + casadi.sqrt(x**2 + CLAMP**2) - casadi.sqrt((x - 1) ** 2 + CLAMP**2)) / 2
+    clamped: casadi.SX = (1 + casadi.sqrt(x**2 + CLAMP_WIDTH**2) - casadi.sqrt((x - 1) ** 2 + CLAMP_WIDTH**2)) / 2
     return clamped
 
 
-def _larger(x: casadi.SX, y: casadi.SX) -> casadi.SX:
+def _smooth_maximum(x: casadi.SX, y: casadi.SX) -> casadi.SX:
     import casadi
 
-    return (x + y + casadi.sqrt((x - y) ** 2 + EDGE**2)) / 2
+    return (x + y + casadi.sqrt((x - y) ** 2 + EDGE_WIDTH**2)) / 2
 
 
 def _sparse(vector: Array) -> casadi.DM:
-    """Return a vector without its zeros, rounding's too, so that no operation is spent on them."""
+    """Return a vector as a sparse matrix without values that are 0 up to rounding, which saves their operations."""
     import casadi
 
-    rounded = np.where(np.abs(vector) < ROUNDING, 0.0, vector)
+    rounded = np.where(np.abs(vector) < ZERO, 0.0, vector)
     return casadi.sparsify(casadi.DM(rounded))

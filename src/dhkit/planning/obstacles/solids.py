@@ -14,27 +14,27 @@ if TYPE_CHECKING:
     CoalModule: TypeAlias = Any
 
 POINT = 1e-9
-"""An axis shorter than this, m, has no direction: its capsule is a ball."""
+"""Length of an axis (m) below which its capsule is a ball."""
 TOLERANCE = 1e-9
-"""Of coal's iterations, m; its default is 1e-6."""
+"""Tolerance of coal's iterations, m; its default is 1e-6."""
 
 
 def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
-    """Return signed distances of a capsule in many places from an obstacle.
+    """Return the signed distances of a capsule from an obstacle, at N poses.
 
     Parameters
     ----------
     radius
-        The capsule's, m.
+        Radius of the capsule, m.
     axes
-        The ends of its axis in the world, shape (N, 2, 3), m.
+        Ends of its axis in the world, shape (N, 2, 3), m.
     obstacle
         A box, sphere or capsule.
 
     Returns
     -------
     Array
-        Shape (N,), m; negative: how far one must move to be apart.
+        Distances, shape (N,), m; negative for penetration, by its depth.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
 
 
 def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -> Array:
-    """Return signed distances of two capsules in many places, shape (N,), m; axes (N, 2, 3) each.
+    """Return the signed distances of two capsules at N poses, shape (N,), m; ends of their axes are (N, 2, 3), m.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, reque
 
 
 def _capsule(coal: CoalModule, radius: float, axes: Array) -> tuple[Any, list[Any]]:
-    """Return coal's capsule and its poses, shape (N, 2, 3) the ends of its axis."""
+    """Return coal's capsule and its N poses, from the ends of its axis, shape (N, 2, 3), m."""
     along = axes[:, 1] - axes[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     middles = np.ascontiguousarray(axes.mean(axis=1))

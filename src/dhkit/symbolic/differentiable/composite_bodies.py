@@ -20,7 +20,7 @@ Matrix3 = tuple[Vector3, Vector3, Vector3]
 
 
 def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return M, n x n, with drives, by the composite rigid body method (Walker & Orin 1982, method 3)."""
+    """Return M with drives, n x n, kg m^2, kg m and kg, by composite rigid bodies (Walker & Orin 1982, method 3)."""
     frames = equation_frames(table, q)
     entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
     for j, composite in _composites(frames):

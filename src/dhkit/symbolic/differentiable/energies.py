@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return the kinetic energy, J, of links and drives.
+    """Return the kinetic energy of links and drives, 1 x 1, J, for q and qd (n x 1).
 
     Each link adds (m v^2 + w . (J w) + 2 v . (w x m c)) / 2, with v the velocity of the joint frame's origin (Siciliano
     et al., Robotics, 2009, section 7.1.1).
@@ -34,7 +34,7 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
 
 
 def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return the potential energy V = -sum(m g . c) of the moving links, J; zero at the world's origin."""
+    """Return the potential energy V = -sum(m g . c) of the moving links, 1 x 1, J; 0 at the world's origin."""
     import casadi
 
     gravity: Vector3 = table.gravity
@@ -48,7 +48,7 @@ def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 
 def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return M = d2K/dqd2, n x n."""
+    """Return M = d2K/dqd2, n x n, kg m^2, kg m and kg, for q (n x 1)."""
     import casadi
 
     qd = casadi.SX.sym("qd", table.n)
@@ -57,7 +57,7 @@ def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 
 def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return the Christoffel C = (Mdot + A - A^T) / 2 with A = d(M qd)/dq, n x n.
+    """Return the Christoffel C = (Mdot + A - A^T) / 2 with A = d(M qd)/dq, n x n; C qd is in N m and N.
 
     Sum over k of (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2 (Siciliano et al. 2009, eq. 7.45).
     """
@@ -71,7 +71,7 @@ def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) 
 
 
 def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return g = dV/dq, n x 1."""
+    """Return g = dV/dq, n x 1, N m and N."""
     import casadi
 
     g: casadi.SX = casadi.gradient(potential_energy(table, q), q)
@@ -79,7 +79,7 @@ def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 
 def lagrange_inverse_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
-    """Return tau = M qdd + C qd + g, n x 1, from the matrices."""
+    """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices."""
     M, C = lagrange_mass_matrix(table, q), lagrange_coriolis_matrix(table, q, qd)
     tau: casadi.SX = M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
     return tau

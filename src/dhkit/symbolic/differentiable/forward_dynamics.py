@@ -17,7 +17,7 @@ SINGULAR = 1e-14
 
 
 def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
-    """Return qdd of M qdd = torque, n x 1, by the factors L^T D L (Featherstone 2008, section 6.5, for a full matrix).
+    """Return qdd of M qdd = torque, n x 1, SI units, by factors L^T D L (Featherstone 2008, section 6.5, full matrix).
 
     D_i is the inertia that joint i feels while the joints behind it swing freely; where one is not above ``SINGULAR``
     times the largest M_ii all entries are NaN. Only the upper triangle of M is read.
@@ -47,5 +47,5 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
 
 
 def recursive_forward_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX) -> casadi.SX:
-    """Return the joint accelerations that torques cause, n x 1: M qdd = tau - C qd - g."""
+    """Return the joint accelerations qdd of M qdd = tau - C qd - g, n x 1, rad/s^2 and m/s^2."""
     return solve_for_acceleration(composite_mass_matrix(table, q), tau - recursive_bias(table, q, qd))

@@ -47,7 +47,7 @@ class SymbolicTable:
 
     @classmethod
     def parametric(cls, description: Robot) -> tuple[SymbolicTable, casadi.SX]:
-        """Return a table of symbols, and the symbols; their values are ``table_pattern(description)[1]``."""
+        """Return a table of symbols, and the symbols (m x 1); see :func:`table_pattern` for their values."""
         description = description_of(description)
         entries, symbols = _pattern(description).entries()
         return cls._filled(description, entries), symbols
@@ -107,12 +107,12 @@ class SymbolicTable:
 
     @property
     def last_to_tool(self) -> casadi.SX:
-        """The tool in frame n, 4 x 4."""
+        """Pose of the tool in frame n, 4 x 4, m."""
         return _matrix(self.tool[0:4], self.tool[4:8], self.tool[8:12])
 
 
 def joint_symbols(name: str, n: int) -> casadi.SX:
-    """Return n symbols, n x 1."""
+    """Return n symbols without unit, n x 1."""
     import casadi
 
     return casadi.SX.sym(name, n)
@@ -128,7 +128,7 @@ def table_numbers(description: Description) -> Array:
 
 @takes_robot
 def table_pattern(description: Description) -> tuple[str, Array]:
-    """Return the pattern of an arm's frames as text, and the values of its parametric table's symbols, (symbols,).
+    """Return the pattern of an arm's frames as text, and the values of its table's symbols, shape (symbols,), m and 1.
 
     Arms of equal pattern (convention, kinds of joints, which numbers are 0, 1 or -1) have equal expressions.
     """
@@ -164,7 +164,10 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
 
 
 def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
-    """Return the time derivative of the Jacobian along qd, 6 x n; for ``"tool"`` that of its components."""
+    """Return the time derivative of the Jacobian along qd, 6 x n, m and rad per s and unit of q.
+
+    For ``"tool"``, the derivative of its components in the axes of the tool.
+    """
     import casadi
 
     J = jacobian(table, q, frame)

@@ -49,12 +49,12 @@ class NumberPattern:
 
     @property
     def parameters(self) -> Array:
-        """The symbols' values, shape (arms, symbols)."""
+        """Values of the symbols, shape (arms, symbols), in SI units."""
         values: Array = self.numbers[:, self.is_symbol]
         return values
 
     def entries(self) -> tuple[list[Any], casadi.SX]:
-        """Return the N entries of an expression, constants and symbols, and the symbols, symbols x 1."""
+        """Return the N entries of an expression (constants and symbols), and the symbols (symbols x 1, SI units)."""
         import casadi
 
         symbols = casadi.SX.sym("parameter", int(self.is_symbol.sum()))

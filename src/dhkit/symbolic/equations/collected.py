@@ -67,11 +67,6 @@ class _Order:
     """Positions from this one on are rates."""
 
 
-def reading_order(ring: Ring) -> tuple[int, ...]:
-    """Return the indices of a ring's generators in the order in which they are written."""
-    return _order(ring).places
-
-
 def is_reciprocal(generator: Generator) -> bool:
     """Whether a constant is written in a denominator."""
     if generator.meaning is None or len(generator.meaning.terms) != 1:

@@ -1,4 +1,7 @@
-"""Every notation means what a person means by it; what is no mathematics is refused with its place."""
+"""Every notation means what a person means by it; what is no mathematics is refused with its place.
+
+Modules: indices, objects, rewriting, tokens.
+"""
 
 import contextlib
 import math

@@ -1,4 +1,7 @@
-"""Base parameters and the regressor: as many as the numeric rank, and the same equations."""
+"""Base parameters and the regressor: as many as the numeric rank, and the same equations.
+
+Modules: base_parameters, dependencies, regressor.
+"""
 
 from __future__ import annotations
 

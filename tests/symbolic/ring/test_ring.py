@@ -1,4 +1,7 @@
-"""The ring's laws: relations, normal forms, derivatives, and reading of exact expressions."""
+"""The ring's laws: relations, normal forms, derivatives, and reading of exact expressions.
+
+Modules: constants, elements, notation, polynomials, reading, ring.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Exact equations of motion against Pinocchio, the textbook's route, and the textbooks' own formulas."""
+"""Exact equations of motion against Pinocchio, the textbook's route, and the textbooks' own formulas.
+
+Modules: composite, exact_arm, lagrangian, naming.
+"""
 
 from __future__ import annotations
 

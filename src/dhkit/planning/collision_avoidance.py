@@ -1,4 +1,4 @@
-"""Keeping clear of obstacles: smooth distances for the optimizer, coal's exact ones for the certificate."""
+"""Collision avoidance: smooth distances for the optimizer, exact distances by coal for the certificate."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from dhkit.planning.point import Point
 if TYPE_CHECKING:
     import casadi
 
-SIZES = (0, 1, 2, 4, 8, 16, 32)
-"""How many obstacles programs have room for: one made for three serves four as well."""
-BEYOND = 1.2
-"""What a gap that is short is multiplied by to be added to the margin."""
+SLOT_COUNTS = (0, 1, 2, 4, 8, 16, 32)
+"""Numbers of obstacle slots of programs: a program for three obstacles has four slots and serves four as well."""
+INFLATION_FACTOR = 1.2
+"""Factor of a gap's shortfall that is added to the margin of its obstacle before the next solution."""
 
 
 @dataclass(frozen=True)
-class Clear(Constraint):
-    """Links stay away from what fills the slots; its parameters come with each motion."""
+class ClearanceConstraint(Constraint):
+    """Distance of the links from the obstacles in a program's slots, whose parameters come with each motion."""
 
     slots: SceneSlots
     moving = False
@@ -35,30 +35,30 @@ class Clear(Constraint):
 
     @property
     def what(self) -> str:
-        """What it limits, in words."""
+        """Name of the limited quantity."""
         return "clearance"
 
     def size(self, description: Description) -> int:
-        """Return how many parameters it takes."""
+        """Return the number of parameters."""
         return self.slots.size
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return what must stay within bounds, k x 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
         return clearances(point.description, point.q, parameters, self.slots)
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
-    """What a motion keeps away from, and by how much."""
+class CollisionAvoidance:
+    """Obstacles of a motion, and the clearance from them and between links."""
 
     obstacles: tuple[Obstacle | Floor, ...] = ()
     clearance: float = 0.01
-    """m."""
+    """Smallest distance, m."""
     self_collision: bool = False
 
     @classmethod
-    def of(cls, obstacles: Scene, clearance: float, self_collision: bool) -> Surroundings:
-        """Check arguments.
+    def of(cls, obstacles: Scene, clearance: float, self_collision: bool) -> CollisionAvoidance:
+        """Return checked settings.
 
         Raises
         ------
@@ -74,31 +74,31 @@ class Surroundings:
 
     @property
     def slots(self) -> SceneSlots:
-        """Room for it, with some to spare."""
-        return roomy(SceneSlots.of(self.obstacles, self.self_collision))
+        """Slots of a program for these obstacles, padded so that programs can be used again."""
+        return padded_slots(SceneSlots.of(self.obstacles, self.self_collision))
 
     @property
     def names(self) -> str:
-        """What is there, in words."""
+        """Names of the obstacles, as text."""
         counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
         return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
 
     def gaps(self, description: Description, q: Array) -> Array:
-        """Return the exact distance of states (N, n) from the nearest thing, shape (N,), m."""
+        """Return the exact smallest distance at states q (N, n), shape (N,), m."""
         found = distance(description, q, self.obstacles, self.self_collision)
         return np.asarray(found.distance)
 
-    def short(self, description: Description, q: Array) -> Array:
-        """Return by how much each thing's gap is short of the clearance, shape (K + 1,), m; links' own last."""
+    def shortfalls(self, description: Description, q: Array) -> Array:
+        """Return the shortfalls of distances from the clearance, shape (K + 1,), m; that between links last."""
         found = deficits(description, q, self.obstacles, self.clearance, self.self_collision)
         return found if self.self_collision else np.append(found, 0.0)
 
     def values(self, inflation: Array) -> Array:
-        """Return the parameters of a program's slots."""
+        """Return the parameters of a program's slots for inflations of the margins, shape (K + 1,), m."""
         return self.slots.values(self.obstacles, self.clearance, inflation)
 
     def require(self, description: Description, q: Array, where: str) -> None:
-        """Refuse a configuration that is too near.
+        """Require the clearance at one configuration q (n,), rad and m.
 
         Raises
         ------
@@ -114,13 +114,13 @@ class Surroundings:
         raise PlanningError(f"{where}: {who} is {state} {what}, {1000 * self.clearance:.3g} mm are asked for")
 
 
-NOTHING = Surroundings()
+NO_AVOIDANCE = CollisionAvoidance()
 
 
-def roomy(slots: SceneSlots) -> SceneSlots:
-    """Return slots for as many obstacles or somewhat more."""
+def padded_slots(slots: SceneSlots) -> SceneSlots:
+    """Return slots for at least as many obstacles, rounded up to ``SLOT_COUNTS``."""
     return SceneSlots(_next(slots.capsules), _next(slots.boxes), slots.floor, slots.self_collision)
 
 
 def _next(count: int) -> int:
-    return next((size for size in SIZES if size >= count), count)
+    return next((size for size in SLOT_COUNTS if size >= count), count)

@@ -1,4 +1,7 @@
-"""Closed-form inverse kinematics: every branch closes, the original is among them, peers find the same."""
+"""Closed-form inverse kinematics: every branch closes, the original is among them, peers find the same.
+
+Modules: arm_plane, family, formulas, links, planar, program, spherical_wrist, three_parallel, turret, wrist.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-r"""Documents: rows that go on, chains, entries and systems are read as what they mean and as nothing else."""
+r"""Documents: rows that go on, chains, entries and systems are read as what they mean and as nothing else.
+
+Modules: latex_document, latex_rows, latex_source, latex_statements, entry_statements, statements.
+"""
 
 import re
 

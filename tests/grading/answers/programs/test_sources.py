@@ -1,4 +1,7 @@
-"""Programs and papers are read, not run: what they assign, in order, and nothing that was changed afterwards."""
+"""Programs and papers are read, not run: what they assign, in order, and nothing that was changed afterwards.
+
+Modules: notebook, program_answers.
+"""
 
 import json
 import re

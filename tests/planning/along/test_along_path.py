@@ -1,4 +1,7 @@
-"""Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library."""
+"""Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library.
+
+Modules: checks, grid, path_motion, path_states, program, rows, search, terms, timing_task.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
-"""What is printed is what was derived, exactly; and it reads as in textbooks."""
+"""What is printed is what was derived, exactly; and it reads as in textbooks.
+
+Modules: collected, programs, quantities, text, writing.
+"""
 
 import re
 from fractions import Fraction

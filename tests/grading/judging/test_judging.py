@@ -1,4 +1,7 @@
-"""Laws of the parts of judging: each module that compares answers with the truth, by itself."""
+"""Laws of the parts of judging: each module that compares answers with the truth, by itself.
+
+Modules: functions, coordinates, enclosures, quotients, sampling.
+"""
 
 from fractions import Fraction
 

@@ -1,4 +1,7 @@
-"""CasADi functions: named, differentiable, of use to optimizers, and equal to the kernels."""
+"""CasADi functions: named, differentiable, of use to optimizers, and equal to the kernels.
+
+Modules: casadi_functions, friction, velocity_regressor.
+"""
 
 import pickle
 import time

@@ -1,4 +1,7 @@
-"""Straight-line programs compute what CasADi computes, with nothing done twice."""
+"""Straight-line programs compute what CasADi computes, with nothing done twice.
+
+Modules: graph, printers.
+"""
 
 import casadi
 import numpy as np

@@ -1,4 +1,4 @@
-"""What a motion is to be like, as it is asked for."""
+"""Checked arguments of a planning request."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, joint_array
-from dhkit.planning.clear import Surroundings
+from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.trajectories import Limits
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
-    """What a motion is to be like, whatever its way."""
+class PlanRequest:
+    """Arguments of a planning request that do not depend on the route."""
 
     limits: Limits
     duration: float | None
     start_velocity: Array
     goal_velocity: Array
     payload: Payload | None
-    surroundings: Surroundings
+    avoidance: CollisionAvoidance
 
     def loaded(self, description: Description) -> Description:
-        """Return an arm with what it is to carry."""
+        """Return the arm with its payload."""
         return self.payload.carried(description) if self.payload else description
 
     def rests_at(self, name: str) -> bool:
-        """Whether the arm stands still at a place."""
+        """Whether the arm is at rest at a place, given by its name."""
         return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
 
 
 def checked_limits(description: Description, limits: Limits | None) -> Limits:
-    """Return limits, a robot's own where none are given.
+    """Return the given limits, or the robot's own if none are given.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def checked_limits(description: Description, limits: Limits | None) -> Limits:
 
 
 def end_velocity(description: Description, value: ArrayLike | None, name: str) -> Array:
-    """Return a velocity (n,), zero where none is given.
+    """Return joint rates at an end, shape (n,), rad/s and m/s; zero if none are given.
 
     Raises
     ------
