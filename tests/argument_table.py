@@ -187,7 +187,9 @@ def _functions() -> Iterator[tuple[str, object]]:
 
 
 def _members(owner: type) -> Iterator[tuple[str, object]]:
-    for name, one in vars(owner).items():
+    bases = [base for base in owner.__mro__ if base.__module__.startswith("dhkit.")]
+    members = {name: one for base in reversed(bases) for name, one in vars(base).items()}
+    for name, one in members.items():
         function = one.__func__ if isinstance(one, (classmethod, staticmethod)) else one
         if not name.startswith("_") and inspect.isfunction(function):
             yield name, function

@@ -1,6 +1,6 @@
 """Check the shape of the package: no import circles, no splinters, no oversized files, a test for each module.
 
-Imports inside functions and under ``TYPE_CHECKING`` count, and so do modules that a package names for lazy import.
+Imports inside functions and under ``TYPE_CHECKING`` count, and so do the lazy imports of a package's stub.
 
     python tools/architecture.py            # the checks; exit status 1 and one line a fault
     python tools/architecture.py --lines    # code lines a package, without blank lines, comments and docstrings
@@ -50,11 +50,11 @@ def imported(tree: ast.AST, known: Mapping[str, Path]) -> Iterator[str]:
                     yield node.module
 
 
-def registered(tree: ast.AST, known: Mapping[str, Path]) -> Iterator[str]:
-    """Yield the modules that a file names in strings: tables of lazily imported names."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in known:
-            yield node.value
+def lazily_imported(stub: Path, package: str, known: Mapping[str, Path]) -> Iterator[str]:
+    """Yield the modules of the lazy imports that a package's ``__init__.pyi`` lists."""
+    for node in ast.walk(ast.parse(stub.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and f"{package}.{node.module}" in known:
+            yield f"{package}.{node.module}"
 
 
 def imports(known: Mapping[str, Path]) -> dict[str, set[str]]:
@@ -63,8 +63,8 @@ def imports(known: Mapping[str, Path]) -> dict[str, set[str]]:
     for name, path in known.items():
         tree = ast.parse(path.read_text())
         targets = set(imported(tree, known))
-        if path.name == "__init__.py":
-            targets |= set(registered(tree, known))
+        if path.with_suffix(".pyi").exists():
+            targets |= set(lazily_imported(path.with_suffix(".pyi"), name, known))
         found[name] = targets - {name}
     return found
 
@@ -132,10 +132,12 @@ def faults() -> Iterator[str]:
 
 
 def lines_by_package() -> Counter[str]:
-    """Return the code lines of each package."""
+    """Return the code lines of each package, stubs included."""
     counted: Counter[str] = Counter()
-    for name, path in modules().items():
-        counted[name.split(".")[1] if path.parent != PACKAGE else "dhkit"] += code_lines(path.read_text())
+    for path in PACKAGE.rglob("*.py*"):
+        if path.suffix in (".py", ".pyi"):
+            parts = path.relative_to(PACKAGE).parts
+            counted[parts[0] if len(parts) > 1 else "dhkit"] += code_lines(path.read_text())
     return counted
 
 

@@ -10,8 +10,16 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.description.arrays import number_array
 from dhkit.kernels import Kernel, fill, kernel
-from dhkit.symbolic import Friction, Graph, SymbolicTable, jacobian, joint_symbols, smooth_direction, table_pattern
-from dhkit.symbolic import friction_torque as friction_expression
+from dhkit.symbolic import (
+    Friction,
+    Graph,
+    SymbolicTable,
+    friction_torque as friction_expression,
+    jacobian,
+    joint_symbols,
+    smooth_direction,
+    table_pattern,
+)
 
 
 @takes_robot

@@ -12,8 +12,13 @@ from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.dynamics.regressor import regressor
 from dhkit.kernels import Kernel, fill, kernel
-from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
-from dhkit.symbolic import velocity_regressor as velocity_regressor_expression
+from dhkit.symbolic import (
+    Graph,
+    SymbolicTable,
+    joint_symbols,
+    table_pattern,
+    velocity_regressor as velocity_regressor_expression,
+)
 
 DEPENDENT = 1e-9
 """A column of unit length depends on earlier ones where less than this remains of it; rounding leaves 1e-14."""

@@ -8,9 +8,15 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.kernels import Kernel, fill, kernel
-from dhkit.symbolic import Graph, ReferenceAxes, SymbolicTable, joint_symbols, table_pattern
-from dhkit.symbolic import jacobian as symbolic_jacobian
-from dhkit.symbolic import jacobian_dot as symbolic_jacobian_dot
+from dhkit.symbolic import (
+    Graph,
+    ReferenceAxes,
+    SymbolicTable,
+    jacobian as symbolic_jacobian,
+    jacobian_dot as symbolic_jacobian_dot,
+    joint_symbols,
+    table_pattern,
+)
 
 
 @takes_robot

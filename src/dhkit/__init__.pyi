@@ -1,0 +1,91 @@
+from . import (
+    control as control,
+    description as description,
+    dynamics as dynamics,
+    grading as grading,
+    kinematics as kinematics,
+    lab as lab,
+    model as model,
+    planning as planning,
+    programs as programs,
+    symbolic as symbolic,
+    trajectories as trajectories,
+    verification as verification,
+    viewer as viewer,
+)
+from .arm import Arm as Arm
+from .control import (
+    LQR as LQR,
+    PID as PID,
+    Adaptive as Adaptive,
+    BatchResult as BatchResult,
+    Comparison as Comparison,
+    ComputedTorque as ComputedTorque,
+    FeedForward as FeedForward,
+    FrictionCompensation as FrictionCompensation,
+    OperationalSpace as OperationalSpace,
+    PDGravity as PDGravity,
+    Push as Push,
+    Sensors as Sensors,
+    SimulationResult as SimulationResult,
+    Sine as Sine,
+    Step as Step,
+    ToolPoses as ToolPoses,
+)
+from .description import (
+    Description as Description,
+    DHTable as DHTable,
+    pose as pose,
+    pose_parts as pose_parts,
+    robots as robots,
+)
+from .dynamics import Friction as Friction
+from .errors import (
+    AnswerError as AnswerError,
+    DescriptionError as DescriptionError,
+    DhkitError as DhkitError,
+    ExpressionError as ExpressionError,
+    ModelError as ModelError,
+    PlanningError as PlanningError,
+    SimulationError as SimulationError,
+    UnreachableError as UnreachableError,
+)
+from .grading import GradeReport as GradeReport, grade as grade
+from .kinematics import (
+    Classification as Classification,
+    IKFlag as IKFlag,
+    IKPath as IKPath,
+    IKSolutions as IKSolutions,
+    IKStatus as IKStatus,
+    Singularities as Singularities,
+    Workspace as Workspace,
+)
+from .planning import (
+    Certificate as Certificate,
+    Distances as Distances,
+    Effort as Effort,
+    Energy as Energy,
+    Floor as Floor,
+    Jerk as Jerk,
+    MotorPower as MotorPower,
+    Obstacle as Obstacle,
+    Payload as Payload,
+    Planner as Planner,
+    Time as Time,
+    ToolAcceleration as ToolAcceleration,
+    ToolDirection as ToolDirection,
+    ToolOrientation as ToolOrientation,
+    ToolSpeed as ToolSpeed,
+    TorqueSpeedLine as TorqueSpeedLine,
+)
+from .symbolic import (
+    BaseParameters as BaseParameters,
+    CasadiFunctions as CasadiFunctions,
+    Lagrangian as Lagrangian,
+    SymbolicKinematics as SymbolicKinematics,
+)
+from .trajectories import JointPath as JointPath, Limits as Limits, Trajectory as Trajectory
+from .verification import VerificationReport as VerificationReport
+from .viewer import View as View, plot as plot
+
+__version__: str
