@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
@@ -132,7 +132,7 @@ class Arm:
         name: str = "arm",
         parameters: Mapping[str, Quantity] | None = None,
         limits: Sequence[Sequence[Quantity] | None] | None = None,
-        bodies: Sequence[Body | Mapping[str, Any] | None] | None = None,
+        bodies: Sequence[Body | Mapping[str, object] | None] | None = None,
     ) -> Arm:
         """Return the arm of a Denavit-Hartenberg table; see :func:`dhkit.description.from_dh`."""
         return cls(
@@ -610,7 +610,7 @@ class Arm:
     def compare(
         self,
         reference: Reference | Trajectory,
-        controllers: Sequence[str] | Mapping[str, Any] | None = None,
+        controllers: Sequence[str] | Mapping[str, str | Controller] | None = None,
         bandwidth: float = 20.0,
         damping: float = 1.0,
         plant: Robot | None = None,
@@ -892,14 +892,14 @@ class Arm:
 
     def grade(
         self,
-        answers: Mapping[str, Any] | None = None,
+        answers: Mapping[str, object] | None = None,
         *,
-        names: Mapping[str, Any] | None = None,
-        task: Mapping[str, Any] | None = None,
+        names: Mapping[str, object] | None = None,
+        task: Mapping[str, object] | None = None,
         rubric: Rubric | None = None,
         seed: int | None = None,
         explain: bool = True,
-        **quantities: Any,
+        **quantities: object,
     ) -> GradeReport:
         """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
 

@@ -38,7 +38,7 @@ def plain(text: str, most: int) -> str:
     return line if len(line) <= most and len(text) <= 2 * most else f"{line[: most - 1]}…"
 
 
-def listed(values: Iterable[Any]) -> str:
+def listed(values: Iterable[float]) -> str:
     """Return numbers as text with four digits.
 
     Examples

@@ -159,7 +159,7 @@ def _row(result: SimulationResult, degrees: bool) -> tuple[str, ...]:
 def compare(
     description: Description,
     reference: Reference | Trajectory,
-    controllers: Sequence[str] | Mapping[str, Any] = tuple(CONTROLLERS),
+    controllers: Sequence[str] | Mapping[str, str | Controller] = tuple(CONTROLLERS),
     bandwidth: float = 20.0,
     damping: float = 1.0,
     done: Callable[[str], None] | None = None,

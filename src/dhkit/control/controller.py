@@ -39,7 +39,7 @@ Law: TypeAlias = Callable[[float, Array, Array, Setpoint, Array], tuple[Any, Arr
 NO_STATE: Array = np.zeros(0)
 
 
-def reset(controller: Any) -> None:
+def reset(controller: object) -> None:
     """Call a controller's ``reset()`` if it has one.
 
     Raises
@@ -61,7 +61,7 @@ def reset(controller: Any) -> None:
         raise SimulationError(f"reset() of the controller raised {type(error).__name__}: {text}") from error
 
 
-def require_fits(controller: Any, description: Description) -> None:
+def require_fits(controller: object, description: Description) -> None:
     """Require that a controller was made for an arm with the same joints.
 
     Raises
@@ -74,7 +74,7 @@ def require_fits(controller: Any, description: Description) -> None:
         raise ValueError(f"the controller is one of {own.name}, joints {own.kinds}; expected {description.kinds}")
 
 
-def name_of(controller: Any) -> str:
+def name_of(controller: object) -> str:
     """Return a controller's name for figures: that of its class, or of the function."""
     if controller is None:
         return "no controller"
@@ -83,7 +83,7 @@ def name_of(controller: Any) -> str:
     return f"{name}({name_of(inner)})" if inner is not None else name.strip("<>")
 
 
-def continuous_law(controller: Any, q: Array) -> tuple[Array, Law]:
+def continuous_law(controller: Controller | ContinuousController, q: Array) -> tuple[Array, Law]:
     """Return the internal states at time 0, shape (m,), and the law of a controller in continuous time.
 
     Parameters
@@ -115,7 +115,7 @@ def continuous_law(controller: Any, q: Array) -> tuple[Array, Law]:
     return NO_STATE, lambda t, q, qd, setpoint, state: (controller(t, q, qd, setpoint), NO_STATE)
 
 
-def call_controller(controller: Callable[..., Any], t: float, *arguments: Any) -> Any:
+def call_controller(controller: Callable[..., object], t: float, *arguments: object) -> Any:
     """Call a controller and return its result.
 
     Raises
@@ -130,7 +130,7 @@ def call_controller(controller: Callable[..., Any], t: float, *arguments: Any) -
         raise SimulationError(f"the controller raised {type(error).__name__} at {t:g} s: {text}") from error
 
 
-def torques(returned: Any, n: int, t: float) -> Array:
+def torques(returned: object, n: int, t: float) -> Array:
     """Return a controller's result as an array of torques, shape (n,), N m and N.
 
     Raises

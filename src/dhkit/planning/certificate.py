@@ -194,7 +194,7 @@ class Checker:
             found.append(("torque", np.abs(states.tau) / limits.torque))
         for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
             values = constraint.measured(states, parameters)
-            found.append((constraint.what, np.abs(values) if constraint.low == -1 else values))
+            found.append((constraint.what, np.abs(values) if constraint.is_two_sided else values))
         if self.avoidance:
             short = self.avoidance.clearance - self.avoidance.gaps(self.description, states.q)
             found.append(("clearance", 1 + short[:, None] / max(self.description.reach, MIN_REACH)))

@@ -34,6 +34,11 @@ class Constraint:
     needs_torque: ClassVar[bool] = False
 
     @property
+    def is_two_sided(self) -> bool:
+        """Whether the bounds are -1 and 1, which margins tighten alike."""
+        return self.low == -self.high
+
+    @property
     def what(self) -> str:
         """Name of the limited quantity."""
         raise NotImplementedError

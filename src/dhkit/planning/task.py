@@ -150,7 +150,7 @@ def g_bounds(task: PlanTask, problem: Problem, rows: list[Rows], margins: Margin
                 a = -b
             case _ if row.what in margins.shares:
                 b = b - shares
-                a = np.where(a == -1, -b, a)
+                a = np.where(row.low == -row.high, -b, a)
         low.append(a.ravel())
         high.append(b.ravel())
     return np.concatenate(low), np.concatenate(high)

@@ -156,9 +156,9 @@ class SymbolicKinematics:
         """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath."""
         return str(format_function("equations_latex")(format_function("kinematic_quantities")(self, what)))
 
-    def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, Any]:
+    def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, object]:
         """Return sympy matrices by name, not simplified."""
-        matrices: dict[str, Any] = format_function("equations_sympy")(
+        matrices: dict[str, object] = format_function("equations_sympy")(
             format_function("kinematic_quantities")(self, what)
         )
         return matrices

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dhkit.description.schema import titled_schema
 from dhkit.trajectories.files import LEFT_OUT, MAX_DIGITS
 from dhkit.trajectories.ros_yaml import ROWS, TIMES
@@ -23,7 +21,7 @@ ROW = {"type": "array", "items": NUMBER, "minItems": 1}
 ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}
 
 
-def motion_schema() -> dict[str, Any]:
+def motion_schema() -> dict[str, object]:
     """Return the JSON Schema of motion files that end in .yaml or .yml.
 
     JSON Schema cannot express that rows have one number a joint, that times increase, that all points have the same
@@ -47,7 +45,7 @@ def motion_schema() -> dict[str, Any]:
     return titled_schema("dhkit motion file", _closed(properties, description, ["joint_names", "points"]))
 
 
-def _point() -> dict[str, Any]:
+def _point() -> dict[str, object]:
     positions, velocities, accelerations = ROWS
     properties = {
         positions: ROW | {"description": "Joint values, rad and m, one a joint."},
@@ -62,16 +60,16 @@ def _point() -> dict[str, Any]:
     }
 
 
-def _duration() -> dict[str, Any]:
+def _duration() -> dict[str, object]:
     """Return the schema of a time: seconds and nanoseconds, under the keys of one version of ROS."""
-    properties: dict[str, Any] = {}
+    properties: dict[str, object] = {}
     for whole, part in TIMES:
         properties |= {whole: WHOLE | {"description": "Whole seconds."}, part: WHOLE | {"description": "Nanoseconds."}}
     duration = _closed(properties, "Time of the sample, greater than that of the one before.")
     return duration | {"anyOf": [{"required": [*keys]} for keys in TIMES]}
 
 
-def _closed(properties: dict[str, Any], description: str, required: list[str] | None = None) -> dict[str, Any]:
+def _closed(properties: dict[str, object], description: str, required: list[str] | None = None) -> dict[str, object]:
     """Return the schema of a mapping without other keys."""
     known = {"type": "object", "description": description, "properties": properties, "additionalProperties": False}
     return known | ({"required": required} if required else {})

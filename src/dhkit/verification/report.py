@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
 
@@ -123,7 +122,7 @@ class VerificationReport:
     def _title(self) -> str:
         return f"{self.robot} against {self.reference}, {self.samples} states, seed {self.seed}"
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> dict[str, object]:
         """Return everything as plain data for JSON."""
         units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of sliding joints m, m/s, m/s^2
         agreements = [

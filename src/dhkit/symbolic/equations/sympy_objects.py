@@ -68,7 +68,7 @@ def sympy_object(element: Element) -> Any:
     return Printer(element.ring.generators, SympyWriter(notation(element.ring))).sum(collected(element))
 
 
-def equations_sympy(quantities: Sequence[Quantity]) -> dict[str, Any]:
+def equations_sympy(quantities: Sequence[Quantity]) -> dict[str, object]:
     """Return matrices (``sympy.Matrix``; vectors are columns) and expressions by name."""
     import sympy
 

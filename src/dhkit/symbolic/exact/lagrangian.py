@@ -232,9 +232,9 @@ class Lagrangian:
         """
         return str(format_function("equations_latex")(format_function("readable")(self, what)))
 
-    def sympy(self, what: str | Sequence[str] = tuple(QUANTITIES)) -> dict[str, Any]:
+    def sympy(self, what: str | Sequence[str] = tuple(QUANTITIES)) -> dict[str, object]:
         """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
-        matrices: dict[str, Any] = format_function("equations_sympy")(format_function("quantities")(self, what))
+        matrices: dict[str, object] = format_function("equations_sympy")(format_function("quantities")(self, what))
         return matrices
 
     def __str__(self) -> str:
