@@ -31,30 +31,31 @@ from dhkit.verification import random_motions
 
 RESULT = Path(__file__).parent / "results" / "control"
 RATE = 1000.0
-"""Hz: calls of the sampled controllers, and steps of their plants."""
-MOST_SECONDS = 1.5
-"""s that 10 s of one PUMA under computed torque may take."""
-LEAST_RATIO = 200.0
-"""Times that a loop over pin.aba may at least take for an arm, over dhkit's batch."""
-LARGEST_DIFFERENCE = 1e-9
-"""rad and rad/s: of the loop's last states from the batch's. Both add up the same steps, and differ by rounding."""
+"""Calls of the sampled controllers, and steps of their plants, per second, Hz."""
+MAX_SECONDS = 1.5
+"""Longest time of simulating 10 s of one PUMA under computed torque, s."""
+MIN_RATIO = 200.0
+"""Smallest time of an arm in a loop over pin.aba, over that in dhkit's batch."""
+MAX_DIFFERENCE = 1e-9
+"""Largest difference of the loop's last states from the batch's, rad and rad/s: both add up the same steps, and differ
+by rounding."""
 LOOP_ARMS = 4
 """Arms that the peer's loop moves, one after another."""
-FINER = 8
-"""Steps a period of the run that shows the integration error: with order 4, its own error is 4096 times smaller."""
-SPARSE = 20.0
-"""Rows a second of a continuous run that is asked for little more than its end."""
-EXACT = 1e-13
+FINE_STEPS = 8
+"""Steps in a period of the run that shows the integration error: with order 4, its own error is 4096 times smaller."""
+SPARSE_RATE = 20.0
+"""Rows per second of a continuous run of which little more than the end is needed, Hz."""
+EXACT_TOLERANCE = 1e-13
 """Tolerance of the runs that errors are measured against."""
-TIGHT = {"rtol": 1e-10, "atol": 1e-12}
-"""Tolerances that bring fdyn about as close as DOP853 is by default."""
+TIGHT_OPTIONS = {"rtol": 1e-10, "atol": 1e-12}
+"""Tolerances with which fdyn is about as exact as DOP853 is by default."""
 SWING_RATES = (1000.0, 2000.0, 4000.0)
 SPREAD = 0.5
-"""rad: how far from their target the arms of the batch may begin."""
+"""Farthest that the arms of the batch begin from their target, rad."""
 BANDWIDTH = 3.0
-"""rad/s of the batch's controller: after 1 s its arms still move. At rest, last states would agree by themselves."""
+"""Bandwidth of the batch's controller, rad/s: after 1 s its arms still move; at rest all last states would agree."""
 OFFSET = 0.05
-"""rad: how far from its reference the continuously controlled arm begins."""
+"""Distance of the continuously controlled arm from its reference at the beginning, rad."""
 STATES = 50
 """Random states at which a peer's accelerations are checked."""
 
@@ -65,24 +66,24 @@ States = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class SimulationSizes:
-    """How much is simulated."""
+    """The sizes of the simulations."""
 
     single: float = 10.0
-    """s of one arm under a sampled controller."""
+    """Time of one arm under a sampled controller, s."""
     arms: int = 10_000
     batch: float = 1.0
-    """s of each arm of the batch."""
+    """Time of each arm of the batch, s."""
     swing: float = 5.0
-    """s of the passive swing."""
+    """Time of the passive swing, s."""
     controlled: float = 0.5
-    """s under a continuous controller."""
+    """Time under a continuous controller, s."""
     repeats: int = 5
-    """Rounds."""
+    """Number of rounds."""
 
 
 @dataclass
-class _Findings:
-    """What was measured so far."""
+class _Measurements:
+    """The measurements so far."""
 
     single: list[SingleRow] = field(default_factory=list)
     batch: list[BatchRow] = field(default_factory=list)
@@ -101,66 +102,62 @@ def compare_simulations(
     arm
         The robot, with bodies.
     sizes
-        How much is simulated; what the figures are asked at unless given.
+        Sizes of the simulations; by default those of the requirements.
     seed
-        Of the states in which arms begin.
+        Seed of the states at the beginning.
     progress
-        Gets a line before each step.
+        Called with a line before each step.
 
     Returns
     -------
     SimulationReport
-        What was measured; when interrupted from the keyboard, what was measured until then.
+        The measurements; after Ctrl-C those until then.
     """
     tell = progress or (lambda line: None)
-    asked = sizes or SimulationSizes()
-    findings, interrupted = _Findings(), False
+    sizes = sizes or SimulationSizes()
+    measurements, interrupted = _Measurements(), False
     try:
         with calm():
             tell("compiling")
             arm.compile()
             tell("one arm")
-            findings.single.append(_single(arm, asked))
-            tell(f"{asked.arms} arms")
-            _many(arm, asked, seed, findings)
+            measurements.single.append(_single(arm, sizes))
+            tell(f"{sizes.arms} arms")
+            _many(arm, sizes, seed, measurements)
             tell("models")
-            _check_models(arm, findings)
+            _check_models(arm, measurements)
             tell("a passive swing")
-            _swing(arm, asked, seed, findings)
+            _swing(arm, sizes, seed, measurements)
             tell("a continuous controller")
-            _controlled(arm, asked, findings)
+            _controlled(arm, sizes, measurements)
     except KeyboardInterrupt:
         interrupted = True
     return SimulationReport(
         robot=arm.name,
         seed=seed,
-        repeats=asked.repeats,
-        single=tuple(findings.single),
-        batch=tuple(findings.batch),
-        integration=tuple(findings.integration),
-        models=tuple(findings.models),
-        requirements=tuple(_requirements(arm.name, asked, findings)),
-        missing=tuple(findings.missing),
+        repeats=sizes.repeats,
+        **{name: tuple(values) for name, values in vars(measurements).items()},
+        requirements=tuple(_requirements(arm.name, sizes, measurements)),
         machine=Machine.here(),
         interrupted=interrupted,
     )
 
 
 def _seconds(calls: Sequence[Call], repeats: int) -> Array:
-    """Return the seconds of each call, shape (rounds, len(calls))."""
+    """Return the times of the calls, shape (rounds, len(calls)), s."""
     times = [lasting(call) for call in calls]
     repeating = [repeated(call, count) for call, count in zip(calls, times, strict=True)]
     return np.array(list(rounds(repeating, repeats))) / times
 
 
 def _timing(seconds: Array) -> Timing:
-    """Return median and quartiles over the rounds, shape (rounds,)."""
+    """Return median and quartiles of times over the rounds, shape (rounds,), s."""
     lower, middle, upper = np.quantile(seconds, [0.25, 0.5, 0.75]).tolist()
     return Timing(middle, lower, upper)
 
 
 def _middle(arm: Arm) -> Array:
-    """Return the middle of the joint limits, shape (n,); 0 where there are none."""
+    """Return the middle of the joint limits, shape (n,), rad and m; 0 for joints without limits."""
     numbers = arm.description.numbers
     with np.errstate(invalid="ignore"):
         middle = (numbers.lower + numbers.upper) / 2
@@ -168,7 +165,7 @@ def _middle(arm: Arm) -> Array:
 
 
 def _wave(arm: Arm) -> Sine:
-    """Return a reference that keeps all joints moving, half a radian or metre to both sides."""
+    """Return a reference that moves all joints by half a radian or metre to both sides."""
     return Sine(_middle(arm), np.full(arm.n, 0.5), 0.5)
 
 
@@ -193,13 +190,13 @@ def _single(arm: Arm, sizes: SimulationSizes) -> SingleRow:
         steps=len(result.t) - 1,
         timing=timing,
         joint_error=float(result.peak_error.max()),
-        integration_error=max(_difference(_states(result), _states(run(plant_rate=FINER * RATE)))),
+        integration_error=max(_difference(_states(result), _states(run(plant_rate=FINE_STEPS * RATE)))),
         audit=result.audit.error,
     )
 
 
-def _many(arm: Arm, sizes: SimulationSizes, seed: int, findings: _Findings) -> None:
-    """Time batches of arms that come to rest at a configuration, beside a loop over pin.aba that moves a few."""
+def _many(arm: Arm, sizes: SimulationSizes, seed: int, measurements: _Measurements) -> None:
+    """Time batches of arms that come to rest at a configuration, beside a loop over pin.aba that moves a few arms."""
     target, controller = _middle(arm), PDGravity.tuned(arm, BANDWIDTH)
     start = target + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, (sizes.arms, arm.n))
     few = min(LOOP_ARMS, sizes.arms)
@@ -224,10 +221,10 @@ def _many(arm: Arm, sizes: SimulationSizes, seed: int, findings: _Findings) -> N
         differences[name] = float(np.abs(ends - np.hstack([result.q[:few], result.qd[:few]])).max())
         calls[name] = (lambda: [loop(q0, steps) for q0 in start[:few]]), few
     except UnavailableError as error:
-        findings.missing.append(Missing("batch", "pin.aba", str(error)))
+        measurements.missing.append(Missing("batch", "pin.aba", str(error)))
     counts = np.array([count * steps for _, count in calls.values()])
     each = _seconds([call for call, _ in calls.values()], sizes.repeats) / counts
-    findings.batch += [
+    measurements.batch += [
         BatchRow(
             contender=name,
             arms=count,
@@ -239,7 +236,7 @@ def _many(arm: Arm, sizes: SimulationSizes, seed: int, findings: _Findings) -> N
     ]
 
 
-def _check_models(arm: Arm, findings: _Findings) -> None:
+def _check_models(arm: Arm, measurements: _Measurements) -> None:
     """Compare accelerations with those of the toolbox's robot of our table, and of its own PUMA."""
     motion = random_motions(arm.description, STATES)
     q, qd, tau = motion.q, motion.qd, arm.inverse_dynamics(motion.q, motion.qd, motion.qdd)
@@ -247,18 +244,18 @@ def _check_models(arm: Arm, findings: _Findings) -> None:
 
     def compare(model: str, accelerations: Array) -> None:
         difference = float(np.abs(accelerations - ours).max() / np.abs(ours).max())
-        findings.models.append(ModelCheck(model, difference))
+        measurements.models.append(ModelCheck(model, difference))
 
     try:
         compare("roboticstoolbox, DHRobot of dhkit's table", Fdyn(arm.description).accelerations(q, qd, tau))
         if arm.name == "puma560":
             compare("roboticstoolbox, its own Puma560 without friction", own_puma_accelerations(q, qd, tau))
     except UnavailableError as error:
-        findings.missing.append(Missing("models", "roboticstoolbox", str(error)))
+        measurements.missing.append(Missing("models", "roboticstoolbox", str(error)))
 
 
-def _swing(arm: Arm, sizes: SimulationSizes, seed: int, findings: _Findings) -> None:
-    """Let an arm go at rest, without stops."""
+def _swing(arm: Arm, sizes: SimulationSizes, seed: int, measurements: _Measurements) -> None:
+    """Compare the swing of an arm that is let go at rest, without stops."""
     start = np.random.default_rng(seed + 1).normal(size=arm.n) * 0.3
     run = partial(arm.simulate, q0=start, duration=sizes.swing, restitution=None)
 
@@ -278,18 +275,21 @@ def _swing(arm: Arm, sizes: SimulationSizes, seed: int, findings: _Findings) -> 
     for name, peer in (
         ("solve_ivp over pin.aba, RK45, its defaults", lambda: partial(default_swing, arm.description)),
         ("roboticstoolbox fdyn, RK45, its defaults", lambda: Fdyn(arm.description).swing),
-        (f"roboticstoolbox fdyn, RK45, rtol {TIGHT['rtol']:g}", lambda: Fdyn(arm.description, TIGHT).swing),
+        (
+            f"roboticstoolbox fdyn, RK45, rtol {TIGHT_OPTIONS['rtol']:g}",
+            lambda: Fdyn(arm.description, TIGHT_OPTIONS).swing,
+        ),
     ):
         try:
             contenders[name] = partial(peer(), start, sizes.swing)
         except UnavailableError as error:
-            findings.missing.append(Missing(problem, name, str(error)))
-    exact = _states(run(rate=None, plant_rate=SPARSE, tolerance=EXACT))
-    findings.integration += _integrations(problem, contenders, exact, sizes.swing, sizes.repeats, drift)
+            measurements.missing.append(Missing(problem, name, str(error)))
+    exact = _states(run(rate=None, plant_rate=SPARSE_RATE, tolerance=EXACT_TOLERANCE))
+    measurements.integration += _integrations(problem, contenders, exact, sizes.swing, sizes.repeats, drift)
 
 
-def _controlled(arm: Arm, sizes: SimulationSizes, findings: _Findings) -> None:
-    """Let an arm that begins beside its reference follow it under computed torque in continuous time."""
+def _controlled(arm: Arm, sizes: SimulationSizes, measurements: _Measurements) -> None:
+    """Compare an arm that begins away from its reference and follows it under computed torque in continuous time."""
     wave, controller = _wave(arm), ComputedTorque.tuned(arm)
     q0, qd0 = (rows[0] for rows in wave.sampled(np.zeros(1))[:2])
     q0 = q0 + OFFSET
@@ -297,22 +297,22 @@ def _controlled(arm: Arm, sizes: SimulationSizes, findings: _Findings) -> None:
     contenders = dict(_continuous(run))
     contenders["dhkit, RK4 at 1 kHz, torques held"] = lambda: _states(run(rate=RATE))
     problem = f"Computed torque in continuous time, {sizes.controlled:g} s"
-    for name, options in (("its defaults", {}), (f"rtol {TIGHT['rtol']:g}", TIGHT)):
+    for name, options in (("its defaults", {}), (f"rtol {TIGHT_OPTIONS['rtol']:g}", TIGHT_OPTIONS)):
         full = f"roboticstoolbox fdyn, RK45, {name}"
         try:
             controlled = Fdyn(arm.description, options).controlled
             contenders[full] = partial(controlled, controller, wave, q0, qd0, sizes.controlled)
         except UnavailableError as error:
-            findings.missing.append(Missing(problem, full, str(error)))
-    exact = _states(run(rate=None, plant_rate=SPARSE, tolerance=EXACT))
-    findings.integration += _integrations(problem, contenders, exact, sizes.controlled, sizes.repeats)
+            measurements.missing.append(Missing(problem, full, str(error)))
+    exact = _states(run(rate=None, plant_rate=SPARSE_RATE, tolerance=EXACT_TOLERANCE))
+    measurements.integration += _integrations(problem, contenders, exact, sizes.controlled, sizes.repeats)
 
 
 def _continuous(run: Callable[..., SimulationResult]) -> Mapping[str, Callable[[], States]]:
     """Return runs by DOP853, by name: with as many rows as by default, and with few."""
     return {
         "dhkit, DOP853, 1000 rows a second": lambda: _states(run(rate=None)),
-        f"dhkit, DOP853, {SPARSE:g} rows a second": lambda: _states(run(rate=None, plant_rate=SPARSE)),
+        f"dhkit, DOP853, {SPARSE_RATE:g} rows a second": lambda: _states(run(rate=None, plant_rate=SPARSE_RATE)),
     }
 
 
@@ -340,26 +340,26 @@ def _integrations(
         )
 
 
-def _requirements(robot: str, sizes: SimulationSizes, findings: _Findings) -> Iterator[Requirement]:
-    """Yield what is asked of simulation, beside what was measured."""
+def _requirements(robot: str, sizes: SimulationSizes, measurements: _Measurements) -> Iterator[Requirement]:
+    """Yield the requirements of simulation, beside the measured numbers."""
     full = SimulationSizes()
-    asked_at = f"puma560, {full.single:g} s, and {full.arms} arms for {full.batch:g} s"
-    as_asked = robot == "puma560" and (sizes.single, sizes.arms, sizes.batch) == (full.single, full.arms, full.batch)
-    loop = next((row for row in findings.batch if row.difference is not None), None)
-    wall = findings.single[0].timing.seconds if findings.single else None
+    conditions = f"puma560, {full.single:g} s, and {full.arms} arms for {full.batch:g} s"
+    is_judged = robot == "puma560" and (sizes.single, sizes.arms, sizes.batch) == (full.single, full.arms, full.batch)
+    loop = next((row for row in measurements.batch if row.difference is not None), None)
+    wall = measurements.single[0].timing.seconds if measurements.single else None
     lines = (
-        ("one arm", "s for 10 s under computed torque, RK4 at 1 kHz", MOST_SECONDS, True, wall),
-        ("many arms", "times a loop over pin.aba, one thread", LEAST_RATIO, False, loop.ratio if loop else None),
+        ("one arm", "s for 10 s under computed torque, RK4 at 1 kHz", MAX_SECONDS, True, wall),
+        ("many arms", "times a loop over pin.aba, one thread", MIN_RATIO, False, loop.ratio if loop else None),
         (
             "many arms",
             "difference from that loop's last states",
-            LARGEST_DIFFERENCE,
+            MAX_DIFFERENCE,
             True,
             loop.difference if loop else None,
         ),
     )
     for quantity, what, required, at_most, measured in lines:
-        yield Requirement(quantity, what, required, at_most, measured, as_asked, conditions=asked_at)
+        yield Requirement(quantity, what, required, at_most, measured, is_judged, conditions=conditions)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

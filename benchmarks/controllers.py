@@ -1,4 +1,4 @@
-"""All controllers on one motion of three arms: makes the tables of docs/control.md anew (`make assets`), in 30 s."""
+"""All controllers on one motion of three arms: writes the tables of docs/control.md (`make assets`), in 30 s."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dhkit.trajectories import Trajectory
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "control.md"
 DURATION = 2.0
-"""s."""
+"""Duration of the motions, s."""
 COMPENSATED = "computed-torque, friction compensated"
 BEGIN, END = "<!-- benchmarks/controllers.py writes from here -->", "<!-- to here -->"
 """Lines of a Markdown file between which the tables stand."""
@@ -29,20 +29,20 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """An arm, its motion, and what its controllers do not know of."""
+    """An arm, its motion, and a payload that its controllers do not know of."""
 
     arm: Arm
     motion: Trajectory
     """A quintic polynomial from rest to rest."""
     payload: float
-    """kg, at the tool."""
+    """Mass at the tool, kg."""
     text: str
-    """What stands above the table."""
+    """Text above the table."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """How far an arm is from its motion under one controller; of the joint that errs most, or None if not simulated."""
+    """The errors of an arm under one controller, of the joint that errs most; None if not simulated."""
 
     peak: float | None
     """Largest error with the right model, rad."""
@@ -96,7 +96,7 @@ def errors_of(
     case
         The arm and its motion.
     names
-        Of controllers, as ``CONTROLLERS`` has them.
+        Names of controllers in ``CONTROLLERS``.
     progress
         Called with a line before each plant.
 
@@ -116,10 +116,10 @@ def errors_of(
         if progress is not None:
             progress(f"{arm.name}: {len(names)} controllers, {plant_name}")
         comparison = compare(arm.description, case.motion, names, plant=plant)
-        for name, why in comparison.failures.items():
-            raise SimulationError(f"{arm.name}, {plant_name}: {name}: {why}")
+        for name, reason in comparison.failures.items():
+            raise SimulationError(f"{arm.name}, {plant_name}: {name}: {reason}")
         runs[plant_name] = dict(comparison.results)
-    found = {
+    errors = {
         name: Errors(
             peak=_largest(run),
             rms=float(run.rms_error.max()),
@@ -132,7 +132,7 @@ def errors_of(
     }
     compensated = FrictionCompensation(ComputedTorque.tuned(arm))
     friction = _largest(arm.simulate(compensated, case.motion, friction=True))
-    return found | {COMPENSATED: Errors(None, None, None, None, None, friction)}
+    return errors | {COMPENSATED: Errors(None, None, None, None, None, friction)}
 
 
 def _largest(run: SimulationResult) -> float:
@@ -147,33 +147,33 @@ HEADINGS = {
     "payload": "payload, rad",
     "friction": "friction, rad",
 }
-"""Of a table's columns, by the fields of ``Errors``."""
+"""Headings of the columns, by the fields of ``Errors``."""
 
 
 def with_tables(text: str, progress: Progress | None = None) -> str:
-    """Return a Markdown text with its tables made anew.
+    """Return a Markdown text with new tables in place of the old ones.
 
     Raises
     ------
     ValueError
-        The text has no place for them: ``BEGIN`` and after it ``END``, once each.
+        The text does not have ``BEGIN`` and after it ``END``, once each.
     """
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end) or BEGIN in rest or END in after:
+    head, begin, rest = text.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not (begin and end) or BEGIN in rest or END in tail:
         raise ValueError(f"expected one line {BEGIN!r} and after it one line {END!r}")
     tables = [f"{case.text}\n\n{table(errors_of(case, progress=progress))}" for case in cases()]
-    return "\n\n".join([before + BEGIN, *tables, END + after])
+    return "\n\n".join([head + BEGIN, *tables, END + tail])
 
 
 def table(errors: Mapping[str, Errors]) -> str:
-    """Return errors by their controllers' names as a Markdown table, numbers with two significant digits."""
+    """Return errors, by the names of controllers, as a Markdown table of numbers with two significant digits."""
     rows = [["controller", *HEADINGS.values()], ["---"] * (len(HEADINGS) + 1)]
-    rows += [[name, *(_printed(getattr(row, field)) for field in HEADINGS)] for name, row in errors.items()]
+    rows += [[name, *(_text(getattr(row, field)) for field in HEADINGS)] for name, row in errors.items()]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
-def _printed(value: float | None) -> str:
+def _text(value: float | None) -> str:
     return "" if value is None else f"{value:#.2g}".rstrip(".")
 
 

@@ -1,4 +1,4 @@
-"""What the benchmark of motions found, for people (text, Markdown) and machines (JSON)."""
+"""The report of the benchmark of motions, for people (text, Markdown) and machines (JSON)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Table, duration, listed_values, report_html, report_markdown, report_text
+from dhkit.bench.report import Missing, Table, duration, report_html, report_markdown, report_text, with_lists
 from dhkit.display import html_table, repr_line
 
 MEANING = (
@@ -20,29 +20,38 @@ MEANING = (
 
 @dataclass(frozen=True)
 class MotionRow:
-    """One contender's figures at one speed."""
+    """The results of one contender at one speed.
+
+    Attributes
+    ----------
+    speed
+        Factor of the robot's speed limits.
+    contender
+        Name of the contender.
+    pairs, found
+        Number of pairs of configurations, and of those between which a motion was found.
+    mean, most
+        Mean and largest ratio of its durations to those of the fine mesh.
+    excess
+        Largest share by which its motions exceed a limit; negative if they keep all limits.
+    seconds, late
+        Median time to find a motion, and the time within which 95 % are found, s.
+    """
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("motion", "found", "over fine, mean", "max", "excess", "time, median", "95 %")
     speed: float
-    """Times the robot's speed limits."""
     contender: str
     pairs: int
     found: int
-    """Pairs between which it found a motion."""
     mean: float
-    """Of its durations over the fine mesh's."""
     most: float
-    """The largest of those."""
     excess: float
-    """By what share of a limit its motions exceed it at worst; negative: what is left."""
     seconds: float
-    """The median time to find one."""
     late: float
-    """Within which 95 % are found, s."""
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return [
             self.contender,
             f"{self.found} of {self.pairs}",
@@ -56,7 +65,7 @@ class MotionRow:
 
 @dataclass(frozen=True)
 class MeshBuild:
-    """How long a planner's program takes to make."""
+    """The time to make a planner's program for a number of intervals, s."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("intervals", "time to make")
     intervals: int
@@ -64,19 +73,19 @@ class MeshBuild:
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return [str(self.intervals), duration(self.seconds)]
 
 
 @dataclass(frozen=True)
 class MotionReport:
-    """Motions in least time beside others; one robot, one process, one core."""
+    """Motions in least time beside others, for one robot in one process on one core."""
 
     robot: str
     pairs: int
-    """Starts and goals at each speed."""
+    """Number of starts and goals at each speed."""
     seed: int
-    """Of those."""
+    """Seed of the starts and goals."""
     rows: tuple[MotionRow, ...]
     builds: tuple[MeshBuild, ...]
     missing: tuple[Missing, ...]
@@ -84,9 +93,9 @@ class MotionReport:
     interrupted: bool = False
 
     def json(self) -> dict[str, Any]:
-        """Return everything as what JSON knows."""
-        listed: dict[str, Any] = listed_values(asdict(self))
-        return listed
+        """Return the report as plain data for JSON."""
+        data: dict[str, Any] = with_lists(asdict(self))
+        return data
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
@@ -110,7 +119,7 @@ class MotionReport:
 
     @property
     def _tables(self) -> list[Table]:
-        """Headings, columns and cells of the tables that have something to show."""
+        """The tables that have rows."""
         columns: Sequence[str] = MotionRow.COLUMNS
         tables: list[Table] = [
             (_heading(speed), columns, [row.cells for row in self.rows if row.speed == speed])

@@ -35,49 +35,50 @@ from dhkit.trajectories import Limits, Trajectory, quintic, trapezoidal
 
 RESULT = Path(__file__).parent / "results" / "planning"
 SPEEDS = (1.0, 3.0)
-"""Times the robot's own speed limits: at three times those of the PUMA, torques count as well."""
+"""Factors of the robot's own speed limits: at three times those of the PUMA, torques count as well."""
 MESHES = (24, 32, 48)
-FINER = 4
-"""Times the usual intervals: what the others are held against."""
-FINE_SECONDS = 120.0
-"""s a motion on the fine mesh may take."""
-HELD = 0.95
-"""Of their limits that torques may need to hold an arm."""
-RATE = 1e4
-"""Hz: where motions are held against their limits."""
+FINE_FACTOR = 4
+"""Intervals of the fine mesh, which the others are compared with, over the usual ones."""
+MAX_FINE_TIME = 120.0
+"""Longest time of a motion on the fine mesh, s."""
+MAX_HOLDING_SHARE = 0.95
+"""Largest share of their limits that torques may need to hold an arm."""
+CHECK_RATE = 1e4
+"""Samples of a motion per second at which its limits are checked, Hz."""
 BUILDS = 3
+"""Times that a planner's program is made, of which the median counts."""
 
 Progress = Callable[[str], None]
 
 
 class Motion(Protocol):
-    """What every contender comes to."""
+    """The motion of a contender."""
 
     @property
     def duration(self) -> float:
-        """In s."""
+        """Duration, s."""
         ...
 
     def q(self, t: Array) -> Array:
-        """Return joint values, shape (N, n)."""
+        """Return joint values at times, shape (N,), s, as shape (N, n)."""
         ...
 
     def qd(self, t: Array) -> Array:
-        """Return velocities, likewise."""
+        """Return rates at times, shape (N,), s, as shape (N, n)."""
         ...
 
     def qdd(self, t: Array) -> Array:
-        """Return accelerations, likewise."""
+        """Return accelerations at times, shape (N,), s, as shape (N, n)."""
         ...
 
 
 Mover = Callable[[Array, Array, Limits], Motion]
-"""From a start, a goal and limits to a motion."""
+"""Returns a motion, given joint values of start and goal, shape (n,) each, and limits."""
 
 
 @dataclass(frozen=True)
 class _Sample:
-    """One motion of one contender; a duration is infinite where it found none."""
+    """One motion of one contender; the duration is infinite if it found none."""
 
     speed: float
     contender: str
@@ -104,9 +105,9 @@ def compare_motions(
     description
         The robot, with bodies and limits of speed and torque.
     pairs
-        Starts and goals at each speed, the same ones.
+        Number of starts and goals, which are the same at each speed.
     meshes
-        Intervals that the planner is tried with.
+        Numbers of intervals of the planner's meshes.
     intervals
         Of its usual mesh, in place of the planner's own; the fine one has four times as many.
     speeds
@@ -124,7 +125,7 @@ def compare_motions(
     tell = progress or (lambda line: None)
     machine = Machine.here()
     usual = intervals or Planner(description).intervals
-    counts = sorted({*meshes, usual} - {FINER * usual})
+    counts = sorted({*meshes, usual} - {FINE_FACTOR * usual})
     samples: list[_Sample] = []
     builds: list[MeshBuild] = []
     missing: list[Missing] = []
@@ -134,9 +135,9 @@ def compare_motions(
             start, goal = holdable_pairs(description, 1, seed)[0]
             Planner(description, intervals=min(counts)).solve(start, goal)  # imports
             planners = {}
-            for count in (*counts, FINER * usual):
+            for count in (*counts, FINE_FACTOR * usual):
                 tell(f"building {count} intervals")
-                planners[count], seconds = _built(description, count)
+                planners[count], seconds = _build_planner(description, count)
                 builds.append(MeshBuild(count, seconds))
             movers = _movers(description, {count: planners[count] for count in counts}, usual, missing)
             for speed in speeds:
@@ -144,7 +145,7 @@ def compare_motions(
                 for k, (start, goal) in enumerate(holdable_pairs(description, pairs, seed)):
                     tell(f"speeds x {speed:g}: pair {k + 1} of {pairs}")
                     gc.collect()
-                    samples += _pair(movers, planners[FINER * usual], start, goal, limits, speed, k)
+                    samples += _pair(movers, planners[FINE_FACTOR * usual], start, goal, limits, speed, k)
         except KeyboardInterrupt:
             interrupted = True
     rows = tuple(row for speed in speeds for row in _rows([s for s in samples if s.speed == speed], usual))
@@ -152,21 +153,21 @@ def compare_motions(
 
 
 def holdable_pairs(description: Description, count: int, seed: int) -> Array:
-    """Return random configurations inside the limits in which the arm can hold itself, shape (count, 2, n)."""
+    """Return random joint values inside the limits at which the arm can hold itself, shape (count, 2, n), rad and m."""
     numbers, rng = description.numbers, np.random.default_rng(seed)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -np.pi)
     upper = np.where(np.isfinite(numbers.upper), numbers.upper, np.pi)
-    found: list[Array] = []
-    while len(found) < 2 * count:
+    holdable: list[Array] = []
+    while len(holdable) < 2 * count:
         q = rng.uniform(lower, upper)
-        if (np.abs(gravity_torque(description, q)) <= HELD * numbers.effort).all():
-            found.append(q)
-    return np.array(found).reshape(count, 2, description.n)
+        if (np.abs(gravity_torque(description, q)) <= MAX_HOLDING_SHARE * numbers.effort).all():
+            holdable.append(q)
+    return np.array(holdable).reshape(count, 2, description.n)
 
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """Keep this process on one core, where the system can."""
+    """Keep this process on one core, if the system can."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -178,13 +179,13 @@ def _one_core() -> Iterator[None]:
         os.sched_setaffinity(0, own)
 
 
-def _built(description: Description, intervals: int) -> tuple[Planner, float]:
-    """Return a planner whose program is made, and how long that took: the median of some."""
+def _build_planner(description: Description, intervals: int) -> tuple[Planner, float]:
+    """Return a planner with its program, and the median time of making it, s."""
     start, goal = holdable_pairs(description, 1, 0)[0]
     seconds = []
     for _ in range(BUILDS):
         planner = Planner(description, intervals=intervals)
-        report = planner.solve(start, goal, time_limit=FINE_SECONDS).report
+        report = planner.solve(start, goal, time_limit=MAX_FINE_TIME).report
         seconds.append(report.build_seconds)
     return planner, float(np.median(seconds))
 
@@ -192,75 +193,75 @@ def _built(description: Description, intervals: int) -> tuple[Planner, float]:
 def _movers(
     description: Description, planners: dict[int, Planner], usual: int, missing: list[Missing]
 ) -> dict[str, Mover]:
-    """Return who takes part, by name; the planner on its usual mesh first."""
+    """Return the contenders by name; the planner on its usual mesh is the first."""
 
-    def planned(planner: Planner) -> Mover:
+    def mover_of(planner: Planner) -> Mover:
         return lambda start, goal, limits: planner.solve(start, goal, limits=limits)
 
-    movers = {_name(usual, usual): planned(planners[usual])}
+    movers = {_name(usual, usual): mover_of(planners[usual])}
     try:
         timing = StraightTiming(description)
         start, goal = holdable_pairs(description, 1, 0)[0]
-        timing(start, goal, Limits.of(description))  # what it does but once
+        timing(start, goal, Limits.of(description))  # work that it does only once
         movers["toppra, straight joint path"] = timing
     except (UnavailableError, PlanningError) as error:
         missing.append(Missing("motions", "toppra", str(error)))
     movers["best trapezoid"] = lambda start, goal, limits: trapezoidal(description, start, goal, limits=limits)
     movers["quintic"] = lambda start, goal, limits: quintic(description, start, goal, limits=limits)
-    return movers | {_name(count, usual): planned(p) for count, p in planners.items() if count != usual}
+    return movers | {_name(count, usual): mover_of(p) for count, p in planners.items() if count != usual}
 
 
 def _name(intervals: int, usual: int) -> str:
-    what = {usual: ", its usual mesh", FINER * usual: ", fine"}.get(intervals, "")
-    return f"dhkit, {intervals} intervals{what}"
+    mesh = {usual: ", its usual mesh", FINE_FACTOR * usual: ", fine"}.get(intervals, "")
+    return f"dhkit, {intervals} intervals{mesh}"
 
 
 def _pair(
     movers: dict[str, Mover], fine: Planner, start: Array, goal: Array, limits: Limits, speed: float, k: int
 ) -> Iterator[_Sample]:
-    """Yield each contender's motion, the fine one last: it starts from the usual one."""
+    """Yield each contender's motion; the one on the fine mesh is the last, since it starts from the usual one."""
     warm: Trajectory | None = None
 
     def finest(start: Array, goal: Array, limits: Limits) -> Motion:
-        return fine.solve(start, goal, limits=limits, warm=warm, time_limit=FINE_SECONDS)
+        return fine.solve(start, goal, limits=limits, warm=warm, time_limit=MAX_FINE_TIME)
 
-    for name, mover in [*movers.items(), (_name(fine.intervals, fine.intervals // FINER), finest)]:
-        began = perf_counter()
+    for name, mover in [*movers.items(), (_name(fine.intervals, fine.intervals // FINE_FACTOR), finest)]:
+        begin = perf_counter()
         try:
             motion = mover(start, goal, limits)
         except PlanningError:
-            yield _Sample(speed, name, k, np.inf, np.nan, perf_counter() - began)
+            yield _Sample(speed, name, k, np.inf, np.nan, perf_counter() - begin)
             continue
-        seconds = perf_counter() - began
+        seconds = perf_counter() - begin
         if warm is None and isinstance(motion, Trajectory):
             warm = motion
         yield _Sample(speed, name, k, motion.duration, _excess(fine.description, motion, limits), seconds)
 
 
 def _excess(description: Description, motion: Motion, limits: Limits) -> float:
-    """Return by what share of a limit of speed or torque a motion exceeds it at worst."""
-    t = np.append(np.arange(0.0, motion.duration, 1 / RATE), motion.duration)
+    """Return the largest share by which a motion exceeds a limit of speed or torque; negative if it keeps them."""
+    t = np.append(np.arange(0.0, motion.duration, 1 / CHECK_RATE), motion.duration)
     states = States(description, t, motion.q(t), motion.qd(t), motion.qdd(t))
     return max(float(use.max()) - 1 for _, use in Checker(description, limits).measured(states))
 
 
 def _rows(samples: list[_Sample], usual: int) -> Iterator[MotionRow]:
     """Yield a row for each contender, of samples at one speed."""
-    best = {s.pair: s.duration for s in samples if s.contender == _name(FINER * usual, usual)}
+    best = {s.pair: s.duration for s in samples if s.contender == _name(FINE_FACTOR * usual, usual)}
     for name in dict.fromkeys(s.contender for s in samples):
-        own = [s for s in samples if s.contender == name and np.isfinite(best.get(s.pair, np.inf))]
-        found = [s for s in own if np.isfinite(s.duration)]
+        compared = [s for s in samples if s.contender == name and np.isfinite(best.get(s.pair, np.inf))]
+        found = [s for s in compared if np.isfinite(s.duration)]
         if not found:
             continue
-        over = [s.duration / best[s.pair] for s in found]
+        ratios = [s.duration / best[s.pair] for s in found]
         middle, late = np.quantile([s.seconds for s in found], [0.5, 0.95])
         yield MotionRow(
             speed=found[0].speed,
             contender=name,
-            pairs=len(own),
+            pairs=len(compared),
             found=len(found),
-            mean=float(np.mean(over)),
-            most=max(over),
+            mean=float(np.mean(ratios)),
+            most=max(ratios),
             excess=max(s.excess for s in found),
             seconds=float(middle),
             late=float(late),

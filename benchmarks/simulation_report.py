@@ -1,4 +1,4 @@
-"""What the benchmark of simulation found, for people (text, Markdown) and machines (JSON)."""
+"""The report of the benchmark of simulation, for people (text, Markdown) and machines (JSON)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from dhkit.bench.report import (
     Requirement,
     Table,
     duration,
-    listed_values,
     report_html,
     report_markdown,
     report_text,
-    standing,
+    requirements_text,
+    with_lists,
 )
 from dhkit.display import html_table, repr_line
 
@@ -32,7 +32,7 @@ MEANING = (
 
 @dataclass(frozen=True)
 class Timing:
-    """Median and quartiles of a call over the rounds, s."""
+    """Median and quartiles of the time of a call over the rounds, s."""
 
     seconds: float
     lower: float
@@ -40,7 +40,7 @@ class Timing:
 
     @property
     def cells(self) -> list[str]:
-        """The median, and from which quartile to which."""
+        """Cells of a row: the median, and the quartiles."""
         return [duration(self.seconds), f"{duration(self.lower)} to {duration(self.upper)}"]
 
 
@@ -60,17 +60,17 @@ class SingleRow:
     )
     controller: str
     simulated: float
-    """s."""
+    """Simulated time, s."""
     steps: int
     timing: Timing
     joint_error: float
-    """Largest one between reference and joint values during the run, rad or m."""
+    """Largest error of a joint value from the reference during the run, rad or m."""
     integration_error: float
     audit: float
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return [
             self.controller,
             f"{self.simulated:g} s",
@@ -88,22 +88,22 @@ class BatchRow:
     contender: str
     arms: int
     each: Timing
-    """Of one arm's step."""
+    """Time of one arm's step."""
     ratio: float
     """Time of one arm's step over that of dhkit's batch on one thread that keeps the last states."""
     difference: float | None
-    """From the states that dhkit ends in; None for dhkit itself."""
+    """Largest difference of the last states from dhkit's; None for dhkit itself."""
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         difference = "" if self.difference is None else f"{self.difference:.0e}"
         return [self.contender, str(self.arms), *self.each.cells, f"{self.ratio:.3g}", difference]
 
 
 @dataclass(frozen=True)
 class IntegrationRow:
-    """How exactly a contender solves a problem, and how long that takes."""
+    """The errors of a contender's solution of a problem, and its time."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = (
         "contender",
@@ -117,17 +117,18 @@ class IntegrationRow:
     problem: str
     contender: str
     simulated: float
-    """s."""
+    """Simulated time, s."""
     timing: Timing
     joint_error: float
-    """Of the last joint values, rad or m."""
+    """Largest error of the last joint values, rad or m."""
     rate_error: float
+    """Largest error of the last rates, rad/s or m/s."""
     drift: float | None
-    """None where torques do work."""
+    """Largest change of the energy over the largest kinetic energy; None where torques do work."""
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return [
             self.contender,
             *self.timing.cells,
@@ -140,7 +141,7 @@ class IntegrationRow:
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """Whether a peer simulates the same arm."""
+    """The difference of a peer's arm from dhkit's."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("peer's model", "difference of accelerations")
     model: str
@@ -149,19 +150,19 @@ class ModelCheck:
 
     @property
     def cells(self) -> list[str]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return [self.model, f"{self.difference:.1e}"]
 
 
 @dataclass(frozen=True)
 class SimulationReport:
-    """Simulation beside peers: one robot, one process."""
+    """Simulation beside peers, for one robot in one process."""
 
     robot: str
     seed: int
-    """Of the starts."""
+    """Seed of the states at the beginning."""
     repeats: int
-    """Rounds."""
+    """Number of rounds."""
     single: tuple[SingleRow, ...]
     batch: tuple[BatchRow, ...]
     integration: tuple[IntegrationRow, ...]
@@ -172,12 +173,12 @@ class SimulationReport:
     interrupted: bool = False
 
     def json(self) -> dict[str, Any]:
-        """Return everything as what JSON knows."""
+        """Return the report as plain data for JSON."""
         plain = asdict(self)
         for entry, line in zip(plain["requirements"], self.requirements, strict=True):
             entry |= line.derived
-        listed: dict[str, Any] = listed_values(plain)
-        return listed
+        data: dict[str, Any] = with_lists(plain)
+        return data
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
@@ -187,7 +188,9 @@ class SimulationReport:
         return report_text(self._title, self.machine.facts, self._tables, MEANING)
 
     def __repr__(self) -> str:
-        return repr_line("SimulationReport", self.robot, f"{self.repeats} rounds, {standing(self.requirements)}")
+        return repr_line(
+            "SimulationReport", self.robot, f"{self.repeats} rounds, {requirements_text(self.requirements)}"
+        )
 
     def _repr_html_(self) -> str:
         table = html_table(BatchRow.COLUMNS, [row.cells for row in self.batch], align="lr")
@@ -200,7 +203,7 @@ class SimulationReport:
 
     @property
     def _tables(self) -> list[Table]:
-        """Headings, columns and cells of the tables that have something to show."""
+        """The tables that have rows."""
         tables: list[Table] = [
             ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
             ("One arm, called at 1 kHz", SingleRow.COLUMNS, [row.cells for row in self.single]),

@@ -1,4 +1,4 @@
-"""Targets that dhkit sets itself beside its peers, and a run of `dhkit bench` that is held against them."""
+"""Targets of dhkit beside its peers, and a run of `dhkit bench` that is compared with them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class _Comparison:
     what: str
     peer: str
     required: float
-    figure: Callable[[Row], float | None]
+    measured: Callable[[Row], float | None]
     at_most: bool = False
     target: float | None = None
 
 
-DERIVED = {CASADI: 0.5, PROOFS: 5.0}
+MAX_DERIVATION_TIMES = {CASADI: 0.5, PROOFS: 5.0}
 """Longest times of derivations, s, by name."""
 COMPARISONS = (
     _Comparison(
@@ -90,20 +90,20 @@ COMPARISONS = (
 
 
 def targets(report: BenchReport) -> tuple[Requirement, ...]:
-    """Return the targets for the quantities of a report, beside what was measured."""
-    as_asked = report.batch >= BATCH and report.threads == 1
+    """Return the targets for the quantities of a report, beside the measured numbers."""
+    is_judged = report.batch >= BATCH and report.threads == 1
     rows = {(row.quantity, row.contender): row for row in report.rows}
     return (
-        *(_compared(line, rows, as_asked) for line in COMPARISONS if line.quantity in report.quantities),
+        *(_compared(line, rows, is_judged) for line in COMPARISONS if line.quantity in report.quantities),
         *(
             Requirement(
-                line.quantity, "scaling to two threads over a control loop's", 0.85, False, line.share, as_asked
+                line.quantity, "scaling to two threads over a control loop's", 0.85, False, line.share, is_judged
             )
             for line in report.scaling
         ),
         *(
             Requirement(
-                line.quantity, f"peak memory over inputs and outputs ({line.called})", 3.0, True, line.share, as_asked
+                line.quantity, f"peak memory over inputs and outputs ({line.called})", 3.0, True, line.share, is_judged
             )
             for line in report.memory
         ),
@@ -114,9 +114,9 @@ def targets(report: BenchReport) -> tuple[Requirement, ...]:
             for line in report.starts
         ),
         *(
-            Requirement(line.robot, f"s: {line.what}", DERIVED[line.what], True, line.seconds)
+            Requirement(line.robot, f"s: {line.what}", MAX_DERIVATION_TIMES[line.what], True, line.seconds)
             for line in report.derivations
-            if line.what in DERIVED
+            if line.what in MAX_DERIVATION_TIMES
         ),
         *(
             Requirement("inverse_dynamics", "additions and multiplications", 400, True, line.total, target=305)
@@ -126,10 +126,10 @@ def targets(report: BenchReport) -> tuple[Requirement, ...]:
     )
 
 
-def _compared(line: _Comparison, rows: Mapping[tuple[str, str], Row], as_asked: bool) -> Requirement:
+def _compared(line: _Comparison, rows: Mapping[tuple[str, str], Row], is_judged: bool) -> Requirement:
     row = rows.get((line.quantity, line.peer))
-    measured = line.figure(row) if row else None
-    return Requirement(line.quantity, line.what, line.required, line.at_most, measured, as_asked, line.target)
+    measured = line.measured(row) if row else None
+    return Requirement(line.quantity, line.what, line.required, line.at_most, measured, is_judged, line.target)
 
 
 def main(quantities: Sequence[str], result: Path, arguments: Sequence[str] | None = None) -> None:

@@ -18,8 +18,19 @@ from benchmarks.motion_report import MeshBuild, MotionReport, MotionRow
 from benchmarks.simulation_report import BatchRow, SimulationReport, Timing
 
 import dhkit
-from dhkit import bench, control, description, grading, kinematics, lab, model, planning, programs, symbolic
-from dhkit import trajectories as motions
+from dhkit import (
+    bench,
+    control,
+    description,
+    grading,
+    kinematics,
+    lab,
+    model,
+    planning,
+    programs,
+    symbolic,
+    trajectories as motions,
+)
 from dhkit.control.batch_result import History
 from dhkit.display import LONGEST_LINE, MOST_ROWS, html_table, plain, repr_line
 from dhkit.dynamics import ParameterGrouping, dynamics_graph, parameter_grouping
@@ -269,7 +280,7 @@ VALUES = {
     bench.PeakMemory: lambda: timed().memory[0],
     bench.Requirement: lambda: timed().requirements[0],
     bench.Row: lambda: timed().rows[1],
-    bench.Task: lambda: bench.PlanTask(lambda items: lambda: None, lambda count: []),
+    bench.Task: lambda: bench.Task(lambda items: lambda: None, lambda count: []),
     bench.ThreadScaling: lambda: timed().scaling[0],
     bench.Verdict: lambda: timed().rows[0].verdict,
     bench.Workload: lambda: bench.Workload.of(planar(), 10, 1, 0),

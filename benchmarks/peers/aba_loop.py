@@ -22,7 +22,7 @@ class AbaLoop:
     description
         The robot.
     controller
-        Its gains (n,) are used, and its law is computed anew with Pinocchio's gravity torques.
+        Its gains, shape (n,), are used; its law is computed here with Pinocchio's gravity torques.
     target
         Joint values to hold, shape (n,), rad and m.
     step
@@ -39,16 +39,16 @@ class AbaLoop:
         self._model = pinocchio_model(description)
         self._data = self._model.createData()
         self._kp, self._kd = (np.array(np.broadcast_to(gain, target.shape)) for gain in (controller.kp, controller.kd))
-        self._most = np.array(description.numbers.effort)
+        self._effort = np.array(description.numbers.effort)
         self._target, self._step = target, step
 
     def __call__(self, q0: Array, steps: int) -> Array:
-        """Return joint values and rates, shape (2n,), some steps after rest at joint values (n,)."""
+        """Return joint values and rates, shape (2n,), after a number of steps from rest at joint values, shape (n,)."""
         model, data, h, n = self._model, self._data, self._step, len(q0)
         aba, gravity = self._pin.aba, self._pin.computeGeneralizedGravity
         add, multiply, subtract, least, largest = np.add, np.multiply, np.subtract, np.minimum, np.maximum
-        target, kp, kd, most = self._target, self._kp, self._kd, self._most
-        lowest, half = -most, h / 2
+        target, kp, kd, effort = self._target, self._kp, self._kd, self._effort
+        lowest, half = -effort, h / 2
         weights = h / 6 * np.array([1.0, 2.0, 2.0, 1.0])
         y, stage, tau, damping = np.concatenate([q0, np.zeros(n)]), np.empty(2 * n), np.empty(n), np.empty(n)
         q, qd, stage_q, stage_qd = y[:n], y[n:], stage[:n], stage[n:]
@@ -61,7 +61,7 @@ class AbaLoop:
             multiply(kd, qd, out=damping)
             subtract(tau, damping, out=tau)
             add(tau, gravity(model, data, q), out=tau)
-            least(tau, most, out=tau)
+            least(tau, effort, out=tau)
             largest(tau, lowest, out=tau)
             v1[:] = qd
             a1[:] = aba(model, data, q, qd, tau)

@@ -19,9 +19,9 @@ class Fdyn:
     Parameters
     ----------
     description
-        The robot, of which a DHRobot without friction is made.
+        The robot, whose DHRobot has no friction.
     options
-        Of SciPy's integrator RK45, such as ``rtol``; its defaults unless given.
+        Options of SciPy's integrator RK45, such as ``rtol``; by default its own.
 
     Raises
     ------
@@ -35,13 +35,13 @@ class Fdyn:
 
     def swing(self, q0: Array, duration: float) -> tuple[Array, Array]:
         """Return joint values and rates, shape (N, n) each, of an arm let go at rest at joint values (n,)."""
-        found = self.robot.fdyn(duration, q0, solver_args=self._options)
-        return found.q, found.qd
+        run = self.robot.fdyn(duration, q0, solver_args=self._options)
+        return run.q, run.qd
 
     def controlled(
         self, controller: ComputedTorque, reference: Reference, q0: Array, qd0: Array, duration: float
     ) -> tuple[Array, Array]:
-        """Return the same under a computed torque with a controller's gains, by the toolbox's own ``rne``."""
+        """Return joint values and rates, shape (N, n) each, under computed torque by the toolbox's own ``rne``."""
         kp, kd = controller.kp, controller.kd
 
         def torque(robot: Any, t: float, q: Array, qd: Array) -> Array:
@@ -49,11 +49,11 @@ class Fdyn:
             tau: Array = robot.rne(q, qd, setpoint_qdd + kd * (setpoint_qd - qd) + kp * (setpoint_q - q))
             return tau
 
-        found = self.robot.fdyn(duration, q0, torque, qd0=qd0, solver_args=self._options)
-        return found.q, found.qd
+        run = self.robot.fdyn(duration, q0, torque, qd0=qd0, solver_args=self._options)
+        return run.q, run.qd
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """Return accelerations of states (N, n), shape (N, n)."""
+        """Return accelerations, shape (N, n), of states and torques, shape (N, n) each."""
         return np.asarray(self.robot.accel(q, qd, tau))
 
 

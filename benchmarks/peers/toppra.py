@@ -14,31 +14,31 @@ from dhkit.errors import PlanningError
 from dhkit.model import pinocchio_model
 from dhkit.trajectories import Limits
 
-GRID = 500
-"""Intervals of s."""
+GRID_INTERVALS = 500
+"""Intervals of the path's parameter s."""
 
 
 @dataclass(frozen=True)
 class ToppraMotion:
-    """A motion of toppra's, called as ours are."""
+    """A motion of toppra, with the methods of ours."""
 
     motion: Any
 
     @property
     def duration(self) -> float:
-        """In s."""
+        """Duration, s."""
         return float(self.motion.duration)
 
     def q(self, t: Array) -> Array:
-        """Return joint values, shape (N, n)."""
+        """Return joint values at times, shape (N,), s, as shape (N, n)."""
         return np.asarray(self.motion(t))
 
     def qd(self, t: Array) -> Array:
-        """Return velocities, likewise."""
+        """Return rates at times, shape (N,), s, as shape (N, n)."""
         return np.asarray(self.motion(t, 1))
 
     def qdd(self, t: Array) -> Array:
-        """Return accelerations, likewise."""
+        """Return accelerations at times, shape (N,), s, as shape (N, n)."""
         return np.asarray(self.motion(t, 2))
 
 
@@ -60,7 +60,7 @@ class StraightTiming:
         self._constraint, self._algorithm = import_peer("toppra.constraint"), import_peer("toppra.algorithm")
         self._model = pinocchio_model(description)
         self._data = self._model.createData()
-        logging.getLogger("toppra").setLevel(logging.ERROR)  # it tells of every instance
+        logging.getLogger("toppra").setLevel(logging.ERROR)  # it logs every instance
 
     def __call__(self, start: Array, goal: Array, limits: Limits) -> ToppraMotion:
         """Return the quickest motion straight from start to goal.
@@ -68,7 +68,7 @@ class StraightTiming:
         Raises
         ------
         PlanningError
-            toppra finds none.
+            toppra finds no motion.
         """
         path = self._toppra.SplineInterpolator([0, 1], np.array([start, goal]))
         speed = self._constraint.JointVelocityConstraint(_both_sides(limits.velocity))
@@ -81,7 +81,7 @@ class StraightTiming:
         instance = self._algorithm.TOPPRA(
             [speed, torque],
             path,
-            gridpoints=np.linspace(0, 1, GRID + 1),
+            gridpoints=np.linspace(0, 1, GRID_INTERVALS + 1),
             solver_wrapper="seidel",
             parametrizer="ParametrizeConstAccel",
         )

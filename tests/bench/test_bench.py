@@ -32,7 +32,8 @@ from dhkit.bench import (
 from dhkit.bench.agreement import judge
 from dhkit.bench.contenders import import_peer, one_by_one
 from dhkit.bench.geometry import OrthoParallel, bare, joint_axes
-from dhkit.bench.peers import all_contenders, dhkit_arm, pinocchio
+from dhkit.bench.machine import cores
+from dhkit.bench.peers import all_contenders, dhkit_arm, eaik, ikpy, pinocchio, roboticstoolbox, ssik
 from dhkit.bench.report import BATCH, duration
 from dhkit.bench.rounds import items_within
 from dhkit.cli import main
@@ -49,7 +50,7 @@ QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders())
 @pytest.fixture(autouse=True)
 def short_rounds(monkeypatch):
     """No figure is judged here: a millisecond tells as much as a second."""
-    monkeypatch.setattr(rounds, "LASTING", 1e-4)
+    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
     monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
 
 
@@ -310,7 +311,7 @@ def test_peaks_of_memory_are_seen_after_they_are_gone():
         return float(np.ones(8_000_000).sum())  # 64 MB, given back before the call returns
 
     try:
-        total, extra = probes._watched(peak)
+        total, extra = probes._with_memory(peak)
     except OSError as error:
         pytest.skip(f"the peak cannot be reset: {error}")
     assert total == 8_000_000
@@ -388,3 +389,12 @@ def test_the_command_refuses_in_one_line(capsys, arguments, complaint):
     assert ended.value.code == 2
     assert err.count("\n") == 1
     assert complaint in err
+
+
+def test_contenders_have_names_of_their_own_and_known_quantities():
+    listed = all_contenders()
+    assert len({(contender.name, contender.quantity) for contender in listed}) == len(listed)
+    peers = [c for peer in (eaik, ikpy, roboticstoolbox, ssik) for c in peer.contenders()]
+    assert {contender.name for contender in peers} <= {contender.name for contender in listed}
+    assert not any(contender.own for contender in peers)
+    assert Machine.here().cores == cores()

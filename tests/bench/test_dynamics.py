@@ -25,7 +25,7 @@ QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders(), *dhkit_arm.casadi_con
 @pytest.fixture(autouse=True)
 def short_rounds(monkeypatch):
     """No figure is judged here: a millisecond tells as much as a second."""
-    monkeypatch.setattr(rounds, "LASTING", 1e-4)
+    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
     monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
 
 

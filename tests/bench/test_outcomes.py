@@ -22,7 +22,7 @@ PEER_UNAVAILABLE = Missing("fk", "peer", "not installed")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """No figure is judged here, and small batches need no compiled kernels."""
-    monkeypatch.setattr(rounds, "LASTING", 1e-4)
+    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
     monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
     monkeypatch.setattr(Arm, "compile", lambda self: None)
 

@@ -23,7 +23,7 @@ DEFAULT_ERROR = 1e-3
 @pytest.fixture(autouse=True)
 def short_rounds(monkeypatch):
     """No figure is judged here: each call is timed once a round."""
-    monkeypatch.setattr(rounds, "LASTING", 1e-6)
+    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-6)
 
 
 def without_toolbox(monkeypatch):

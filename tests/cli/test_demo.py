@@ -11,9 +11,8 @@ from PIL import Image
 from acceptance import only_accepting
 from dhkit import Arm, Trajectory, robots
 from dhkit.cli import main
-from dhkit.cli.quickest import ends, race, there_and_back
+from dhkit.cli.demo_motions import TOUR_RATE, moved_configurations, race, there_and_back, tour
 from dhkit.cli.straight import branches, straight_line
-from dhkit.cli.tour import RATE, tour
 
 KEPT = 1e-6
 """Share of a limit that a certified motion may exceed it by."""
@@ -151,7 +150,7 @@ def test_the_tour_keeps_limits_and_speeds_and_begins_with_a_line(line_of):
     assert np.ptp(q, axis=0).max() > 0.05
     assert np.all(q >= numbers.lower - 1e-9)
     assert np.all(q <= numbers.upper + 1e-9)
-    assert np.all(np.abs(np.diff(q, axis=0)) * RATE <= numbers.velocity)
+    assert np.all(np.abs(np.diff(q, axis=0)) * TOUR_RATE <= numbers.velocity)
     assert np.array_equal(q[0], q[-1])
     assert np.array_equal(q[0], line.q[0])
 
@@ -199,7 +198,7 @@ def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
     arm = Arm.load(name)
     best, quintic = race(arm, 16)
     numbers = arm.description.numbers
-    start, goal = ends(arm)
+    start, goal = moved_configurations(arm)
     assert np.abs(goal - start).min() > 0
     assert best.report.certificate.ok
     assert best.duration < quintic.duration

@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 from dhkit import Arm, FrictionCompensation, Payload, PDGravity, SimulationResult
 from dhkit.cli import main
-from dhkit.cli.simulation_task import chosen_motion
+from dhkit.cli.simulation_settings import chosen_motion
 from dhkit.viewer import View
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_animation
@@ -92,7 +92,7 @@ def test_a_run_that_fails_is_status_1_and_keeps_what_there_was(dhkit, tmp_path, 
         called = iter(range(20))
         return lambda t, q, qd, setpoint: np.zeros(2) if next(called) < 19 else np.full(2, np.nan)
 
-    monkeypatch.setattr("dhkit.cli.simulation_task.make_controller", failing)
+    monkeypatch.setattr("dhkit.cli.simulation_settings.make_controller", failing)
     path = tmp_path / "run.npz"
     status, out, err = dhkit("simulate", "planar2r", *ENDS, "-o", path, "--json")
     assert status == 1

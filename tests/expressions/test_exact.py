@@ -7,8 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.errors import ExpressionError
 from dhkit.expressions import PI, Expression, arc_tangent, cos, exact, exact_angle, parse, sin, sqrt, substitute

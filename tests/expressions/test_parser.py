@@ -7,8 +7,7 @@ import contextlib
 import time
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.errors import ExpressionError
 from dhkit.expressions import Budget, exact, parse

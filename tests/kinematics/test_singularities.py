@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 
 from dhkit.cli import main
 from dhkit.description import from_dh, library_robot, robots

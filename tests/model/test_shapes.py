@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dhkit.description import Base, Box, Capsule, Convention, Cylinder, Mesh, Placement, Shape, Sphere, Tool
 from dhkit.description.frames import world_to_frames

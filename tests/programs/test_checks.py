@@ -8,7 +8,10 @@ import pytest
 
 from dhkit import Arm
 from dhkit.cli import main
-from dhkit.programs import CheckRubric, Program, check
+from dhkit.programs import Program
+from dhkit.programs.checks import check
+from dhkit.programs.report import share_within
+from dhkit.programs.rubric import CheckRubric
 from programs.puma_solutions import EDITS, solution
 
 EXPECTED = {
@@ -185,3 +188,8 @@ def test_what_is_wrong_with_any_pose_is_said_before_an_axis_is_blamed(tmp_path, 
         (part,) = check(Arm.load("puma560"), program, seed=1, samples=20).functions["fk"]
     assert part.points == 0
     assert hint in " ".join(part.details)
+
+
+def test_points_fall_from_the_bound_to_ten_times_it():
+    assert [share_within(value, 0.1) for value in (0.0, 0.1, 1.0, 2.0, np.inf)] == [1.0, 1.0, 0.0, 0.0, 0.0]
+    assert share_within(0.3, 0.1) == pytest.approx(1 - np.log10(3))

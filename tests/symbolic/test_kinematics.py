@@ -12,8 +12,7 @@ import pytest
 from dhkit import Arm
 from dhkit.cli import main
 from dhkit.description import link_transforms
-from dhkit.expressions import exact as number
-from dhkit.expressions import parse, substitute
+from dhkit.expressions import exact as number, parse, substitute
 from dhkit.symbolic import symbolic_kinematics
 
 ARMS = ["planar2r", "puma560", "stanford", "panda", "ur5", "polar_rp", "al5d"]

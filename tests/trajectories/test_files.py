@@ -8,8 +8,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.description import Payload, from_dh, library_robot, robots, with_payload
 from dhkit.dynamics import Friction, inverse_dynamics

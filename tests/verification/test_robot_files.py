@@ -16,8 +16,7 @@ import pytest
 import dhkit
 from dhkit import Arm, robots
 from dhkit.description import library_robot
-from dhkit.expressions import parse
-from dhkit.expressions import substitute as put_in
+from dhkit.expressions import parse, substitute as put_in
 
 LIBRARY = Path(dhkit.__file__).parent / "description" / "library"
 CLOSE = 1e-12

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import dhkit
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
-from dhkit.viewer import plot, plot_arm, plot_motion
+from dhkit.viewer.figures import plot, plot_arm, plot_motion
 from dhkit.viewer.scene import first_configuration
 
 ON_LINE = 1e-12  # m

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.description import library_robot
 from dhkit.viewer.motion import MAX_FRAMES, MIN_FRAMES, check_motion, resample

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.description import Capsule, Cylinder, Mesh, from_dh, library_robot, robots, world_to_frames, world_to_tool
 from dhkit.model.shapes import link_parts

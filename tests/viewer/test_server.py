@@ -12,9 +12,10 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from dhkit.errors import ModelError
+from dhkit.viewer.handlers import MAX_PAGES
 from dhkit.viewer.page import MODULES
 from dhkit.viewer.protocol import encode_frames
-from dhkit.viewer.server import ViewerServer
+from dhkit.viewer.server import MAX_CONNECTIONS, ViewerServer
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_header
 
@@ -264,3 +265,7 @@ def test_a_page_is_told_good_bye(server):
         return socket.close_code
 
     assert run(last_words()) == 1001
+
+
+def test_pages_leave_connections_for_files():
+    assert MAX_PAGES < MAX_CONNECTIONS

@@ -1,7 +1,6 @@
 """Laws of a session: a page ends with the latest of everything, and has one picture to draw at a time."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.viewer.session import MAX_PANEL_MESSAGES, OF_ONE_ARM, Session, Slot
 

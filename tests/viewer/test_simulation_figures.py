@@ -7,8 +7,8 @@ import pytest
 
 import dhkit
 from dhkit.description import from_dh, library_robot
-from dhkit.viewer import plot_comparison
-from dhkit.viewer.simulation_figures import CONTROLLER_COLORS
+from dhkit.viewer.diagrams import CURVE_COLORS, joint_color, joint_kinds, joint_style
+from dhkit.viewer.simulation_figures import CONTROLLER_COLORS, plot_comparison
 from simulation_results import swinging
 
 LARGE = 1_000_000  # states: a thousand seconds at 1 kHz
@@ -137,3 +137,9 @@ def test_a_comparison_needs_results_of_the_same_joints():
         plot_comparison({})
     with pytest.raises(ValueError, match="two has joints RRRRRR; expected RR"):
         plot_comparison({"one": swinging(library_robot("planar2r")), "two": swinging(library_robot("puma560"))})
+
+
+def test_joints_have_colours_and_line_styles_of_their_own():
+    assert len({(joint_color(i), joint_style(i)) for i in range(3 * len(CURVE_COLORS))}) == 3 * len(CURVE_COLORS)
+    kinds = joint_kinds(library_robot("stanford"))
+    assert [(list(joints), factor) for joints, factor, *_ in kinds] == [([0, 1, 3, 4, 5], 180 / np.pi), ([2], 1.0)]

@@ -8,8 +8,9 @@ import pytest
 from dhkit.description import from_dh, library_robot, world_to_tool
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic, trapezoidal
-from dhkit.viewer import View, plot, plot_uses
+from dhkit.viewer import View, plot
 from dhkit.viewer.session import Slot
+from dhkit.viewer.trajectory_figures import plot_uses
 from viewer.messages import decode_animation
 
 FLOAT32 = 1e-6

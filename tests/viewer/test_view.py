@@ -12,6 +12,7 @@ from dhkit.errors import DescriptionError, ModelError
 from dhkit.kinematics.manipulability import force_ellipsoid, velocity_ellipsoid
 from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
+from dhkit.viewer.exports import Exportable
 from dhkit.viewer.scene import node_transforms, scene_size
 from dhkit.viewer.session import Slot
 from simulation_results import swinging
@@ -252,3 +253,17 @@ def test_a_view_needs_neither_matplotlib_nor_a_server_to_be_imported():
     code = "import sys, dhkit.viewer.view; print([m for m in ('matplotlib', 'meshcat', 'tornado') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_snapshot_has_what_is_drawn_and_a_new_arm_has_none_of_it():
+    view = View(library_robot("planar2r"), frames=True)
+    assert isinstance(view, Exportable)
+    points = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.1]])
+    view.trace(points)
+    view.ghosts([[0.1, 0.2], [np.nan, 0.0]], tints=(1.0, 0.0, 0.0))
+    shown = view.snapshot()
+    assert shown.frames and np.array_equal(shown.trace, points)
+    assert [ghost.color for ghost in shown.ghosts] == [(255, 0, 0)]
+    view.replace(library_robot("planar3r"))
+    shown = view.snapshot()
+    assert shown.trace is None and shown.ghosts == () and shown.frames

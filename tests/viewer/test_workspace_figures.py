@@ -9,8 +9,9 @@ import dhkit
 from dhkit.description import from_dh, library_robot, robots, world_to_tool
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import workspace
-from dhkit.viewer import heat_colors, plot_ellipsoid, plot_workspace
+from dhkit.viewer.overlays import heat_colors
 from dhkit.viewer.scene import first_configuration
+from dhkit.viewer.workspace_figures import plot_ellipsoid, plot_workspace
 
 ON_LINE = 1e-12  # m
 

@@ -1,4 +1,4 @@
-"""Whether a contender's answers are the ones that dhkit gives."""
+"""Agreement of a contender's answers with dhkit's."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from dhkit.description import Array
 from dhkit.display import value_line
 
 TOLERANCE = 1e-9
-"""Largest error that counts as agreement, m or rotation entry: a nanometre, far above any rounding. Of dynamics over
-the largest entry where that is above 1."""
-CHECKED = 32
-"""Items that are compared: enough to meet every branch, few enough for a solver of 50 ms."""
+"""Largest error of answers that agree, m or rotation entry: a nanometre, far above any rounding. Errors of dynamics are
+relative to the largest entry if that is above 1."""
+CHECKED_ITEMS = 32
+"""Items that are compared: enough to meet every branch, few enough for a solver that takes 50 ms."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How far a contender's answers are from dhkit's.
+    """The difference of a contender's answers from dhkit's.
 
     Attributes
     ----------
     error
-        The largest difference of an entry: of the poses, of the Jacobians, or of the pose where a solution puts the
-        tool from the one asked for (the position alone where inverse kinematics of the arm do not meet whole poses);
-        None if there was nothing finite to compare.
+        The largest difference of an entry: of poses, of Jacobians, or of the pose that a solution leads to from the
+        pose asked for (its position alone if inverse kinematics of the arm do not meet whole poses); None if nothing
+        finite could be compared.
     solutions
-        Solutions a pose on average that put the tool where it was asked for, for ``ik``; None for the rest.
+        Mean number of solutions that lead to the pose, for ``ik``; None for other quantities.
     """
 
     error: float | None
@@ -51,29 +51,29 @@ class Verdict:
 
 def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
     """Compare the first answers of a task with dhkit's own."""
-    count = min(CHECKED, len(workload.q))
+    count = min(CHECKED_ITEMS, len(workload.q))
     answers = task.answers(count)
     if quantity == "ik":
-        return _closes(workload, answers)
+        return _judge_solutions(workload, answers)
     ours = getattr(workload.arm, quantity)(*(x[:count] for x in workload.inputs(quantity)))
     return Verdict(_worst((np.asarray(answers) - ours) / max(1.0, float(np.abs(ours).max()))))
 
 
-def _closes(workload: Workload, answers: Sequence[Array]) -> Verdict:
+def _judge_solutions(workload: Workload, answers: Sequence[Array]) -> Verdict:
     counts = [len(solutions) for solutions in answers]
-    wanted = np.repeat(workload.T[: len(answers)], counts, axis=0)
+    poses = np.repeat(workload.T[: len(answers)], counts, axis=0)
     q = np.concatenate([np.reshape(solutions, (-1, workload.arm.n)) for solutions in answers])
-    misses = np.abs(workload.arm.fk(q) - wanted)
+    errors = np.abs(workload.arm.fk(q) - poses)
     if not _meets_whole_poses(workload.arm):
-        misses = misses[:, :3, 3:]
-    closing = int(np.sum(misses.max(axis=(1, 2)) <= TOLERANCE)) if len(q) else 0
-    return Verdict(_worst(misses), closing / len(counts))
+        errors = errors[:, :3, 3:]
+    closed = int(np.sum(errors.max(axis=(1, 2)) <= TOLERANCE)) if len(q) else 0
+    return Verdict(_worst(errors), closed / len(counts))
 
 
 def _meets_whole_poses(arm: Arm) -> bool:
-    """Whether inverse kinematics of an arm meet whole poses; those of few joints may meet the position alone."""
+    """Return whether inverse kinematics of an arm meet whole poses; arms of few joints may meet the position alone."""
     fit = arm.family.fit
-    # Position and yaw are all that a planar arm or a SCARA leaves open.
+    # A planar arm or a SCARA that meets position and yaw meets the whole pose.
     return fit is None or len(fit.met) == 6 or "yaw" in fit.met
 
 

@@ -1,9 +1,9 @@
-"""What a contender is: a way to compute a quantity, set up for a robot, that can be timed and asked for its answers."""
+"""Contenders: ways to compute a quantity, set up for a robot, that can be timed and asked for their answers."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -19,20 +19,20 @@ from dhkit.errors import from_checkout
 from dhkit.verification import random_states
 
 QUANTITIES = ("fk", "ik", "jacobian", "inverse_dynamics", "mass_matrix", "forward_dynamics")
-"""What is timed; each is the name of a method of :class:`dhkit.Arm`."""
+"""Quantities that are timed; each is the name of a method of :class:`dhkit.Arm`."""
 
 Call: TypeAlias = Callable[[], object]
 
 
 class UnavailableError(Exception):
-    """A contender that cannot take part, with the reason."""
+    """A contender cannot take part; the message is the reason."""
 
 
 class Mode(Enum):
     """How a contender is called."""
 
     SINGLE = "single"
-    """One call an item, from a Python loop."""
+    """One call for each item, from a Python loop."""
     BATCH = "batch"
     """One call for all items."""
 
@@ -46,9 +46,9 @@ class Workload:
     arm
         The robot.
     q, qd, qdd
-        Random joint values, rates and accelerations, shape (N, n), rad, m and seconds.
+        Random joint values, rates and accelerations, shape (N, n), in rad, m and s.
     threads
-        How many threads a contender that offers threads may use.
+        Number of threads that a contender may use, if it has threads.
     """
 
     arm: Arm
@@ -59,14 +59,14 @@ class Workload:
 
     @classmethod
     def of(cls, arm: Arm, batch: int, threads: int, seed: int) -> Workload:
-        """Draw N = ``batch`` states, full turns and strokes within the limits."""
+        """Return N = ``batch`` random states, of full turns and strokes within the limits."""
         q = random_states(arm.description, batch, seed)
         rng = np.random.default_rng(seed + 1)
         return cls(arm, q, rng.uniform(-1, 1, q.shape), rng.uniform(-1, 1, q.shape), threads)
 
     @cached_property
     def T(self) -> Array:
-        """The tool's poses, world to tool, shape (N, 4, 4)."""
+        """The tool's poses, shape (N, 4, 4), m, world."""
         return self.arm.fk(self.q)
 
     @cached_property
@@ -75,7 +75,7 @@ class Workload:
         return self.arm.inverse_dynamics(self.q, self.qd, self.qdd)
 
     def inputs(self, quantity: str) -> tuple[Array, ...]:
-        """Return what a quantity is computed from, each with N as its first axis."""
+        """Return the arrays that a quantity is computed from, each with N as its first axis."""
         match quantity:
             case "ik":
                 return (self.T,)
@@ -86,8 +86,8 @@ class Workload:
         return (self.q,)
 
     def __repr__(self) -> str:
-        said = f"{counted(len(self.q), 'state')}, {counted(self.threads, 'thread')}"
-        return repr_line("Workload", self.arm.name, said)
+        size = f"{counted(len(self.q), 'state')}, {counted(self.threads, 'thread')}"
+        return repr_line("Workload", self.arm.name, size)
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,10 @@ class Task:
     Attributes
     ----------
     prepare
-        Makes, for a number of items, the call that is timed; everything that a user need not pay for is done here.
+        Returns the call that is timed, for a number of items; work that a user does only once is done here.
     answers
-        Results of the first k items in dhkit's conventions: fk (4, 4), jacobian (6, n), ik (solutions, n) each,
-        torques and accelerations (n,), mass_matrix (n, n).
+        Returns the results of the first k items in dhkit's conventions: of each item fk (4, 4), jacobian (6, n),
+        ik (solutions, n), torques and accelerations (n,), mass_matrix (n, n).
     """
 
     prepare: Callable[[int], Call]
@@ -117,15 +117,15 @@ class Contender:
     Attributes
     ----------
     name
-        Whose it is and what is called, as in ``EAIK IK_batched``.
+        Name of the package and of the function, as in ``EAIK IK_batched``.
     quantity
         One of :data:`QUANTITIES`.
     mode
-        How it is called.
+        How the contender is called.
     setup
-        Builds its model of the robot; raises :class:`UnavailableError` with the reason where it cannot.
+        Builds the package's model of the robot; raises :class:`UnavailableError` with the reason if it cannot.
     own
-        Whether it is dhkit itself.
+        Whether the contender is dhkit itself.
     """
 
     name: str
@@ -139,12 +139,12 @@ class Contender:
 
 
 def import_peer(module: str) -> Any:
-    """Import a package that dhkit does without.
+    """Import a package that dhkit does not need.
 
     Raises
     ------
     UnavailableError
-        It is not installed, or cannot be imported.
+        The package is not installed, or cannot be imported.
     """
     try:
         return importlib.import_module(module)
@@ -155,24 +155,40 @@ def import_peer(module: str) -> Any:
 
 
 def one_by_one(function: Callable[..., object], inputs: Sequence[Any]) -> Callable[[int], Call]:
-    """Return what prepares a loop of calls over inputs, each one argument or a tuple of them, taken round and round."""
+    """Return the ``prepare`` of a task that calls a function for one input after the other, again from the first.
+
+    Each input is one argument, or a tuple of arguments.
+    """
 
     def prepare(items: int) -> Call:
         chosen = list(islice(cycle(inputs), items))
 
-        def of_one() -> None:
+        def call_with_one() -> None:
             for value in chosen:
                 function(value)
 
-        def of_two_or_three() -> None:
+        def call_with_several() -> None:
             for values in chosen:
                 function(*values)
 
         if not isinstance(chosen[0], tuple):
-            return of_one
+            return call_with_one
         if len(chosen[0]) > 1:
-            return of_two_or_three
+            return call_with_several
         chosen = [value for (value,) in chosen]
-        return of_one
+        return call_with_one
 
     return prepare
+
+
+def single_task(
+    function: Callable[..., Any], inputs: Iterable[Any], answer: Callable[[Any], Array] = lambda result: result
+) -> Task:
+    """Return the task of calling a function for one input after the other; ``answer`` converts its results."""
+    inputs = list(inputs)
+
+    def answers(count: int) -> list[Array]:
+        arguments = (value if isinstance(value, tuple) else (value,) for value in inputs[:count])
+        return [answer(function(*values)) for values in arguments]
+
+    return Task(one_by_one(function, inputs), answers)

@@ -1,4 +1,4 @@
-"""How long equations of motion take to derive, here and by sympy.physics.mechanics, and how long they are."""
+"""Times of deriving equations of motion, here and by sympy.physics.mechanics, and the lengths of the equations."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FUNCTIONS = ("mass_matrix", "coriolis_matrix", "gravity_torque", "inverse_dynami
 
 @dataclass(frozen=True)
 class Derivation:
-    """A time of deriving; None where it took longer than the limit."""
+    """The time of a derivation, s; None if it took longer than the limit, s."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("robot", "who and what", "time")
     robot: str
@@ -41,7 +41,7 @@ class Derivation:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         time = f"{self.seconds:.3g} s" if self.seconds is not None else f"not within {self.limit:g} s"
         return self.robot, self.what, time
 
@@ -51,7 +51,7 @@ class Derivation:
 
 @dataclass(frozen=True)
 class Operations:
-    """What a program is made of; sines, cosines and constants are free, gravity and rotor inertia are in."""
+    """The operations of a program, with gravity and rotor inertia; sines, cosines and constants are not counted."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("program", "+ and -", "×", "sum", "sines and cosines")
     program: str
@@ -66,7 +66,7 @@ class Operations:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         counts = (self.additions, self.multiplications, self.total, self.trigonometric)
         return self.program, *map(str, counts)
 
@@ -81,16 +81,18 @@ def operations(arm: Arm) -> list[Operations]:
         ("gravity torque", "gravity_torque"),
         ("mass matrix", "mass_matrix"),
     )
-    found = []
+    counted = []
     for name, quantity in programs:
         counts = operation_count(dynamics_graph(quantity, arm.description))
         additions = counts.get("additions", 0) + counts.get("negations", 0)
-        found.append(Operations(name, additions, counts.get("multiplications", 0), counts.get("sines and cosines", 0)))
-    return found
+        counted.append(
+            Operations(name, additions, counts.get("multiplications", 0), counts.get("sines and cosines", 0))
+        )
+    return counted
 
 
 def derivations(arm: Arm, limit: float) -> list[Derivation]:
-    """Time our derivations of an arm, and the peer's of it and of two planar ones, each within a time limit, s."""
+    """Time our derivations of an arm, and the peer's of this arm and of two planar ones, each within a limit, s."""
     description = arm.description
 
     def casadi() -> None:
@@ -101,50 +103,50 @@ def derivations(arm: Arm, limit: float) -> list[Derivation]:
     def exact(symbols: str) -> Callable[[], None]:
         def run() -> None:
             exact_arm.cache_clear()
-            found = lagrangian(description, symbols)  # type: ignore[arg-type]
-            found.C, found.g, found.tau  # noqa: B018 - derived when first asked for
+            lag = lagrangian(description, symbols)  # type: ignore[arg-type]
+            lag.C, lag.g, lag.tau  # noqa: B018 - they are derived when they are first read
 
         return run
 
     def proofs() -> None:
-        found = lagrangian(description, "inertial")
-        if not (found.prove_euler_lagrange(derive(description, symbols="inertial")) and found.prove_skew_symmetry()):
+        lag = lagrangian(description, "inertial")
+        if not (lag.prove_euler_lagrange(derive(description, symbols="inertial")) and lag.prove_skew_symmetry()):
             raise AssertionError("the two derivations differ")
 
     own = ((CASADI, casadi), (EXACT, exact("none")), (INERTIAL, exact("inertial")), (PROOFS, proofs))
-    found = [Derivation(arm.name, what, _seconds(run), limit) for what, run in own]
+    timed = [Derivation(arm.name, what, _seconds(run), limit) for what, run in own]
     peers = [Arm.load(name) for name in ("planar2r", "planar3r")]
     peers += [] if arm.name in ("planar2r", "planar3r") else [arm]
-    return [*found, *(Derivation(peer.name, PEER, _peer_seconds(peer, limit), limit) for peer in peers)]
+    return [*timed, *(Derivation(peer.name, PEER, _peer_seconds(peer, limit), limit) for peer in peers)]
 
 
 def _seconds(run: Callable[[], None]) -> float:
-    run()  # imports, and what the interpreter learns
+    run()  # imports modules, and warms the interpreter up
     start = perf_counter()
     run()
     return perf_counter() - start
 
 
 def _peer_seconds(arm: Arm, limit: float) -> float | None:
-    """Time the peer in a process of its own, which a limit can end."""
+    """Return the time of the peer in a process of its own, s; None if it exceeds the limit, s."""
     with tempfile.TemporaryDirectory() as folder:
         robot = Path(folder) / "robot.toml"
         write_robot(bare(arm.description), robot)
         command = [sys.executable, "-c", "from dhkit.bench import derivations as d; d.report_peer()", str(robot)]
         try:
-            done = subprocess.run(  # noqa: S603 - our own code
+            process = subprocess.run(  # noqa: S603 - our own code
                 command, capture_output=True, text=True, timeout=limit + 10, check=True
             )
         except subprocess.TimeoutExpired:
             return None
-    seconds = float(done.stdout)
+    seconds = float(process.stdout)
     return seconds if seconds <= limit else None
 
 
 def report_peer() -> None:
-    """Print how long the peer takes for the robot file named in the arguments, s."""
+    """Print the time of the peer, s, for the robot file in the arguments."""
     description = Arm.load(sys.argv[1]).description
-    lagranges_equations(Arm.load("polar_rp").description)  # imports
+    lagranges_equations(Arm.load("polar_rp").description)  # imports modules
     start = perf_counter()
     lagranges_equations(description)
     sys.stdout.write(str(perf_counter() - start))

@@ -1,4 +1,4 @@
-"""A description in the words of other libraries: joint axes in space, the ortho-parallel parameters."""
+"""A description as other libraries need it: joint axes in space, and the ortho-parallel parameters."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dhkit.bench.contenders import UnavailableError
 from dhkit.description import Array, Description, world_to_frames, world_to_tool
 from dhkit.description.frames import carrying
 
-GEOMETRIC = 1e-9
-"""Axes closer than this, in m or as a sine, count as meeting, parallel or perpendicular."""
+AXIS_TOLERANCE = 1e-9
+"""Largest distance, m, or sine of axes that count as meeting, parallel or perpendicular."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,11 +21,11 @@ class JointAxes:
     Attributes
     ----------
     directions
-        Unit vectors, shape (n, 3).
+        Directions of the axes, unit vectors, shape (n, 3), world.
     points
-        A point on each axis, m, shape (n, 3).
+        A point of each axis, shape (n, 3), m, world.
     T_world_tool
-        The tool there, shape (4, 4).
+        Pose of the tool at this state, shape (4, 4), m.
     """
 
     directions: Array
@@ -34,24 +34,26 @@ class JointAxes:
 
     @property
     def offsets(self) -> Array:
-        """World to the first point, point to point, last point to tool, shape (n + 1, 3): the P of EAIK and ssik."""
+        """Offsets from the world over the points to the tool, shape (n + 1, 3), m: the P of EAIK and ssik."""
         return np.diff(self.points, axis=0, prepend=0.0, append=self.T_world_tool[None, :3, 3])
 
     def without_tool_rotation(self, T: Array) -> Array:
-        """Return poses (..., 4, 4) of a tool whose axes are the world's at this state."""
-        turned = np.array(T)
-        turned[..., :3, :3] = T[..., :3, :3] @ self.T_world_tool[:3, :3].T
-        return turned
+        """Return poses, shape (..., 4, 4), m, of a tool whose axes are the world's at this state."""
+        return self._with_rotation(T, self.T_world_tool[:3, :3].T)
 
     def with_tool_rotation(self, T: Array) -> Array:
-        """Undo :meth:`without_tool_rotation`."""
-        turned = np.array(T)
-        turned[..., :3, :3] = T[..., :3, :3] @ self.T_world_tool[:3, :3]
-        return turned
+        """Return the tool's poses, the inverse of :meth:`without_tool_rotation`."""
+        return self._with_rotation(T, self.T_world_tool[:3, :3])
+
+    @staticmethod
+    def _with_rotation(T: Array, R: Array) -> Array:
+        rotated = np.array(T)
+        rotated[..., :3, :3] = T[..., :3, :3] @ R
+        return rotated
 
 
 def joint_axes(description: Description, q: Array | None = None) -> JointAxes:
-    """Return the axes of a revolute arm at q, shape (n,), rad; at 0 unless given.
+    """Return the axes of a revolute arm at joint values q, shape (n,), rad; by default at 0.
 
     Raises
     ------
@@ -80,37 +82,38 @@ def bare(description: Description) -> Description:
 
 
 def has_spherical_wrist(axes: JointAxes) -> bool:
-    """Whether the last three axes meet in a point."""
+    """Return whether the last three axes meet in a point."""
     return wrist_centre(axes) is not None
 
 
 def wrist_centre(axes: JointAxes) -> Array | None:
-    """Return the point where the last three axes meet, m, or None."""
+    """Return the point where the last three axes meet, shape (3,), m, world; None if they do not."""
     directions, points = axes.directions[-3:], axes.points[-3:]
     # Least squares of the distances to the three lines: sum (1 - h h^T) (x - p) = 0.
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     centre = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None)[0]
     distances = np.linalg.norm(np.einsum("kij,kj->ki", projectors, centre - points), axis=1)
-    return centre if distances.max() < GEOMETRIC else None
+    return centre if distances.max() < AXIS_TOLERANCE else None
 
 
 @dataclass(frozen=True, eq=False)
 class OrthoParallel:
     """An arm with an ortho-parallel basis and a spherical wrist.
 
-    Its zero state has all links upright, axes along z y y z y z; lengths as in Brandstötter, Angerer and Hofbaur, An
-    analytical solution of the inverse kinematics problem of industrial serial manipulators (2014), figure 2.
+    At its zero state all links are upright, with axes along z y y z y z; lengths are named as in
+    Brandstötter, Angerer and Hofbaur, An analytical solution of the inverse kinematics problem of industrial serial
+    manipulators (2014), figure 2.
 
     Attributes
     ----------
     a1, a2, b, c2, c3
-        Lengths, m; c1 and c4 are 0: the basis is taken at shoulder height and the flange in the wrist's centre.
+        Lengths, m; c1 and c4 are 0, since the basis is at shoulder height and the flange in the wrist's centre.
     T_world_basis, T_flange_tool
-        What lies before and behind, shape (4, 4).
+        Poses of the basis and, in the flange, of the tool, shape (4, 4), m.
     zero
-        Our joint values where the arm stands upright, shape (6,), rad.
+        Our joint values of the upright arm, shape (6,), rad.
     signs
-        1 where the two joint angles grow together, else -1, shape (6,).
+        1 if our joint angle and the family's grow together, else -1, shape (6,).
     """
 
     a1: float
@@ -125,7 +128,7 @@ class OrthoParallel:
 
     @classmethod
     def of(cls, description: Description) -> OrthoParallel:
-        """Fit an arm: stand it upright joint by joint, then read its lengths off.
+        """Return the parameters of an arm: it is turned upright joint by joint, where its lengths are measured.
 
         Raises
         ------
@@ -137,17 +140,17 @@ class OrthoParallel:
         axes = joint_axes(description)
         centre = wrist_centre(axes)
         h = axes.directions
-        across = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
-        if centre is None or max(across) > GEOMETRIC or np.linalg.norm(np.cross(h[1], h[2])) > GEOMETRIC:
+        cosines = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
+        if centre is None or max(cosines) > AXIS_TOLERANCE or np.linalg.norm(np.cross(h[1], h[2])) > AXIS_TOLERANCE:
             raise UnavailableError("takes an ortho-parallel basis with a spherical wrist; this arm is built otherwise")
-        return _upright(description)
+        return _fit_upright(description)
 
     def poses(self, T: Array) -> Array:
-        """Return poses of the flange in the basis for poses of the tool in the world, shape (..., 4, 4)."""
+        """Return poses of the flange in the basis for poses of the tool in the world, shape (..., 4, 4), m."""
         return np.asarray(np.linalg.inv(self.T_world_basis) @ T @ np.linalg.inv(self.T_flange_tool))
 
     def tool_poses(self, T: Array) -> Array:
-        """Undo :meth:`poses`."""
+        """Return poses of the tool in the world, the inverse of :meth:`poses`."""
         return np.asarray(self.T_world_basis @ T @ self.T_flange_tool)
 
     def angles(self, q: Array) -> Array:
@@ -155,25 +158,25 @@ class OrthoParallel:
         return self.signs * (q - self.zero)
 
     def ours(self, angles: Array) -> Array:
-        """Undo :meth:`angles`."""
+        """Return our joint values, the inverse of :meth:`angles`."""
         return self.zero + self.signs * angles
 
 
-def _upright(description: Description) -> OrthoParallel:
+def _fit_upright(description: Description) -> OrthoParallel:
     axes = joint_axes(description)
     z, y = axes.directions[0], axes.directions[1]
     x = np.cross(y, z)
     q = np.zeros(6)
 
-    def turn(joint: int, current: Array, wanted: Array) -> JointAxes:
-        """Turn a joint until one vector shows where another does."""
+    def turn(joint: int, current: Array, target: Array) -> JointAxes:
+        """Turn a joint until one vector has the direction of another."""
         axis = joint_axes(description, q).directions[joint]
-        q[joint] = np.arctan2(axis @ np.cross(current, wanted), current @ wanted - (axis @ current) * (axis @ wanted))
+        q[joint] = np.arctan2(axis @ np.cross(current, target), current @ target - (axis @ current) * (axis @ target))
         return joint_axes(description, q)
 
     upper_arm = axes.points[2] - axes.points[1]
     axes = turn(1, upper_arm - (upper_arm @ y) * y, z)
-    axes = turn(2, _towards(wrist_centre(axes), axes), z)
+    axes = turn(2, _forearm_direction(wrist_centre(axes), axes), z)
     axes = turn(3, axes.directions[4], y)
     axes = turn(4, axes.directions[5], z)
     centre = wrist_centre(axes)
@@ -202,7 +205,7 @@ def _upright(description: Description) -> OrthoParallel:
     )
 
 
-def _towards(centre: Array | None, axes: JointAxes) -> Array:
+def _forearm_direction(centre: Array | None, axes: JointAxes) -> Array:
     """Return the direction of the fourth axis that points from the elbow to the wrist's centre."""
     forearm: Array = axes.directions[3]
     return -forearm if centre is not None and (centre - axes.points[2]) @ forearm < 0 else forearm

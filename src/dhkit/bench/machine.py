@@ -1,4 +1,4 @@
-"""What a benchmark ran on: processor, Python and packages; nothing that names a host or a person."""
+"""The machine of a benchmark: processor, Python and packages; nothing that names a host or a person."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ PACKAGES = (
 
 @dataclass(frozen=True)
 class Machine:
-    """Where figures come from.
+    """The machine that a benchmark ran on.
 
     Attributes
     ----------
     processor
-        Its model.
+        Model of the processor.
     cores
-        How many of them this process may use.
+        Number of cores that this process may use.
     flags
-        Vector instruction sets that matter here.
+        Vector instruction sets that kernels use.
     system
         Operating system and architecture.
     python
         Implementation and version.
     packages
-        Versions of what took part, by name; missing ones are left out.
+        Versions of the packages, by name; those that are not installed are left out.
     kernels
         The setting ``DHKIT_KERNELS``: auto, on or off.
     """
@@ -92,7 +92,7 @@ def cores() -> int:
 
 
 def _cpuinfo() -> dict[str, str]:
-    """Return the first processor's entries of /proc/cpuinfo; nothing where there is none."""
+    """Return the first processor's entries of /proc/cpuinfo; none on systems without it."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:

@@ -1,4 +1,4 @@
-"""What a ratio table does not show: scaling over threads, peak memory, the first call of a new process."""
+"""Probes beside the ratios: scaling over threads, peak memory, and the first call of a new process."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from dhkit.description import write_robot
 from dhkit.display import value_line
 
 BLOCK, BLOCKS = bytes(256 * 1024), 128
-"""What the control loop hashes: a block that stays in the core's cache, and how often."""
-PROCESS_TIME = 120.0
-"""s a new process may take."""
-PROCESSES = 3
-"""New processes with a warm cache; the median counts."""
+"""The block that the control loop hashes, which stays in the core's cache, and how many times."""
+MAX_PROCESS_TIME = 120.0
+"""Longest time of a new process, s."""
+WARM_PROCESSES = 3
+"""New processes with a warm cache, of which the median time counts."""
 
 
 @dataclass(frozen=True)
 class ThreadScaling:
-    """One thread's time over two threads', for dhkit and for a loop that only computes, in the same rounds."""
+    """The time of one thread over that of two, for dhkit and for a control loop that only computes."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("quantity", "dhkit", "control loop", "share")
     quantity: str
@@ -47,17 +47,17 @@ class ThreadScaling:
 
     @property
     def share(self) -> float:
-        """How much of what the machine gives dhkit takes."""
+        """Dhkit's gain over that of the control loop, which is what the machine can give."""
         return self.dhkit / self.control
 
     @property
     def derived(self) -> dict[str, Any]:
-        """What JSON carries beyond the fields."""
+        """Entries in JSON besides the fields."""
         return {"share": self.share}
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.dhkit:.2f}", f"{self.control:.2f}", f"{self.share:.2f}")
 
     def __repr__(self) -> str:
@@ -66,16 +66,16 @@ class ThreadScaling:
 
 @dataclass(frozen=True)
 class PeakMemory:
-    """How much more memory a process holds at the worst moment of a batch call, all threads and native code counted.
+    """The peak of a process's memory during a batch call, with all threads and native code.
 
     Attributes
     ----------
     called
-        One of :attr:`CALLED`.
+        How the call is made: one of :attr:`CALLED`.
     inputs, outputs
-        Bytes of the call's arrays.
+        Sizes of the call's arrays, bytes.
     extra
-        Bytes beyond those held before the call.
+        Memory beyond that before the call, bytes.
     """
 
     CALLED: ClassVar[tuple[str, ...]] = ("out=", "new arrays")
@@ -88,23 +88,23 @@ class PeakMemory:
 
     @property
     def peak(self) -> int:
-        """Bytes that the call needs in all: its arrays and what it took beside them."""
+        """Memory that the call needs, bytes: its arrays, and what it allocates besides."""
         held = self.inputs + (self.outputs if self.called == "out=" else 0)
         return held + self.extra
 
     @property
     def share(self) -> float:
-        """The peak over inputs plus outputs."""
+        """The peak over the sum of inputs and outputs."""
         return self.peak / (self.inputs + self.outputs)
 
     @property
     def derived(self) -> dict[str, Any]:
-        """What JSON carries beyond the fields."""
+        """Entries in JSON besides the fields."""
         return {"peak": self.peak, "share": self.share}
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         arrays, peak = (f"{count / 1e6:.1f}" for count in (self.inputs + self.outputs, self.peak))
         return (self.quantity, self.called, arrays, peak, f"{self.share:.2f}")
 
@@ -114,14 +114,14 @@ class PeakMemory:
 
 @dataclass(frozen=True)
 class FirstCall:
-    """Seconds from the start of a new Python to the end of its first batch call, imports included.
+    """The time from the start of a new Python to the end of its first batch call, imports included.
 
     Attributes
     ----------
     first
-        With an empty kernel cache.
+        Time with an empty kernel cache, s.
     second
-        With a warm one.
+        Time with a warm kernel cache, s.
     """
 
     COLUMNS: ClassVar[tuple[str, ...]] = ("quantity", "cold cache [s]", "warm cache [s]")
@@ -131,7 +131,7 @@ class FirstCall:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """A line of a table under :attr:`COLUMNS`."""
+        """The cells of a row under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.first:.2f}", f"{self.second:.2f}")
 
     def __repr__(self) -> str:
@@ -144,7 +144,7 @@ def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadSca
     Raises
     ------
     UnavailableError
-        There is one core, or no such method.
+        There is only one core, or no such method.
     """
     if cores() < 2:
         raise UnavailableError("needs two cores")
@@ -169,7 +169,7 @@ def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadSca
 
 
 def _hash_blocks(count: int) -> None:
-    """Compute without memory traffic and without Python's lock, which hashlib lets go of."""
+    """Compute without memory traffic and without Python's global lock, which hashlib releases."""
     digest = hashlib.sha256()
     for _ in range(count):
         digest.update(BLOCK)
@@ -181,50 +181,52 @@ def peak_memory(workload: Workload, quantity: str, called: str) -> PeakMemory:
     Raises
     ------
     UnavailableError
-        The system does not count peaks, or there is no such method.
+        The system does not record peaks, or there is no such method.
     """
     method(workload.arm, quantity)
     if not Path("/proc/self/clear_refs").exists():
         raise UnavailableError("needs Linux's /proc/self/clear_refs")
-    # Freed memory goes back to the system at once: none of the peak hides in what was free before.
-    calm = {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
+    # With these settings freed memory is returned to the system at once, so that it cannot hide a part of the peak.
+    malloc = {"MALLOC_MMAP_THRESHOLD_": "131072", "MALLOC_TRIM_THRESHOLD_": "131072"}
     code = "from dhkit.bench import probes; probes.report_peak()"
     with tempfile.TemporaryDirectory() as folder:
         robot = _robot_file(workload.arm, folder)
-        printed = _python(code, robot, quantity, called, str(len(workload.q)), str(workload.threads), environment=calm)
+        printed = _python(
+            code, robot, quantity, called, str(len(workload.q)), str(workload.threads), environment=malloc
+        )
     return PeakMemory(quantity, called, **json.loads(printed))
 
 
 def report_peak() -> None:
-    """Print one call's bytes as JSON; the arguments are what :func:`peak_memory` passes."""
+    """Print the sizes of one call, bytes, as JSON; the arguments are those that :func:`peak_memory` passes."""
     robot, quantity, called, batch, threads = sys.argv[1:]
     workload = Workload.of(Arm.load(robot), int(batch), int(threads), seed=0)
     workload.arm.compile()
     function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
     out = new_output(function, inputs) if called == "out=" else None
-    warm = min(len(inputs[0]), 1024)
-    few = [x[:warm] for x in inputs]
-    function(*few, out=None if out is None else out[:warm], threads=workload.threads)
-    result, extra = _watched(lambda: function(*inputs, out=out, threads=workload.threads))
-    sizes = {"inputs": sum(x.nbytes for x in inputs), "outputs": _bytes_of(result), "extra": extra}
+    count = min(len(inputs[0]), 1024)
+    warm_up = [x[:count] for x in inputs]
+    function(*warm_up, out=None if out is None else out[:count], threads=workload.threads)
+    result, extra = _with_memory(lambda: function(*inputs, out=out, threads=workload.threads))
+    sizes = {"inputs": sum(x.nbytes for x in inputs), "outputs": _size_of(result), "extra": extra}
     sys.stdout.write(json.dumps(sizes))
 
 
-def _watched(call: Callable[[], Any]) -> tuple[Any, int]:
-    """Return a call's result and how far the resident memory rose above what it was, bytes."""
-    Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
-    before = _status("VmRSS")
+def _with_memory(call: Callable[[], Any]) -> tuple[Any, int]:
+    """Return a call's result, and how far the resident memory rose during the call, bytes."""
+    Path("/proc/self/clear_refs").write_text("5")  # this resets the recorded peak
+    initial = _memory("VmRSS")
     result = call()
-    return result, max(0, _status("VmHWM") - before)
+    return result, max(0, _memory("VmHWM") - initial)
 
 
-def _status(key: str) -> int:
+def _memory(key: str) -> int:
     lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(f"{key}:"))
 
 
-def _bytes_of(result: Any) -> int:
-    """Return the bytes of an array, or of the arrays that a result is made of."""
+def _size_of(result: Any) -> int:
+    """Return the size of an array, or of the arrays in a result, bytes."""
     if isinstance(result, np.ndarray):
         return result.nbytes
     parts = result._asdict().values() if hasattr(result, "_asdict") else vars(result).values()
@@ -240,10 +242,10 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
         A process fails, or there is no such method.
     """
     method(workload.arm, quantity)
-    given = {"ik": "arm.fk(q)", "inverse_dynamics": "q, q, q", "forward_dynamics": "q, q, q"}.get(quantity, "q")
+    arguments = {"ik": "arm.fk(q)", "inverse_dynamics": "q, q, q", "forward_dynamics": "q, q, q"}.get(quantity, "q")
     code = (
         "import sys, numpy as np, dhkit; arm = dhkit.Arm.load(sys.argv[1]); "
-        f"q = np.random.default_rng(0).uniform(-1, 1, (int(sys.argv[2]), arm.n)); arm.{quantity}({given})"
+        f"q = np.random.default_rng(0).uniform(-1, 1, (int(sys.argv[2]), arm.n)); arm.{quantity}({arguments})"
     )
     with tempfile.TemporaryDirectory() as folder:
         robot, cache = _robot_file(workload.arm, folder), {"DHKIT_CACHE_DIR": str(Path(folder) / "cache")}
@@ -253,7 +255,7 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
             _python(code, robot, str(len(workload.q)), environment=cache)
             return perf_counter() - start
 
-        return FirstCall(quantity, seconds(), median(seconds() for _ in range(PROCESSES)))
+        return FirstCall(quantity, seconds(), median(seconds() for _ in range(WARM_PROCESSES)))
 
 
 def _robot_file(arm: Arm, folder: str) -> str:
@@ -263,18 +265,20 @@ def _robot_file(arm: Arm, folder: str) -> str:
 
 
 def _python(code: str, *arguments: str, environment: Mapping[str, str]) -> str:
-    """Run code in a new Python and return what it prints."""
+    """Run code in a new Python and return its output."""
     command = [sys.executable, "-c", code, *arguments]
     with suppress(subprocess.TimeoutExpired):
-        done = subprocess.run(  # noqa: S603 - our own code
+        process = subprocess.run(  # noqa: S603 - our own code
             command,
             capture_output=True,
             text=True,
-            timeout=PROCESS_TIME,
+            timeout=MAX_PROCESS_TIME,
             check=False,
             env=os.environ | dict(environment),
         )
-        if done.returncode:
-            raise UnavailableError(f"a new process failed: {(done.stderr.strip().splitlines() or ['no output'])[-1]}")
-        return done.stdout
-    raise UnavailableError(f"a new process took more than {PROCESS_TIME:.0f} s")
+        if process.returncode:
+            raise UnavailableError(
+                f"a new process failed: {(process.stderr.strip().splitlines() or ['no output'])[-1]}"
+            )
+        return process.stdout
+    raise UnavailableError(f"a new process took more than {MAX_PROCESS_TIME:.0f} s")

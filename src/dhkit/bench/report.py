@@ -1,4 +1,4 @@
-"""What a benchmark found, for people (text, Markdown) and machines (JSON)."""
+"""The report of a benchmark, for people (text, Markdown, HTML) and for machines (JSON)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 
 BATCH = 100_000
-"""Items of the batch that the figures are asked at."""
+"""Items of the batch that requirements are about."""
 
 Table: TypeAlias = tuple[str, Sequence[str], list[list[str]]]
+"""Heading, names of the columns, and cells of a table."""
 RATIO_MEANING = (
     "x batch and x single: how many times as long as dhkit's batch call with out=, and as its single call; "
     "medians over the rounds. Error: largest difference from dhkit's answers (of dynamics over their "
@@ -27,23 +28,23 @@ RATIO_MEANING = (
 
 @dataclass(frozen=True)
 class Row:
-    """One contender's figures.
+    """The timings of one contender.
 
     Attributes
     ----------
     quantity, contender, mode
-        What was timed and how it was called.
+        Quantity, name of the contender, and how it was called.
     own
-        Whether it is dhkit itself.
+        Whether the contender is dhkit itself.
     items, rounds
-        Items a batch call, or a loop of single calls; rounds.
+        Items of a batch call, or of a loop of single calls; number of rounds.
     seconds, lower, upper
-        Median and quartiles over the rounds, s an item.
+        Median and quartiles over the rounds, s for each item.
     verdict
-        Whether its answers agree with dhkit's.
+        Agreement of the answers with dhkit's.
     times_batch, times_single
-        Its time over that of dhkit's batch call with ``out=``, and over that of dhkit's single call; None where dhkit
-        was not measured.
+        The time over that of dhkit's batch call with ``out=``, and over that of dhkit's single call; None if dhkit was
+        not measured.
     """
 
     quantity: str
@@ -60,18 +61,18 @@ class Row:
     times_single: float | None
 
     def __repr__(self) -> str:
-        said = f"{self.mode.value}, {duration(self.seconds)} an item"
-        return repr_line("Row", f"{self.quantity} by {self.contender}", said)
+        timing = f"{self.mode.value}, {duration(self.seconds)} an item"
+        return repr_line("Row", f"{self.quantity} by {self.contender}", timing)
 
 
 @dataclass(frozen=True)
 class Missing:
-    """A contender or a probe that did not take part, and why.
+    """A contender or a probe that did not take part.
 
     Attributes
     ----------
     quantity, name, reason
-        What it was to compute or to measure, whose or what it is, why there are no figures of it.
+        Quantity, name of the contender or the probe, and why there are no timings.
     failed
         Whether it raised an error; otherwise it is not installed, or is not made for this arm or machine.
     own
@@ -89,7 +90,7 @@ class Missing:
 
 
 class Ending(Enum):
-    """How the comparison of a quantity ended, in words."""
+    """How the comparison of a quantity ended; the value is the text in reports."""
 
     COMPLETE = "every contender that took part agrees"
     PEERS_FAILED = "peers failed"
@@ -106,11 +107,11 @@ class Outcome:
     Attributes
     ----------
     quantity
-        What was compared.
+        The quantity.
     ending
-        How it ended.
+        How the comparison ended.
     causes
-        The contenders that brought it about, each with its reason; none where all is well.
+        The contenders that caused it, each with its reason; none if all contenders agree.
     """
 
     quantity: str
@@ -119,12 +120,12 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Whether dhkit was timed and agrees, whatever its peers did."""
+        """Whether dhkit was timed and agrees, with or without failures of peers."""
         return self.ending in (Ending.COMPLETE, Ending.PEERS_FAILED)
 
     @property
     def derived(self) -> dict[str, Any]:
-        """What JSON carries beside the quantity and the causes."""
+        """Entries in JSON besides the quantity and the causes."""
         return {"ending": self.ending.name.lower(), "ok": self.ok}
 
     def __str__(self) -> str:
@@ -138,22 +139,22 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A figure that dhkit must reach.
+    """A number that dhkit must reach.
 
     Attributes
     ----------
     quantity, what
-        What is compared.
+        The quantity, and what is compared.
     required, target
-        The least (or most) that is asked, and what is hoped for.
+        The required number, and a better one that is aimed at.
     at_most
-        Whether ``required`` is the most.
+        Whether ``required`` is an upper bound, rather than a lower one.
     measured
-        What was seen; None where something did not take part.
+        The measured number; None if a contender did not take part.
     judged
-        Whether it was measured under the conditions that it is asked under.
+        Whether it was measured under the conditions of the requirement.
     conditions
-        What these are.
+        Description of these conditions.
     """
 
     quantity: str
@@ -167,19 +168,19 @@ class Requirement:
 
     @property
     def met(self) -> bool | None:
-        """Whether it is reached; None where that cannot be told."""
+        """Whether the requirement is met; None if that cannot be judged."""
         if self.measured is None or not self.judged:
             return None
         return self.measured <= self.required if self.at_most else self.measured >= self.required
 
     @property
     def derived(self) -> dict[str, Any]:
-        """What JSON carries beyond the fields."""
+        """Entries in JSON besides the fields."""
         return {"met": self.met}
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """What, required, measured, verdict."""
+        """Cells of a row: what is compared, required number, measured number, verdict."""
         target = f" (target {self.target:g})" if self.target else ""
         bound = f"at {'most' if self.at_most else 'least'} {self.required:g}{target}"
         measured = "not measured" if self.measured is None else f"{self.measured:.3g}"
@@ -198,28 +199,28 @@ class Requirement:
 
 @dataclass(frozen=True)
 class BenchReport:
-    """dhkit beside its peers, one robot, one process.
+    """Timings of dhkit beside its peers, for one robot in one process.
 
     Attributes
     ----------
     robot
-        Its name.
+        Name of the robot.
     batch, threads, seed
-        Items of a batch, threads a batch call may use, seed of the states.
+        Items of a batch, threads that a batch call may use, seed of the states.
     rows, missing
-        The contenders' figures; who did not take part, and why.
+        Timings of the contenders; contenders that did not take part.
     outcomes
         How the comparison of each quantity ended; an interrupted run has those that it finished.
     scaling, memory, starts
-        Two threads against one, peak memory, time of a second process.
+        Two threads against one, peak memory, first call of a new process.
     machine
-        Where it ran.
+        The machine that the benchmark ran on.
     interrupted
-        Whether it was stopped before the end.
+        Whether the run was stopped before its end.
     derivations, operations
-        How long equations take to derive, and how many operations they are.
+        Times of deriving equations, and numbers of their operations.
     requirements
-        Targets that the run was held against, beside what was measured; none unless asked for.
+        Requirements beside the measured numbers; by default none.
     """
 
     robot: str
@@ -239,7 +240,7 @@ class BenchReport:
     requirements: tuple[Requirement, ...] = ()
 
     def json(self) -> dict[str, Any]:
-        """Return everything as what JSON knows: no NaN, no tuples, no classes."""
+        """Return the report as plain data for JSON, without NaN, tuples and classes."""
         plain = asdict(self)
         for entry, row in zip(plain["rows"], self.rows, strict=True):
             verdict = entry.pop("verdict")
@@ -247,8 +248,8 @@ class BenchReport:
         for key in ("outcomes", "requirements", "scaling", "memory"):
             for entry, value in zip(plain[key], getattr(self, key), strict=True):
                 entry |= value.derived
-        listed: dict[str, Any] = listed_values(plain)
-        return listed
+        data: dict[str, Any] = with_lists(plain)
+        return data
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
@@ -258,7 +259,9 @@ class BenchReport:
         return report_text(self._title, self.machine.facts, self._tables, RATIO_MEANING)
 
     def __repr__(self) -> str:
-        return repr_line("BenchReport", self.robot, f"{counted(len(self.rows), 'row')}, {standing(self.requirements)}")
+        return repr_line(
+            "BenchReport", self.robot, f"{counted(len(self.rows), 'row')}, {requirements_text(self.requirements)}"
+        )
 
     def _repr_html_(self) -> str:
         endings = {outcome.quantity: outcome.ending.value for outcome in self.outcomes}
@@ -270,16 +273,16 @@ class BenchReport:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The quantities that were timed."""
+        """The quantities that were timed, in their order."""
         return tuple(dict.fromkeys(row.quantity for row in self.rows))
 
     def _fastest(self, quantity: str) -> tuple[str, str, str]:
-        """Return dhkit's least time, and who of the peers that agree has the least, with it."""
+        """Return dhkit's shortest time, and the fastest of the peers that agree with its time, as text."""
         rows = [row for row in self.rows if row.quantity == quantity]
         own = min((row.seconds for row in rows if row.own), default=None)
         peer = min((row for row in rows if not row.own and row.verdict.ok), key=lambda row: row.seconds, default=None)
-        least = "–" if own is None else duration(own)
-        return (least, "–", "–") if peer is None else (least, peer.contender, duration(peer.seconds))
+        own_text = "–" if own is None else duration(own)
+        return (own_text, "–", "–") if peer is None else (own_text, peer.contender, duration(peer.seconds))
 
     @property
     def _title(self) -> str:
@@ -289,26 +292,23 @@ class BenchReport:
 
     @property
     def _tables(self) -> list[Table]:
-        """Headings, columns and cells of the tables that have something to show."""
+        """The tables that have rows."""
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
         tables: list[Table] = [
             (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
             for quantity in self.quantities
         ]
-        tables += [
-            ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
-            ("Two threads", ThreadScaling.COLUMNS, [list(line.cells) for line in self.scaling]),
-            ("Peak memory", PeakMemory.COLUMNS, [list(line.cells) for line in self.memory]),
-            ("A new process", FirstCall.COLUMNS, [list(line.cells) for line in self.starts]),
-            ("Operations", Operations.COLUMNS, [list(line.cells) for line in self.operations]),
-            ("Derivations", Derivation.COLUMNS, [list(line.cells) for line in self.derivations]),
-            (
-                "Did not take part",
-                ("quantity", "who", "why"),
-                [[gap.quantity, gap.name, gap.reason] for gap in self.missing],
-            ),
-        ]
-        return [table for table in tables if table[2]]
+        others = (
+            ("Required", ("what", "required", "measured", ""), self.requirements),
+            ("Two threads", ThreadScaling.COLUMNS, self.scaling),
+            ("Peak memory", PeakMemory.COLUMNS, self.memory),
+            ("A new process", FirstCall.COLUMNS, self.starts),
+            ("Operations", Operations.COLUMNS, self.operations),
+            ("Derivations", Derivation.COLUMNS, self.derivations),
+        )
+        tables += [(heading, columns, [list(row.cells) for row in rows]) for heading, columns, rows in others]
+        gaps = [[gap.quantity, gap.name, gap.reason] for gap in self.missing]
+        return [table for table in (*tables, ("Did not take part", ("quantity", "who", "why"), gaps)) if table[2]]
 
 
 def _cells(row: Row) -> list[str]:
@@ -327,7 +327,7 @@ def _cells(row: Row) -> list[str]:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in the unit that suits it, three digits."""
+    """Return a time, s, as text with three digits in a suitable unit."""
     for unit, scale in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= 0.9995 * scale:
             return f"{seconds / scale:.3g} {unit}"
@@ -341,7 +341,7 @@ def _ratio(value: float | None) -> str:
 
 
 def report_text(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
-    """Return a report as text: what ran where, its tables, and what their columns mean."""
+    """Return a report as text: title, facts of the machine, tables, and the meaning of their columns."""
     parts = [title, *(f"  {fact}" for fact in facts), ""]
     for heading, columns, cells in tables:
         parts += [heading, *text_table(columns, cells), ""]
@@ -349,7 +349,7 @@ def report_text(title: str, facts: Iterable[str], tables: Iterable[Table], meani
 
 
 def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
-    """Return the same as Markdown."""
+    """Return a report as Markdown; see :func:`report_text`."""
     parts = [f"# {title}", *(f"- {fact}" for fact in facts), ""]
     for heading, columns, cells in tables:
         parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
@@ -357,20 +357,20 @@ def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], m
 
 
 def report_html(title: str, facts: Iterable[str], table: str, requirements: Sequence[Requirement] = ()) -> str:
-    """Return a report for a notebook: its main table, which is HTML already, and what is required."""
+    """Return a report for a notebook: its main table, which is HTML already, and its requirements."""
     cells = [requirement.cells for requirement in requirements]
     required = html_table(("what", "required", "measured", ""), cells) if cells else ""
     return html_block(title, table, required, html_lines(list(facts)))
 
 
-def standing(requirements: Sequence[Requirement]) -> str:
-    """Return how many of what is required is met, of what could be judged."""
+def requirements_text(requirements: Sequence[Requirement]) -> str:
+    """Return the number of requirements that are met, of those that could be judged, as text."""
     judged = [requirement.met for requirement in requirements if requirement.met is not None]
     return f"{sum(judged)} of {counted(len(judged), 'requirement')} met"
 
 
 def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
-    """Return a table's lines for a terminal."""
+    """Return the lines of a table for a terminal."""
     lines = [list(columns), *map(list, cells)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
     return [
@@ -379,15 +379,15 @@ def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[s
 
 
 def markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
-    """Return a table's lines in Markdown."""
+    """Return the lines of a table in Markdown."""
     lines = [columns, ["---"] * len(columns), *cells]
     return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
 
 
-def listed_values(value: Any) -> Any:
-    """Return plain data with tuples as lists, as JSON has them."""
+def with_lists(value: Any) -> Any:
+    """Return plain data with lists in place of tuples, as JSON reads it back."""
     if isinstance(value, dict):
-        return {key: listed_values(entry) for key, entry in value.items()}
+        return {key: with_lists(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [listed_values(entry) for entry in value]
+        return [with_lists(entry) for entry in value]
     return value

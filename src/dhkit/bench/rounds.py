@@ -1,4 +1,4 @@
-"""Timing in interleaved rounds: every contender once a round, so that a noisy minute hits them all."""
+"""Timing in interleaved rounds: every contender is timed once in each round, so that a noisy minute affects all."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from dhkit.bench.contenders import Call, Mode, Task
 from dhkit.description import Array
 
 BUDGET = {Mode.SINGLE: 0.05, Mode.BATCH: 1.0}
-"""s a contender may take in a round: a loop of single calls is as telling when it is short."""
-LASTING = 0.02
-"""s: a call is repeated until its timing lasts this long: caches are then as warm for each, and no start decides."""
+"""Time of a contender in a round, s: a short loop of single calls is as informative as a long one."""
+MIN_TIMING = 0.02
+"""Shortest timing of repeated calls, s: with it caches are equally warm for all, and the first call does not decide."""
 
 
 @contextmanager
 def calm() -> Iterator[None]:
-    """Keep the garbage collector and others' warnings out of what is timed."""
-    collecting = gc.isenabled()
+    """Keep the garbage collector and warnings of other packages out of timings."""
+    was_enabled = gc.isenabled()
     gc.collect()
     gc.disable()
     try:
@@ -30,12 +30,12 @@ def calm() -> Iterator[None]:
             warnings.simplefilter("ignore")
             yield
     finally:
-        if collecting:
+        if was_enabled:
             gc.enable()
 
 
 def seconds_of(call: Call) -> float:
-    """Return how long one call takes, s; what it returns is let go after the clock has stopped."""
+    """Return the time of one call, s; its result is freed after the clock has stopped."""
     start = perf_counter()
     result = call()
     seconds = perf_counter() - start
@@ -43,27 +43,27 @@ def seconds_of(call: Call) -> float:
     return seconds
 
 
-def items_within(task: Task, mode: Mode, most: int) -> int:
-    """Return how many items fit a round, at most ``most``; this warms the contender up as well."""
-    items = min(most, 1 if mode is Mode.SINGLE else 64)
+def items_within(task: Task, mode: Mode, max_items: int) -> int:
+    """Return how many items fit into a round, at most ``max_items``; this warms the contender up as well."""
+    items = min(max_items, 1 if mode is Mode.SINGLE else 64)
     while True:
         call = task.prepare(items)
         seconds_of(call)
         seconds = seconds_of(call)
         room = BUDGET[mode] / max(seconds, 1e-9)
-        if items == most or room < 2.0:
+        if items == max_items or room < 2.0:
             return max(1, int(items * min(1.0, room)))
-        items = min(most, items * int(min(room, 16.0)))
+        items = min(max_items, items * int(min(room, 16.0)))
 
 
 def lasting(call: Call) -> int:
-    """Return how often a call is to be repeated; this warms it up as well."""
+    """Return the number of repetitions of a call in a timing; this warms the call up as well."""
     seconds_of(call)
-    return max(1, round(LASTING / max(seconds_of(call), 1e-7)))
+    return max(1, round(MIN_TIMING / max(seconds_of(call), 1e-7)))
 
 
 def repeated(call: Call, times: int) -> Call:
-    """Return a call of a call, one time after another."""
+    """Return a call that repeats another."""
 
     def calls() -> None:
         for _ in range(times):
@@ -73,7 +73,7 @@ def repeated(call: Call, times: int) -> Call:
 
 
 def rounds(calls: Sequence[Call], repeats: int) -> Iterator[Array]:
-    """Yield, a round, the seconds of each call, shape (len(calls),)."""
+    """Yield the times of the calls, shape (len(calls),), s, for each round."""
     for _ in range(repeats):
         gc.collect()
         yield np.array([seconds_of(call) for call in calls])

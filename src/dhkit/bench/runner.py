@@ -1,4 +1,4 @@
-"""The benchmark: set contenders up, check their answers, time them in turns."""
+"""The benchmark: contenders are set up, their answers are checked, and they are timed in turns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.bench.agreement import Verdict, judge
-from dhkit.bench.contenders import QUANTITIES, Call, Contender, Task, UnavailableError, Workload
+from dhkit.bench.contenders import QUANTITIES, Call, Contender, UnavailableError, Workload
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
@@ -19,17 +19,17 @@ from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
 DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
-DERIVING = 90.0
-"""s that a peer may derive: one that takes longer would not be waited for."""
+MAX_DERIVATION_TIME = 90.0
+"""Longest time of a peer's derivation, s: nobody would wait longer."""
 REPEATS = 9
-"""Rounds: odd, so that the median is one of them."""
+"""Number of rounds: odd, so that the median is one of them."""
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class _Entrant:
-    """A contender that takes part: a call of ``times`` times ``items`` items."""
+    """A contender that takes part, with a call that computes ``items`` items ``times`` times."""
 
     contender: Contender
     verdict: Verdict
@@ -39,8 +39,8 @@ class _Entrant:
 
 
 @dataclass
-class _Findings:
-    """What was measured so far; an interrupted run reports it."""
+class _Measurements:
+    """The measurements so far, which are reported also by an interrupted run."""
 
     rows: list[Row] = field(default_factory=list)
     missing: list[Missing] = field(default_factory=list)
@@ -74,31 +74,31 @@ def run(
     quantities
         Any of :data:`QUANTITIES`.
     batch
-        Items of a batch; slow contenders get fewer, as their rows say.
+        Items of a batch; slow contenders get fewer, as their rows show.
     threads
-        How many threads batch calls that offer threads may use.
+        Number of threads that batch calls may use, if they have threads.
     repeats
-        Rounds.
+        Number of rounds.
     seed
-        Of the random states.
+        Seed of the random states.
     progress
-        Gets a line before each step.
+        Called with a line before each step.
     probes
-        Whether to measure threads, memory and new processes too, and with dynamics derivations.
+        Whether threads, memory and new processes are measured too and, with dynamics, derivations.
     contenders
-        Who takes part; everyone unless given.
+        The contenders; by default all.
     targets
-        Returns the requirements that the report is held against; none unless given.
+        Returns the requirements that the report is compared with; by default there are none.
 
     Returns
     -------
     BenchReport
-        What was measured; when interrupted from the keyboard, what was measured until then.
+        The measurements; after Ctrl-C those until then.
 
     Raises
     ------
     ValueError
-        An unknown quantity, or a count below 1.
+        A quantity is unknown, or a count is below 1.
 
     Examples
     --------
@@ -107,23 +107,23 @@ def run(
     >>> report.rows[0].contender, report.rows[0].items
     ('dhkit, out=', 100)
     """
-    _check(quantities, batch=batch, threads=threads, repeats=repeats)
+    _check_arguments(quantities, batch=batch, threads=threads, repeats=repeats)
     tell = progress or (lambda line: None)
     chosen = all_contenders() if contenders is None else contenders
-    findings, interrupted = _Findings(), False
+    measurements, interrupted = _Measurements(), False
     try:
         with calm():
             workload = Workload.of(arm, batch, threads, seed)
             tell("compiling")
             arm.compile()
             for quantity in quantities:
-                _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, findings, tell)
-                findings.outcomes.append(outcome_of(quantity, findings.rows, findings.missing))
+                _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, measurements, tell)
+                measurements.outcomes.append(outcome_of(quantity, measurements.rows, measurements.missing))
             for quantity in quantities if probes else ():
-                _probe(workload, quantity, repeats, findings, tell)
+                _probe(workload, quantity, repeats, measurements, tell)
             if probes and not DYNAMICS.isdisjoint(quantities):
                 tell("derivations")
-                _derive(arm, findings)
+                _derive(arm, measurements)
     except KeyboardInterrupt:
         interrupted = True
     report = BenchReport(
@@ -131,14 +131,7 @@ def run(
         batch=batch,
         threads=threads,
         seed=seed,
-        rows=tuple(findings.rows),
-        missing=tuple(findings.missing),
-        outcomes=tuple(findings.outcomes),
-        scaling=tuple(findings.scaling),
-        memory=tuple(findings.memory),
-        starts=tuple(findings.starts),
-        derivations=tuple(findings.derivations),
-        operations=tuple(findings.operations),
+        **{name: tuple(values) for name, values in vars(measurements).items()},
         machine=Machine.here(),
         interrupted=interrupted,
     )
@@ -148,17 +141,17 @@ def run(
 def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -> Outcome:
     """Return how the comparison of a quantity ended.
 
-    A contender fails where it raises an error, and where its answers disagree with the reference. One that is not
-    installed, or not made for the arm, does not fail: it counts only where dhkit itself, or every contender, is so.
+    A contender fails if it raises an error, or if its answers disagree with the reference. A contender that is not
+    installed, or not made for the arm, does not fail: it counts only if dhkit itself, or every contender, is so.
 
     Parameters
     ----------
     quantity
-        What was compared.
+        The quantity.
     rows
-        Figures of contenders; those of other quantities do not count.
+        Rows of contenders; those of other quantities are ignored.
     missing
-        Contenders without figures, likewise.
+        Contenders without rows; those of other quantities are ignored.
 
     Examples
     --------
@@ -184,7 +177,7 @@ def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -
     return Outcome(quantity, Ending.PEERS_FAILED if peers_failed else Ending.COMPLETE, peers_failed)
 
 
-def _check(quantities: Sequence[str], **counts: int) -> None:
+def _check_arguments(quantities: Sequence[str], **counts: int) -> None:
     for quantity in quantities:
         if quantity not in QUANTITIES:
             raise ValueError(f"no quantity {quantity!r}; expected {', '.join(QUANTITIES)}")
@@ -194,10 +187,10 @@ def _check(quantities: Sequence[str], **counts: int) -> None:
 
 
 def _compare(
-    workload: Workload, contenders: Sequence[Contender], repeats: int, findings: _Findings, tell: Progress
+    workload: Workload, contenders: Sequence[Contender], repeats: int, measurements: _Measurements, tell: Progress
 ) -> None:
-    """Check and time the contenders of one quantity; what an interrupted run has seen is kept."""
-    entrants = list(_entrants(workload, contenders, findings, tell))
+    """Check and time the contenders of one quantity; the rounds of an interrupted run are kept."""
+    entrants = list(_entrants(workload, contenders, measurements, tell))
     if not entrants:
         return
     seconds: list[Array] = []
@@ -207,27 +200,23 @@ def _compare(
             tell(f"{entrants[0].contender.quantity}: round {len(seconds)} of {repeats}")
     finally:
         if seconds:
-            findings.rows += _rows(entrants, np.array(seconds))
+            measurements.rows += _rows(entrants, np.array(seconds))
 
 
 def _entrants(
-    workload: Workload, contenders: Sequence[Contender], findings: _Findings, tell: Progress
+    workload: Workload, contenders: Sequence[Contender], measurements: _Measurements, tell: Progress
 ) -> Iterator[_Entrant]:
     for contender in contenders:
         tell(f"{contender.quantity}: {contender.name}")
         try:
             task = contender.setup(workload)
             verdict = judge(workload, contender.quantity, task)
-            yield _prepared(contender, task, verdict, len(workload.q))
-        except Exception as error:  # a peer may fail in any way; the benchmark goes on and says so
-            findings.missing.append(_missing(contender.quantity, contender.name, error, own=contender.own))
-
-
-def _prepared(contender: Contender, task: Task, verdict: Verdict, most: int) -> _Entrant:
-    items = items_within(task, contender.mode, most)
-    call = task.prepare(items)
-    times = lasting(call)
-    return _Entrant(contender, verdict, items, times, repeated(call, times))
+            items = items_within(task, contender.mode, len(workload.q))
+            call = task.prepare(items)
+            times = lasting(call)
+            yield _Entrant(contender, verdict, items, times, repeated(call, times))
+        except Exception as error:  # a peer may fail in any way; the report names it
+            measurements.missing.append(_missing(contender.quantity, contender.name, error, own=contender.own))
 
 
 def _missing(quantity: str, name: str, error: Exception, *, own: bool = False) -> Missing:
@@ -238,13 +227,13 @@ def _missing(quantity: str, name: str, error: Exception, *, own: bool = False) -
 
 
 def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
-    """Return rows of seconds, shape (rounds, entrants); ratios are taken within a round."""
-    each = seconds / np.array([entrant.items * entrant.times for entrant in entrants])
-    lower, middle, upper = np.quantile(each, [0.25, 0.5, 0.75], axis=0)
+    """Return the rows of timings, shape (rounds, entrants), s; ratios are those within a round."""
+    per_item = seconds / np.array([entrant.items * entrant.times for entrant in entrants])
+    lower, middle, upper = np.quantile(per_item, [0.25, 0.5, 0.75], axis=0)
     names = [entrant.contender.name for entrant in entrants]
 
-    def times(k: int, reference: str) -> float | None:
-        return float(np.median(each[:, k] / each[:, names.index(reference)])) if reference in names else None
+    def ratio(k: int, reference: str) -> float | None:
+        return float(np.median(per_item[:, k] / per_item[:, names.index(reference)])) if reference in names else None
 
     return [
         Row(
@@ -258,35 +247,38 @@ def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
             lower=float(lower[k]),
             upper=float(upper[k]),
             verdict=entrant.verdict,
-            times_batch=times(k, dhkit_arm.BATCH),
-            times_single=times(k, dhkit_arm.SINGLE),
+            times_batch=ratio(k, dhkit_arm.BATCH),
+            times_single=ratio(k, dhkit_arm.SINGLE),
         )
         for k, entrant in enumerate(entrants)
     ]
 
 
-def _derive(arm: Arm, findings: _Findings) -> None:
+def _derive(arm: Arm, measurements: _Measurements) -> None:
     """Count operations and time derivations."""
     try:
-        findings.operations += operations(arm)
-        findings.derivations += derivations(arm, DERIVING)
-    except Exception as error:  # as for the contenders
-        findings.missing.append(_missing("dynamics", "derivations", error))
+        measurements.operations += operations(arm)
+        measurements.derivations += derivations(arm, MAX_DERIVATION_TIME)
+    except Exception as error:  # it may fail in any way, as contenders may
+        measurements.missing.append(_missing("dynamics", "derivations", error))
 
 
-def _probe(workload: Workload, quantity: str, repeats: int, findings: _Findings, tell: Progress) -> None:
-    """Measure what the ratio table does not show; a probe that cannot is listed as missing."""
+def _probe(workload: Workload, quantity: str, repeats: int, measurements: _Measurements, tell: Progress) -> None:
+    """Measure the probes of a quantity; a probe that cannot be measured is listed as missing."""
     steps: tuple[tuple[str, Callable[[], None]], ...] = (
-        ("two threads", lambda: findings.scaling.append(thread_scaling(workload, quantity, repeats))),
+        ("two threads", lambda: measurements.scaling.append(thread_scaling(workload, quantity, repeats))),
         *(
-            (f"memory, {called}", lambda called=called: findings.memory.append(peak_memory(workload, quantity, called)))
+            (
+                f"memory, {called}",
+                lambda called=called: measurements.memory.append(peak_memory(workload, quantity, called)),
+            )
             for called in PeakMemory.CALLED
         ),
-        ("a new process", lambda: findings.starts.append(first_call(workload, quantity))),
+        ("a new process", lambda: measurements.starts.append(first_call(workload, quantity))),
     )
     for name, step in steps:
         tell(f"{quantity}: {name}")
         try:
             step()
-        except Exception as error:  # as for the contenders
-            findings.missing.append(_missing(quantity, name, error))
+        except Exception as error:  # it may fail in any way, as contenders may
+            measurements.missing.append(_missing(quantity, name, error))

@@ -200,10 +200,12 @@ def grade(
         return grade_command.write_explanation(Arm.load(explain), form, output)
     if not sheets:
         raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
-    wanted: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
+    options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
     if remark:
-        return grade_command.remark(sheets, grade_command.rubric_of(rubric), **wanted)
-    return grade_command.grade_files(sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **wanted)
+        return grade_command.remark(sheets, grade_command.rubric_of(rubric), **options)
+    return grade_command.grade_files(
+        sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **options
+    )
 
 
 @app.command()
@@ -277,7 +279,7 @@ SCHEMAS = {
     "task": "dhkit.grading.schema",
     "motion": "dhkit.trajectories.schema",
 }
-"""Modules that have a function ``NAME_schema``, by NAME."""
+"""Modules with a function ``NAME_schema``, by NAME."""
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""The application: all commands together; bad input ends in one line on stderr and status 2."""
+"""The application: all commands together; unusable input ends in one line on stderr and status 2."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dhkit import __version__
 from dhkit.cli import analysis_commands, motion_commands, robot_commands
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import ReaderGone, say
-from dhkit.cli.streams import accept_every_letter
+from dhkit.cli.streams import replace_unknown_letters
 from dhkit.description.joint_text import DEGREES
 from dhkit.errors import DhkitError
 
@@ -60,9 +60,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     KeyboardInterrupt
         Somebody pressed Ctrl-C.
     """
-    accept_every_letter()
+    replace_unknown_letters()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
-    logging.getLogger("dhkit").setLevel(logging.INFO)  # says what takes seconds, such as compiling
+    logging.getLogger("dhkit").setLevel(logging.INFO)  # messages about work that takes seconds, such as compiling
     degrees = DEGREES.set(False)
     try:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
@@ -82,25 +82,25 @@ def run(arguments: Sequence[str] | None = None) -> int:
         raise KeyboardInterrupt from None
     finally:
         DEGREES.reset(degrees)
-    if status == ExitStatus.INTERRUPTED:  # which some versions of typer make of Ctrl-C
+    if status == ExitStatus.INTERRUPTED:  # some versions of typer return it for Ctrl-C
         raise KeyboardInterrupt
-    return status if isinstance(status, int) else 0
+    return status if isinstance(status, int) else ExitStatus.FINE
 
 
-def _refuse(message: str) -> int:
+def _refuse(message: str) -> ExitStatus:
     """Print one line on stderr, shortened, and return the status of unusable input."""
-    line = LONG_WORD.sub(lambda found: f"{found[0][:MAX_WORD_LENGTH]}…", " ".join(message.split()))
+    line = LONG_WORD.sub(lambda match: f"{match[0][:MAX_WORD_LENGTH]}…", " ".join(message.split()))
     sys.stderr.write(f"dhkit: {line if len(line) <= MAX_MESSAGE_LENGTH else f'{line[:MAX_MESSAGE_LENGTH]}…'}\n")
     return ExitStatus.UNUSABLE
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         say(f"dhkit {__version__}")
         raise typer.Exit
 
 
-Version = Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")]
+Version = Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")]
 
 
 @app.callback()

@@ -1,12 +1,13 @@
-"""What people type after a command: numbers, joint values and poses, as expressions; and words made into one option."""
+"""Values that people type after a command: numbers, joint values and poses, as expressions; long options."""
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from enum import Enum, auto
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typer.core import TyperCommand
@@ -21,27 +22,47 @@ if TYPE_CHECKING:
     from dhkit.planning import Floor, Objective, Obstacle, Payload
     from dhkit.trajectories import Limits
 
-LARGEST = 10_000
-"""Bytes of a file with a matrix at most."""
-UNIT = re.compile(r"deg|°|\bpi\b", re.IGNORECASE)
-"""Of an angle, in an expression."""
+MAX_MATRIX_BYTES = 10_000
+"""Largest size of a file with a matrix."""
+ANGLE_UNIT = re.compile(r"deg|°|\bpi\b", re.IGNORECASE)
+"""Sign that an expression has its own unit of angles."""
 PLUS = re.compile(r"(?<![\d.][eE])\+")
-"""Between two terms, not in 1e+4."""
+"""A plus between two terms, not that of 1e+4."""
+
+
+class OutsideLimits(Enum):
+    """What happens to joint values outside the limits."""
+
+    WARN = auto()
+    """A warning on stderr names the joint."""
+    REFUSED_LATER = auto()
+    """Nothing here: the function that gets the values refuses them."""
+    ALLOWED = auto()
+    """Nothing: limits do not count."""
 
 
 def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
-    """Return the values of expressions, separated by spaces, commas or brackets.
+    """Return the values, shape (count,), of expressions that are separated by spaces, commas or brackets.
+
+    Parameters
+    ----------
+    words
+        The expressions.
+    what
+        Name of the values, for messages.
+    counts
+        How many values there may be.
 
     Raises
     ------
     DescriptionError
-        Another count, or no expression: says of what.
+        There is another count, or a word is no expression.
     """
-    listed = _split(words)
-    if len(listed) not in counts:
-        raise DescriptionError(f"{what}: {len(listed)} values; expected {' or '.join(map(str, counts))}")
+    expressions = _split(words)
+    if len(expressions) not in counts:
+        raise DescriptionError(f"{what}: {len(expressions)} values; expected {' or '.join(map(str, counts))}")
     try:
-        return np.array([float(parse(word)) for word in listed])
+        return np.array([float(parse(word)) for word in expressions])
     except ExpressionError as error:
         raise DescriptionError(f"{what}: {error}") from None
 
@@ -52,51 +73,66 @@ def joint_values(
     degrees: bool,
     what: str = "joint values",
     *,
-    outside: Literal["told", "refused", "fine"] = "told",
+    outside: OutsideLimits = OutsideLimits.WARN,
 ) -> Array:
     """Return joint values, shape (n,), rad and m, from expressions or the name of a configuration.
 
-    A joint outside its limits, or turned so far that degrees may be meant, is told on stderr.
+    A warning on stderr names a joint outside its limits, or one turned so far that degrees may be meant.
 
     Parameters
     ----------
+    arm
+        The arm.
+    words
+        The expressions, or one name.
+    degrees
+        Whether bare numbers of turning joints are in degrees.
+    what
+        Name of the values, for messages.
     outside
-        What becomes of values outside the limits: told here, refused by who is given them, or of no account.
+        What happens to values outside the limits.
 
     Raises
     ------
     DescriptionError
-        No such configuration, another count, or no expression.
+        There is no such configuration, there is another count, or a word is no expression.
     """
     if len(words) == 1 and words[0] in arm.configurations:
-        return _told(arm, arm.configurations[words[0]], words[0], outside)
-    listed = _split(words)
-    if len(listed) == 1 and not listed[0][:1].isdigit() and listed[0][:1] not in "+-.(":
+        return _with_warning(arm, arm.configurations[words[0]], words[0], outside)
+    expressions = _split(words)
+    if len(expressions) == 1 and not expressions[0][:1].isdigit() and expressions[0][:1] not in "+-.(":
         names = ", ".join(arm.configurations)
-        raise DescriptionError(f"{arm.name} has no configuration {listed[0]!r}; it has {names or 'none'}")
-    if typo := next((word for word in listed if word.startswith("--")), None):
-        raise DescriptionError(f"no such option: {typo}")
-    if len(listed) != arm.n:
-        raise DescriptionError(f"{len(listed)} {what}; expected {arm.n} for {arm.name}")
-    if degrees and (found := next((word for word in listed if UNIT.search(word)), None)):
+        raise DescriptionError(f"{arm.name} has no configuration {expressions[0]!r}; it has {names or 'none'}")
+    if option := next((word for word in expressions if word.startswith("--")), None):
+        raise DescriptionError(f"no such option: {option}")
+    if len(expressions) != arm.n:
+        raise DescriptionError(f"{len(expressions)} {what}; expected {arm.n} for {arm.name}")
+    if degrees and (found := next((word for word in expressions if ANGLE_UNIT.search(word)), None)):
         raise DescriptionError(f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees")
-    values = numbers(listed, what, [arm.n])
+    values = numbers(expressions, what, [arm.n])
     values = np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
-    return _told(arm, values, what, outside)
+    return _with_warning(arm, values, what, outside)
 
 
-def _told(arm: Arm, q: Array, what: str, outside: str) -> Array:
-    """Return joint values; say on stderr which is outside its limits, or turns so far that degrees may be meant."""
+def option_values(
+    arm: Arm, text: str, option: str, degrees: bool, outside: OutsideLimits = OutsideLimits.REFUSED_LATER
+) -> Array:
+    """Return the joint values of an option, shape (n,), rad and m: see :func:`joint_values`."""
+    return joint_values(arm, [text], degrees, f"values of {option}", outside=outside)
+
+
+def _with_warning(arm: Arm, q: Array, what: str, outside: OutsideLimits) -> Array:
+    """Return joint values; warn of the first outside its limits, or turned so far that degrees may be meant."""
     numbers = arm.description.numbers
     for i, joint in enumerate(arm.description.joints):
         slides = not joint.is_revolute
         beyond = violated_limit_text(q[i], numbers.lower[i], numbers.upper[i], slides=slides)
         hint = degrees_hint(q[i], slides=slides)
-        if beyond and outside == "refused":
+        if beyond and outside is OutsideLimits.REFUSED_LATER:
             break
-        if (beyond and outside == "told") or hint:
-            words = beyond or f"{joint_text(q[i], slides=slides)}{hint}"
-            sys.stderr.write(f"dhkit: warning: {what}: {joint.name} is {words}\n")
+        if (beyond and outside is OutsideLimits.WARN) or hint:
+            problem = beyond or f"{joint_text(q[i], slides=slides)}{hint}"
+            sys.stderr.write(f"dhkit: warning: {what}: {joint.name} is {problem}\n")
             break
     return q
 
@@ -104,33 +140,34 @@ def _told(arm: Arm, q: Array, what: str, outside: str) -> Array:
 def target(
     arm: Arm, *, xyz: str | None, euler: str, order: str, matrix: str | None, like: str | None, degrees: bool
 ) -> Array:
-    """Return the pose that is asked for, shape (4, 4): by position and Euler angles, by a matrix, or by joint values.
+    """Return the pose of --xyz and --euler, of --matrix, or of the joint values of --like, shape (4, 4), m, world.
 
     Raises
     ------
     DescriptionError
-        Not one of them alone, another count of numbers, or no expressions.
+        Not exactly one of --xyz, --matrix and --like is given, there is another count of numbers, or a word is no
+        expression.
     ValueError
-        No such order of Euler angles, or a matrix that is no pose.
+        There is no such order of Euler angles, or the matrix is no pose.
     """
     if sum(given is not None for given in (xyz, matrix, like)) != 1:
         raise DescriptionError("where to? expected one of --xyz, --matrix and --like")
-    placed = pose(euler=numbers([euler], "--euler", [3]), order=order, degrees=degrees)
+    T = pose(euler=numbers([euler], "--euler", [3]), order=order, degrees=degrees)
     if matrix is not None:
         return _matrix(matrix)
     if like is not None:
-        return arm.fk(joint_values(arm, [like], degrees, "values of --like", outside="fine"))
-    placed[:3, 3] = numbers([xyz or ""], "--xyz", [3])
-    return placed
+        return arm.fk(option_values(arm, like, "--like", degrees, OutsideLimits.ALLOWED))
+    T[:3, 3] = numbers([xyz or ""], "--xyz", [3])
+    return T
 
 
 def objective(text: str) -> Objective:
-    """Return an objective: words such as time and effort, with a factor before each that wants one, joined by +.
+    """Return an objective: names such as time and effort, each with an optional factor before it, joined by +.
 
     Raises
     ------
     DescriptionError
-        Another word, or a factor that is no positive number.
+        There is no such objective, or a factor is no positive number.
 
     Examples
     --------
@@ -154,23 +191,23 @@ def objective(text: str) -> Objective:
 
 
 def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed: float) -> Limits:
-    """Return an arm's limits, some of them in place of its own.
+    """Return an arm's limits, with some of them replaced.
 
     Parameters
     ----------
     given
-        Numbers by ``velocity``, ``acceleration``, ``jerk`` and ``torque``: one for all joints, or one for each.
+        Numbers of ``velocity``, ``acceleration``, ``jerk`` and ``torque``: one for all joints, or one for each.
     degrees
         Whether angles are in degrees.
     speed
-        Share of the velocities that may be used.
+        Share of the velocity limits that may be used.
 
     Raises
     ------
     DescriptionError
-        Another count, or no expressions.
+        There is another count, or a word is no expression.
     ValueError
-        A limit that is not positive.
+        A limit is not positive.
     """
     from dhkit.trajectories import Limits
 
@@ -179,18 +216,18 @@ def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed
         if text is None:
             continue
         values = np.broadcast_to(numbers([text], f"--{name}", sorted({1, arm.n})), arm.n)
-        turns = degrees and name != "torque"
-        limits[name] = np.where(arm.description.numbers.prismatic | (not turns), values, np.radians(values))
+        is_angle = degrees and name != "torque"
+        limits[name] = np.where(arm.description.numbers.prismatic | (not is_angle), values, np.radians(values))
     return Limits.of(arm.description, **limits).scaled(velocity=speed)
 
 
 def columns(text: str | None) -> dict[str, str] | None:
-    """Return what a file calls its columns, by our names: "t=tout q=yout".
+    """Return the names of a file's columns, by our names, from a text such as "t=tout q=yout".
 
     Raises
     ------
     DescriptionError
-        Another form.
+        The text has another form.
     """
     if text is None:
         return None
@@ -201,59 +238,67 @@ def columns(text: str | None) -> dict[str, str] | None:
 
 
 def payload(text: str | None) -> Payload | None:
-    """Return a load: its mass, kg, and after an @ its centre of mass in the tool's frame, m.
+    """Return the load of a text "KG [@ X Y Z]": its mass, kg, and its centre of mass in the tool's frame, m.
 
     Raises
     ------
     DescriptionError
-        Other numbers, or no expressions.
+        There are other numbers, or a word is no expression.
     """
     from dhkit.planning import Payload
 
     if text is None:
         return None
-    mass, _, com = text.partition("@")
+    mass, com = split_at(text)
     x, y, z = numbers([com], "--payload", [3]) if com else (0.0, 0.0, 0.0)
     return Payload(float(numbers([mass], "--payload", [1])[0]), (float(x), float(y), float(z)))
 
 
 def obstacles(boxes: Sequence[str], spheres: Sequence[str], floor: str | None) -> list[Obstacle | Floor]:
-    """Return what is in the way: boxes "SX SY SZ @ X Y Z", balls "R @ X Y Z" and the height of a floor, m.
+    """Return obstacles: boxes "SX SY SZ @ X Y Z", balls "R @ X Y Z" and the height of a floor, m.
 
     Raises
     ------
     DescriptionError
-        Other numbers, or no expressions.
+        There are other numbers, or a word is no expression.
     ValueError
-        Sizes that are not positive.
+        A size is not positive.
     """
     from dhkit.planning import Floor, Obstacle
 
     scene: list[Obstacle | Floor] = []
-    for k, text in enumerate(boxes):
-        size, centre = _placed(text, "--box", 3, "SX SY SZ @ X Y Z")
-        scene.append(Obstacle.box(size, centre, _numbered("box", k, boxes)))
-    for k, text in enumerate(spheres):
-        radius, centre = _placed(text, "--sphere", 1, "R @ X Y Z")
-        scene.append(Obstacle.sphere(float(radius[0]), centre, _numbered("sphere", k, spheres)))
+    for name, text in _numbered("box", boxes):
+        size, centre = _size_and_centre(text, "--box", 3, "SX SY SZ @ X Y Z")
+        scene.append(Obstacle.box(size, centre, name))
+    for name, text in _numbered("sphere", spheres):
+        radius, centre = _size_and_centre(text, "--sphere", 1, "R @ X Y Z")
+        scene.append(Obstacle.sphere(float(radius[0]), centre, name))
     if floor is not None:
         scene.append(Floor(float(numbers([floor], "--floor", [1])[0])))
     return scene
 
 
-def _placed(text: str, what: str, count: int, expected: str) -> tuple[Array, Array]:
-    sizes, at, position = text.partition("@")
-    if not at or len(_split([sizes])) != count or len(_split([position])) != 3:
+def split_at(text: str) -> tuple[str, str | None]:
+    """Return the parts of a text before and behind its ``@``; None for the second if it has none."""
+    before, sign, behind = text.partition("@")
+    return before, behind if sign else None
+
+
+def _size_and_centre(text: str, what: str, count: int, expected: str) -> tuple[Array, Array]:
+    size, centre = split_at(text)
+    if centre is None or len(_split([size])) != count or len(_split([centre])) != 3:
         raise DescriptionError(f'{what}: found {text!r}; expected "{expected}", m')
-    return numbers([sizes], what, [count]), numbers([position], what, [3])
+    return numbers([size], what, [count]), numbers([centre], what, [3])
 
 
-def _numbered(name: str, k: int, among: Sequence[str]) -> str:
-    return name if len(among) == 1 else f"{name} {k + 1}"
+def _numbered(name: str, texts: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield each text with a name, which has a number if there are several."""
+    for k, text in enumerate(texts, start=1):
+        yield name if len(texts) == 1 else f"{name} {k}", text
 
 
-def gathering(counts: Mapping[str, int | None]) -> type[TyperCommand]:
-    """Return a kind of command whose options take several words, negative numbers too.
+def with_long_options(counts: Mapping[str, int | None]) -> type[TyperCommand]:
+    """Return a class of commands whose options take several words, negative numbers too.
 
     Parameters
     ----------
@@ -261,35 +306,35 @@ def gathering(counts: Mapping[str, int | None]) -> type[TyperCommand]:
         How many values each option takes; None: all words up to the next option.
     """
 
-    class Gathering(TyperCommand):
+    class LongOptionCommand(TyperCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            # A short option ends the words too; other words behind one dash are negative numbers.
+            # A short option ends the words too; other words that begin with one dash are negative numbers.
             short = {name for option in self.params for name in option.opts if not name.startswith("--")}
-            return super().parse_args(ctx, _gathered(args, counts, short))
+            return super().parse_args(ctx, _join_option_words(args, counts, short))
 
-    return Gathering
+    return LongOptionCommand
 
 
-def _gathered(args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]) -> list[str]:
-    """Return arguments with the words after each of some options made into one."""
-    gathered, rest = [], list(args)
+def _join_option_words(args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]) -> list[str]:
+    """Return arguments with the words after each of these options joined into one."""
+    joined, rest = [], list(args)
     while rest:
         word = rest.pop(0)
-        gathered.append(word)
+        joined.append(word)
         if word not in counts:
             continue
         values: list[str] = []
         count = counts[word]
-        while rest and not _is_option(rest[0], short) and (count is None or len(_split(values)) < count):
+        while (
+            rest
+            and not (rest[0].startswith("--") or rest[0] in short)
+            and (count is None or len(_split(values)) < count)
+        ):
             values.append(rest.pop(0))
         if not values:
             raise DescriptionError(f"{word}: no values; expected {'some' if count is None else count} after it")
-        gathered.append(" ".join(values))
-    return gathered
-
-
-def _is_option(word: str, short: Collection[str]) -> bool:
-    return word.startswith("--") or word in short
+        joined.append(" ".join(values))
+    return joined
 
 
 def _split(words: Sequence[str]) -> list[str]:
@@ -297,19 +342,19 @@ def _split(words: Sequence[str]) -> list[str]:
 
 
 def _matrix(given: str) -> Array:
-    """Return the pose of a matrix by row, 16 entries or the first 12, or of a text file that holds them."""
+    """Return the pose, shape (4, 4), m, of 16 entries by row or the first 12, or of a text file that has them."""
     words = _split([given])
     if len(words) == 1:
-        words = _split([_text(Path(given))])
+        words = _split([_file_text(Path(given))])
     entries = numbers(words, "--matrix", [16, 12])
     return check_pose(np.append(entries[:12], entries[12:] if len(entries) == 16 else (0, 0, 0, 1)).reshape(4, 4))
 
 
-def _text(path: Path) -> str:
+def _file_text(path: Path) -> str:
     if not path.is_file():
         raise DescriptionError(f"--matrix: found {str(path)!r}; expected 16 or 12 numbers, or a text file of them")
-    if path.stat().st_size > LARGEST:
-        raise DescriptionError(f"{path}: more than {LARGEST} bytes; expected 16 or 12 numbers")
+    if path.stat().st_size > MAX_MATRIX_BYTES:
+        raise DescriptionError(f"{path}: more than {MAX_MATRIX_BYTES} bytes; expected 16 or 12 numbers")
     try:
         return path.read_text("utf-8")
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""`dhkit bench`: kinematics and dynamics beside its peers, with progress on stderr."""
+"""`dhkit bench`: times of kinematics and dynamics beside peers, with progress on stderr."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from dhkit.arm import Arm
-from dhkit.bench import BenchReport, Ending, Requirement
-from dhkit.bench import run as run_bench
+from dhkit.bench import BenchReport, Ending, Requirement, run as run_bench
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
@@ -29,11 +28,11 @@ def run(
     output: Path | None,
     json: bool,
     targets: Callable[[BenchReport], tuple[Requirement, ...]] | None = None,
-) -> int:
-    """Run the benchmark, print its report, and say on stderr which quantities failed.
+) -> ExitStatus:
+    """Run the benchmark, print its report, and name the quantities that failed on stderr.
 
-    Returns 0; 1 where dhkit itself, or every contender of a quantity, failed or could not be timed; 130 where Ctrl-C
-    ended the run early. Peers that fail beside dhkit are noted.
+    The status is NO if dhkit itself, or every contender of a quantity, failed or could not be timed; INTERRUPTED if
+    Ctrl-C ended the run early. Peers that fail beside dhkit are noted.
     """
     if output is not None:
         check_place(output)
@@ -51,11 +50,11 @@ def run(
             sys.stderr.write(f"dhkit: {'note: ' if outcome.ok else ''}{outcome}\n")
     if report.interrupted:
         return ExitStatus.INTERRUPTED
-    return 0 if all(outcome.ok for outcome in report.outcomes) else 1
+    return ExitStatus.FINE if all(outcome.ok for outcome in report.outcomes) else ExitStatus.NO
 
 
 class Report(Protocol):
-    """A report that can be written: of quantities, motions or simulations."""
+    """A report that can be written: about quantities, motions or simulations."""
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
@@ -65,7 +64,7 @@ class Report(Protocol):
 
 
 def write(report: Report, path: Path) -> tuple[Path, Path]:
-    """Write a report as Markdown and as JSON, whatever the path's ending; return the two files."""
+    """Write a report as Markdown and as JSON, whatever the path's suffix; return the two files."""
     files = path.with_suffix(".md"), path.with_suffix(".json")
     write_atomically(files[0], report.markdown())
     write_atomically(files[1], json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
@@ -73,17 +72,17 @@ def write(report: Report, path: Path) -> tuple[Path, Path]:
 
 
 class _Progress:
-    """One line on stderr that is written over in a terminal; a line a step elsewhere."""
+    """Progress on stderr: one line that is overwritten in a terminal; a line for each step elsewhere."""
 
     def __init__(self) -> None:
         self.terminal = sys.stderr.isatty()
 
     def show(self, line: str) -> None:
-        """Show what is being done."""
+        """Show the present step."""
         sys.stderr.write(f"\r\x1b[K{line}" if self.terminal else f"{line}\n")
         sys.stderr.flush()
 
     def clear(self) -> None:
-        """Leave the terminal's line empty."""
+        """Clear the terminal's line."""
         if self.terminal:
             sys.stderr.write("\r\x1b[K")

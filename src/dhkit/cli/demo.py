@@ -13,50 +13,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
+from dhkit.cli.demo_motions import race, there_and_back, tour
 from dhkit.cli.equations_page import equations_page
-from dhkit.cli.output import print_json, say, write_figure
-from dhkit.cli.quickest import race, there_and_back
-from dhkit.cli.simulation_task import chosen_motion
+from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.output import output_folder, print_json, say, write_figure
+from dhkit.cli.simulation_settings import chosen_motion
 from dhkit.cli.straight import Branches, Line, branches, straight_line
-from dhkit.cli.tour import tour
 from dhkit.control import compare
 from dhkit.description import Array, write_atomically
 from dhkit.dynamics import dynamics_graph
-from dhkit.errors import DescriptionError, DhkitError
+from dhkit.errors import DhkitError
 from dhkit.symbolic import operation_count
 from dhkit.symbolic.equations import equations_latex, latex_document, readable
 from dhkit.trajectories import Trajectory
 from dhkit.verification import VerificationReport
 from dhkit.viewer.motion import Motion
 
-PRINTED = 5_000
-"""Terms of M, C and g that are printed; of longer ones M and g."""
-SAMPLES = 801
-"""By which a motion's largest torque is told."""
-QUICKEST = "least time"
+MAX_TERMS = 5_000
+"""Most terms of M, C and g that are printed together; of longer equations M and g are printed."""
+TORQUE_SAMPLES = 801
+"""Samples of a motion of which the largest torque is printed."""
+LEAST_TIME = "least time"
 PAGES = {
     "equations.html": "the equations of motion",
     "plan.html": "motions in least time",
     "control.html": "simulated controllers",
 }
-"""What the arm's page leads to."""
-OWN = 1e-6
-"""Share of the reach: an arm whose frames are all nearer to another's than this looks the same."""
+"""Pages that the arm's page leads to."""
+SAME_LOOK = 1e-6
+"""Largest distance of frames, as a share of the arm's reach, of two states that look the same."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """What the page shows of inverse kinematics."""
+class InverseKinematics:
+    """Results of inverse kinematics that the page shows."""
 
-    ways: Branches
+    branches: Branches
     line: Line | None
 
 
-def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
-    """Run the demo into a folder; return 0, or 1 where our numbers and Pinocchio's disagree."""
-    folder = output or Path("out") / arm.name
-    if folder.exists() and not folder.is_dir():
-        raise DescriptionError(f"{folder}: not a folder")
+def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> ExitStatus:
+    """Run the demo into a folder; the status is NO if our numbers and Pinocchio's disagree."""
+    folder = output_folder(output, arm.name)
     folder.mkdir(parents=True, exist_ok=True)
     stages: list[dict[str, Any]] = []
 
@@ -79,7 +77,7 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
         write_atomically(folder / "verification.md", reports[0].markdown())
     stage("equations", lambda: _equations(arm, folder))
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
-    shown: list[Shown] = []
+    shown: list[InverseKinematics] = []
     motions: dict[str, Motion] = {}
     stage("ik", lambda: _inverse(arm, shown))
     stage("plan", lambda: _plan(arm, folder, 16 if quick else None, motions))
@@ -92,7 +90,7 @@ def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> int:
         for report in reports:
             say(f"\n{report}")
         say(f"\nOpen {folder / 'index.html'} in a browser; it needs no network.")
-    return 0 if ok else 1
+    return ExitStatus.FINE if ok else ExitStatus.NO
 
 
 def _build(arm: Arm, path: Path) -> str:
@@ -120,10 +118,10 @@ def _equations(arm: Arm, folder: Path) -> str:
             return "the two derivations DISAGREE"
         seconds = time.perf_counter() - start
         entries = [*lag.M.flat, *lag.C.flat, *lag.g]
-        what = ("M", "C", "g") if sum(map(len, entries)) <= PRINTED else ("M", "g")
-        listed = readable(lag, what)
-        write_atomically(folder / "equations.tex", latex_document(equations_latex(listed), arm.name))
-        write_atomically(folder / "equations.html", equations_page(lag, listed))
+        what = ("M", "C", "g") if sum(map(len, entries)) <= MAX_TERMS else ("M", "g")
+        shown = readable(lag, what)
+        write_atomically(folder / "equations.tex", latex_document(equations_latex(shown), arm.name))
+        write_atomically(folder / "equations.html", equations_page(lag, shown))
     except DhkitError as error:
         return f"skipped: {error}"
     operations = operation_count(dynamics_graph("inverse_dynamics", arm.description))
@@ -142,36 +140,36 @@ def _figure(arm: Arm, path: Path) -> str:
     return str(write_figure(plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)), path))
 
 
-def _inverse(arm: Arm, shown: list[Shown]) -> str:
+def _inverse(arm: Arm, shown: list[InverseKinematics]) -> str:
     from dhkit.viewer.scene import first_configuration
 
     line = straight_line(arm)
-    ways = branches(arm, first_configuration(arm.description) if line is None else line.q[0])
-    shown.append(Shown(ways, line))
-    return f"{_ways(ways)}; {_followed(line)}"
+    solutions = branches(arm, first_configuration(arm.description) if line is None else line.q[0])
+    shown.append(InverseKinematics(solutions, line))
+    return f"{_branches_text(solutions)}; {_line_text(line)}"
 
 
-def _ways(ways: Branches) -> str:
-    count = len(ways.q)
+def _branches_text(branches: Branches) -> str:
+    count = len(branches.q)
     one = count == 1
-    if ways.closed_form:
+    if branches.closed_form:
         what = f"{count} branch{'' if one else 'es'} of one pose"
     else:
         what = f"no closed form: {count} solution{'' if one else 's'} of one pose, by iteration,"
-    if ways.error is None:
+    if branches.error is None:
         return f"{what} aim{'s' * one} at one point"
-    to = f"to {ways.error:.0e}" if ways.error else "exactly"
+    to = f"to {branches.error:.0e}" if branches.error else "exactly"
     return f"{what} close{'s' * one} FK {to}"
 
 
-def _followed(line: Line | None) -> str:
+def _line_text(line: Line | None) -> str:
     if line is None:
         return "no straight line found that it follows without a jump"
     return f"a line of {line.length:.2g} m in {len(line.q)} poses: {line.switches} switches"
 
 
 def _plan(arm: Arm, folder: Path, intervals: int | None, motions: dict[str, Motion]) -> str:
-    """Plan a motion in least time, and write it with what it and the quintic use of the limits, and a page of both."""
+    """Plan a motion in least time; write it, a figure of it beside the quintic, and a page of both."""
     from dhkit.viewer import plot_uses
 
     try:
@@ -180,7 +178,7 @@ def _plan(arm: Arm, folder: Path, intervals: int | None, motions: dict[str, Moti
         return f"skipped: {error}"
     best.save(folder / "plan.npz")
     write_figure(plot_uses({"least time": best, "quintic": quintic}), folder / "plan.png")
-    motions |= {QUICKEST: best, "the quintic between the same states": quintic}
+    motions |= {LEAST_TIME: best, "the quintic between the same states": quintic}
     both = {"there in least time, back by the quintic": there_and_back(best, quintic)}
     _save(
         arm,
@@ -194,7 +192,7 @@ def _plan(arm: Arm, folder: Path, intervals: int | None, motions: dict[str, Moti
     certificate = best.report.certificate
     kept = "all limits kept" if certificate.ok else "limits NOT kept"
     return (
-        f"{_worth(best)}, the quintic {_worth(quintic)}: {kept} in {certificate.states} states, by "
+        f"{_duration_text(best)}, the quintic {_duration_text(quintic)}: {kept} in {certificate.states} states, by "
         f"{certificate.reference}; {folder / 'plan.html'}: there in least time, back by the quintic"
     )
 
@@ -230,24 +228,25 @@ def _control(arm: Arm, folder: Path, motions: dict[str, Motion]) -> str:
     return f"{seconds}: {', '.join(errors)}; {folder / 'control.html'}: pid, with the motion asked for as a ghost"
 
 
-def _worth(motion: Trajectory) -> str:
-    tau = motion.sample(n=SAMPLES).tau
+def _duration_text(motion: Trajectory) -> str:
+    tau = motion.sample(n=TORQUE_SAMPLES).tau
     largest = 100 * float(np.max(np.abs(tau) / motion.description.numbers.effort))
     return f"{motion.duration:.3f} s with torques up to {largest:.0f} %"
 
 
-def _page(arm: Arm, shown: Shown, path: Path, motions: dict[str, Motion]) -> str:
+def _page(arm: Arm, inverse: InverseKinematics, path: Path, motions: dict[str, Motion]) -> str:
     """Write a page with the arm's motions and, at the pose where the first begins, its other branches as ghosts."""
-    line = shown.line
+    line = inverse.line
     times, q = tour(arm, None if line is None else line.q)
     first = "tour of the configurations" if line is None else "tour, with a straight line of the tool"
-    beside = _apart(arm, shown.ways.q, q[0])
+    is_ghost = _looks_different(arm, inverse.branches.q, q[0])
     lines = [arm.description.source, f'The motion "{first}" plays first; more are under Motions.']
-    if beside.any():
+    if is_ghost.any():
         lines.append("Translucent arms are the other ways to reach the pose with which it begins.")
     with arm.view() as view:
         view.show(q[0])
-        view.ghosts(shown.ways.q[beside], names=[x for x, drawn in zip(shown.ways.names, beside, strict=True) if drawn])
+        names = [name for name, ghost in zip(inverse.branches.names, is_ghost, strict=True) if ghost]
+        view.ghosts(inverse.branches.q[is_ghost], names=names)
         view.trace(None if line is None else line.T[:, :3, 3])
         links = {text: name for name, text in PAGES.items() if (path.parent / name).exists()}
         played = {first: (times, q)} | motions
@@ -263,7 +262,7 @@ def _save(arm: Arm, path: Path, title: str, motions: Mapping[str, Motion], capti
         )
 
 
-def _apart(arm: Arm, q: Array, own: Array) -> NDArray[np.bool_]:
-    """Return of which states (k, n) something is seen beside the arm in its own, (k,): others would only tint it."""
-    gaps = np.abs(arm.frames(q) - arm.frames(own))[..., :3, 3].max(axis=(1, 2))
-    return np.asarray(gaps > OWN * arm.description.reach)
+def _looks_different(arm: Arm, q: Array, shown: Array) -> NDArray[np.bool_]:
+    """Return which states, shape (k, n), look different from the one shown, shape (n,): others would only tint it."""
+    distances = np.abs(arm.frames(q) - arm.frames(shown))[..., :3, 3].max(axis=(1, 2))
+    return np.asarray(distances > SAME_LOOK * arm.description.reach)

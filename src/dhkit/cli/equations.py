@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from dhkit.arm import Arm
 from dhkit.cli.equations_page import equations_page
-from dhkit.cli.output import print_json, say
+from dhkit.cli.output import print_json, say_written
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
@@ -36,25 +36,25 @@ from dhkit.symbolic.equations import (
     readable,
 )
 
-LARGEST_TITLE = 200
-
-Printed = Callable[[Any, Sequence[Quantity]], str]
+MAX_TITLE_LENGTH = 200
+Source: TypeAlias = Lagrangian | SymbolicKinematics
+"""Where quantities come from."""
 
 
 def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
-    """Return the equations that are printed.
+    """Return the equations of motion, with these symbols, or in base parameters.
 
     Raises
     ------
     DescriptionError
-        No such choice of symbols, or a link without a body.
+        There is no such choice of symbols, or a link has no body.
     """
-    known: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
+    choices: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
     if base and symbols not in ("file", "inertial"):
         raise DescriptionError(f"--symbols {symbols}: base parameters are made of symbols; leave one of the two out")
-    if symbols not in known:
-        raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(known)}")
-    return base_parameters(description).lagrangian if base else lagrangian(description, known[symbols])
+    if symbols not in choices:
+        raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(choices)}")
+    return base_parameters(description).lagrangian if base else lagrangian(description, choices[symbols])
 
 
 def _kinematics_of(description: Description, symbols: str, base: bool) -> SymbolicKinematics:
@@ -71,53 +71,53 @@ def run(arm: Arm, *, what: str, form: str, symbols: str, base: bool, output: Pat
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
     if is_kinematic(what):
         kinematics = _kinematics_of(arm.description, symbols, base)
-        lag: Lagrangian | SymbolicKinematics = kinematics
-        listed = kinematic_quantities(kinematics, what)
+        lag: Source = kinematics
+        shown = kinematic_quantities(kinematics, what)
     else:
         lag = derived = lagrangian_of(arm.description, symbols, base)
-        listed = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
+        shown = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
     if output is not None:
-        files = _written(lag, listed, form, output)
+        files = _write(lag, shown, form, output)
         if json:
             print_json({"files": [str(file) for file in files]})
         else:
-            say("\n".join(f"wrote {file}" for file in files))
+            say_written(files)
         return
-    text = FORMATS[form](lag, listed)
+    text = FORMATS[form](lag, shown)
     if json:
-        print_json(_facts(lag, listed, form, text))
+        print_json(_facts(lag, shown, form, text))
     else:
         sys.stdout.write(text)
 
 
-def _written(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity], form: str, output: Path) -> list[Path]:
-    """Write a file, or for MATLAB a file a function into a folder; return their paths."""
+def _write(lag: Source, shown: Sequence[Quantity], form: str, output: Path) -> list[Path]:
+    """Write a file, or for MATLAB a file for each function into a folder; return the paths."""
     if output.suffix == ".toml":
         raise DescriptionError(f"{output}: equations would overwrite a robot file; expected another name")
     if form == "matlab":
         if output.suffix or (output.exists() and not output.is_dir()):
             raise DescriptionError(f"{output}: expected a folder; MATLAB wants a file for every function")
-        contents = {output / name: text for name, text in matlab_files(lag, listed).items()}
+        contents = {output / name: text for name, text in matlab_files(lag, shown).items()}
     else:
         if output.is_dir():
             raise DescriptionError(f"{output} is a folder; expected the name of a file")
         check_place(output)
-        contents = {output: FORMATS[form](lag, listed)}
+        contents = {output: FORMATS[form](lag, shown)}
     for path, text in contents.items():
         write_atomically(path, text)
     return list(contents)
 
 
-def _text(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity]) -> str:
+def _text(lag: Source, shown: Sequence[Quantity]) -> str:
     notes = "".join(f"note: {note}\n" for note in lag.notes)
-    return f"{equations_text(listed)}\n{notes}"
+    return f"{equations_text(shown)}\n{notes}"
 
 
-def _latex(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity]) -> str:
-    return latex_document(equations_latex(listed), lag.description.name[:LARGEST_TITLE])
+def _latex(lag: Source, shown: Sequence[Quantity]) -> str:
+    return latex_document(equations_latex(shown), lag.description.name[:MAX_TITLE_LENGTH])
 
 
-FORMATS: Mapping[str, Printed] = {
+FORMATS: Mapping[str, Callable[[Any, Sequence[Quantity]], str]] = {
     "text": _text,
     "latex": _latex,
     "python": equations_python,
@@ -125,16 +125,16 @@ FORMATS: Mapping[str, Printed] = {
     "matlab": equations_matlab,
     "html": equations_page,
 }
-"""What equations can be printed as."""
+"""Printers of equations, by the name of the format."""
 
 
-def _facts(lag: Lagrangian | SymbolicKinematics, listed: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
+def _facts(lag: Source, shown: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
     return {
         "robot": lag.description.name,
-        "what": [quantity.name for quantity in listed],
+        "what": [quantity.name for quantity in shown],
         "format": form,
         "text": text,
-        "terms": {quantity.name: [len(element) for element in quantity.elements.flat] for quantity in listed},
+        "terms": {quantity.name: [len(element) for element in quantity.elements.flat] for quantity in shown},
         "constants": lag.constants,
         "notes": list(lag.notes),
     }

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dhkit.description import DHTable
 from dhkit.grading.reports.mathml import equation_mathml
@@ -38,9 +38,9 @@ UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m
     "YZ": "kg m²",
     "ZZ": "kg m²",
 }
-"""Of the symbols that we name ourselves, by their first letters."""
-PRODUCT = r"T = T_{\mathrm{base}}\, A_{1} A_{2} \cdots A_{n}\, T_{\mathrm{tool}}"
-LAW = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
+"""Units of the symbols that we name ourselves, by their first letters."""
+KINEMATIC_EQUATION = r"T = T_{\mathrm{base}}\, A_{1} A_{2} \cdots A_{n}\, T_{\mathrm{tool}}"
+EQUATION_OF_MOTION = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
 STYLE = """
 body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
        max-width: 66rem; margin: 2.5rem auto; padding: 0 1.5rem; }
@@ -62,19 +62,19 @@ th { color: #57606a; } td.number { text-align: right; font-variant-numeric: tabu
 
 
 def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
-    """Return a page: the robot's table, quantities, what the constants are worth, and notes."""
+    """Return a page with the robot's table, quantities, the values of constants, and notes."""
     description = lag.description
-    moving = any(quantity.name in QUANTITIES for quantity in quantities)
-    subject = "equations of motion" if moving else "kinematics"
+    is_dynamics = any(quantity.name in QUANTITIES for quantity in quantities)
+    subject = "equations of motion" if is_dynamics else "kinematics"
     body = [
         f"<h1>{escape(description.name)}: {subject}</h1>",
         f'<p class="source">{escape(description.source)}</p>' if description.source else "",
-        f'<div class="display">{equation_mathml(LAW if moving else PRODUCT)}</div>',
+        f'<div class="display">{equation_mathml(EQUATION_OF_MOTION if is_dynamics else KINEMATIC_EQUATION)}</div>',
         "<h2>Denavit-Hartenberg table</h2>",
         DHTable.of(description)._repr_html_(),
         *_sections(quantities),
         *_constants(lag, quantities),
-        *(f'<p class="note">{escape(note)}</p>' for note in [*lag.notes, *_renamed(quantities)]),
+        *(f'<p class="note">{escape(note)}</p>' for note in [*lag.notes, *renamings(_elements(quantities))]),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -95,8 +95,8 @@ def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
 
 
 def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> Iterator[str]:
-    """Yield a table of the constants that occur, with their values."""
-    elements = [element for quantity in quantities for element in quantity.elements.flat]
+    """Yield a table of the constants in the quantities, with their values."""
+    elements = _elements(quantities)
     values = dict(lag.description.numbers.values) | lag.arm.parameters
     order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
     rings = {name: x.ring for x in elements for name in symbols_of(constants_of(generators_of([x])))}
@@ -112,12 +112,12 @@ def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quanti
 
 
 def _unit(lag: Lagrangian | SymbolicKinematics, name: str) -> str:
-    """Return the unit of a symbol that we named; the file's own parameters are in SI units."""
+    """Return the unit of a symbol that we name; the robot file's own parameters are in SI units."""
     letters = re.match(r"Jm|Ia|M[XYZ]|[XYZ]{2}|[A-Za-z]", name)
     if lag.arm.symbols != "inertial" or name in lag.description.parameters or not letters:
         return "SI"
     return UNITS.get(letters[0], "SI")
 
 
-def _renamed(quantities: Sequence[Quantity]) -> list[str]:
-    return renamings(element for quantity in quantities for element in quantity.elements.flat)
+def _elements(quantities: Sequence[Quantity]) -> list[Any]:
+    return [element for quantity in quantities for element in quantity.elements.flat]

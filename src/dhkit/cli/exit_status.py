@@ -4,14 +4,14 @@ from enum import IntEnum
 
 
 class ExitStatus(IntEnum):
-    """What the command returns to the shell."""
+    """Exit status of the command."""
 
     FINE = 0
     NO = 1
-    """The answer is no: not verified, answer wrong, unreachable."""
+    """The answer is no: a robot is not verified, an answer is wrong, a pose is out of reach."""
     UNUSABLE = 2
-    """Unusable input; one line on stderr says what and where."""
+    """The input is unusable; one line on stderr says what is wrong, and where."""
     INTERRUPTED = 130
-    """Ctrl-C: 128 and the number of SIGINT, as shells have it."""
+    """Ctrl-C: 128 plus the number of SIGINT, as in shells."""
     READER_GONE = 141
-    """The reader of the output went away: 128 and the number of SIGPIPE, as shells have it."""
+    """The reader of the output has gone: 128 plus the number of SIGPIPE, as in shells."""

@@ -1,4 +1,4 @@
-"""`dhkit grade`: judge answer sheets, or mark again what was judged before; print or write the reports."""
+"""`dhkit grade`: judge answer sheets, or mark earlier reports again; print or write the reports."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 from dhkit.arm import Arm
+from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
 from dhkit.cli.output import say
 from dhkit.description import write_atomically
@@ -28,12 +29,12 @@ from dhkit.grading.sheets import find_sheets
 
 
 def rubric_of(path: Path | None) -> Rubric:
-    """Return the rubric of a file, its mistakes' names checked; the usual one without a file.
+    """Return the rubric of a file, with checked names of mistakes; without a file the default rubric.
 
     Raises
     ------
     AnswerError
-        No rubric, or a mistake that is not known.
+        The file is no rubric, or a mistake is not known.
     """
     rubric = Rubric() if path is None else Rubric.read(path)
     rubric.require_mistakes(LIBRARY, f"{path}: ")
@@ -41,13 +42,13 @@ def rubric_of(path: Path | None) -> Rubric:
 
 
 def _own_rubric(path: Path) -> Rubric:
-    """Return the rubric that a sheet brings along.
+    """Return the rubric in a sheet.
 
-    It counts for a single sheet without another one: in a class anybody could give points to himself.
+    It is used only for a single sheet without another rubric: in a class, students could give points to themselves.
     """
     try:
         data = read_sheet(path).rubric
-    except AnswerError:  # said when it is judged
+    except AnswerError:  # reported when the sheet is judged
         return Rubric()
     return _rubric_from(data, path)
 
@@ -59,35 +60,35 @@ def grade_files(
     task: Path | None = None,
     seed: int | None = None,
     **options: Any,
-) -> int:
-    """Judge sheets about their own robots, or all about one; see :func:`run` for the options.
+) -> ExitStatus:
+    """Judge sheets about their own robots, or all about one robot; see :func:`run` for the options.
 
     Parameters
     ----------
     sheets
         Files, and folders of them.
     robot
-        What all are about, before the task's and the sheets' own.
+        The robot of all sheets, instead of the task's and the sheets' own.
     rubric
-        What answers are worth, before the task's.
+        The rubric, instead of the task's.
     task
-        An instructor's file of what was asked for, and of which robot.
+        An instructor's file with the task and its robot.
     seed
-        Of the random states, to replay a report.
+        Seed of the random states, to repeat a report.
 
     Raises
     ------
     AnswerError, DescriptionError
-        As :func:`run`, or no such robot, rubric or task.
+        As :func:`run`, or there is no such robot, rubric or task.
     """
-    asked = None if task is None else read_task(task)
+    read = None if task is None else read_task(task)
     about = Arm.load(robot).description if robot is not None else None
-    if about is None and asked is not None and task is not None and asked.robot:
-        about = robot_of(asked, task.parent)
-    alone = len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
-    if rubric is None and asked is not None and asked.rubric:
-        chosen = _rubric_from(asked.rubric, task)
-    elif rubric is None and asked is None and alone:
+    if about is None and read is not None and task is not None and read.robot:
+        about = robot_of(read, task.parent)
+    is_single = len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
+    if rubric is None and read is not None and read.rubric:
+        chosen = _rubric_from(read.rubric, task)
+    elif rubric is None and read is None and is_single:
         chosen = _own_rubric(sheets[0])
     else:
         chosen = rubric_of(rubric)
@@ -96,7 +97,7 @@ def grade_files(
     own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
     return run(
         sheets,
-        judge=lambda path: grade(path, about, chosen, task=asked, seed=seed),
+        judge=lambda path: grade(path, about, chosen, task=read, seed=seed),
         rubric=chosen,
         exclude=own_files,
         prepare=lambda report: prepare(about, report),
@@ -125,8 +126,8 @@ def run(
     memory: int = 2 * GIGABYTE,
     exclude: Collection[Path] = (),
     prepare: Callable[[GradeReport], object] | None = None,
-) -> int:
-    """Judge sheets and deliver the reports; return 0, 1 where one is wrong, 2 where one could not be judged.
+) -> ExitStatus:
+    """Judge sheets and deliver the reports; the status is NO if one is wrong, UNUSABLE if one is unreadable.
 
     Parameters
     ----------
@@ -135,35 +136,35 @@ def run(
     judge, prepare, seconds, memory
         As in :func:`~dhkit.grading.batch.grade_all`.
     jobs
-        Processes at once; one for each core unless given.
+        Number of processes at a time; by default one for each core.
     rubric
-        By which all are marked.
+        The rubric of all sheets.
     form
         text, json, gradescope, junit or html.
     feedback
-        full, hint or verdict; the rubric's unless given.
+        full, hint or verdict; by default the rubric's.
     output
-        A file; or for several sheets as text a folder, of which ``students`` has what is for them, with the feedback,
-        and all else is the teacher's, whole.
+        A file; for several sheets as text a folder, in which ``students`` has the pages for students, with the
+        feedback, and everything else is for the teacher, without omissions.
     json
         As ``form="json"``.
     read
-        Whether text shows how each entry was read.
+        Whether reports as text show how each entry was read.
     exclude
         Files in the folders that are no sheets.
 
     Raises
     ------
     AnswerError
-        No such file, format or feedback; an output that would overwrite a sheet.
+        There is no such file, format or feedback, or the output would overwrite a sheet.
     """
-    found = find_sheets(sheets, exclude)
-    several = len(found) > 1 or any(path.is_dir() for path in sheets)
+    paths = find_sheets(sheets, exclude)
+    several = len(paths) > 1 or any(path.is_dir() for path in sheets)
     form, level = _form("json" if json else form, several), _level(feedback, rubric)
     check_output(output, form, several)
-    with _progress(len(found)) as progress:
+    with _progress(len(paths)) as progress:
         judged = grade_all(
-            found,
+            paths,
             judge,
             jobs=jobs or os.cpu_count() or 1,
             seconds=seconds,
@@ -184,18 +185,18 @@ def remark(
     feedback: str | None = None,
     output: Path | None = None,
     json: bool = False,
-) -> int:
-    """Mark again, without judging, what was judged before, and deliver it as :func:`run` does.
+) -> ExitStatus:
+    """Mark earlier reports again, without judging, and deliver them as :func:`run` does.
 
     Parameters
     ----------
     files
-        JSON as ``dhkit grade --json`` prints it with all feedback, or folders of such files: ``records`` of an output.
+        JSON of ``dhkit grade --json`` with full feedback, or folders of such files, such as ``records`` of an output.
 
     Raises
     ------
     AnswerError
-        No such file, or no reports in it; no such format or feedback.
+        There is no such file, format or feedback, or a file has no reports.
     """
     reports = [report for path in _records(files) for report in read_reports(path)]
     if not reports:
@@ -224,28 +225,27 @@ def _form(form: str, several: bool) -> str:
 def _level(feedback: str | None, rubric: Rubric) -> Feedback:
     for level in get_args(Feedback):
         if level == (feedback or rubric.feedback):
-            known: Feedback = level
-            return known
+            return cast(Feedback, level)
     raise AnswerError(f"--feedback: found {feedback!r}; expected {', '.join(get_args(Feedback))}")
 
 
-def _status(reports: Sequence[GradeReport]) -> int:
-    """Return the exit status of the worst: a sheet that could not be judged, then one that does not pass."""
+def _status(reports: Sequence[GradeReport]) -> ExitStatus:
+    """Return the status of the worst sheet: one that could not be judged, then one that does not pass."""
     if any(report.verdict is Verdict.UNREADABLE for report in reports):
-        return 2
-    return 0 if all(reports) else 1
+        return ExitStatus.UNUSABLE
+    return ExitStatus.FINE if all(reports) else ExitStatus.NO
 
 
 @contextmanager
 def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
-    """Show a bar on stderr, where that is a terminal and there is something to wait for."""
+    """Show a bar on stderr, if that is a terminal and there are several sheets."""
     if total < 2 or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 
-    # Without a thread of its own: the sheets' processes are forked meanwhile.
+    # The bar has no thread of its own, since the sheets' processes are forked meanwhile.
     bar = Progress(
         *Progress.get_default_columns(),
         MofNCompleteColumn(),
@@ -265,7 +265,7 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
         yield show
 
 
-def write_template(robot: str, output: Path | None) -> int:
+def write_template(robot: str, output: Path | None) -> ExitStatus:
     """Print or write an empty answer sheet."""
     description = Arm.load(robot).description
     # A sheet finds robot files only in its own folder.
@@ -273,13 +273,13 @@ def write_template(robot: str, output: Path | None) -> int:
     return _deliver(template(description, name), output)
 
 
-def write_explanation(arm: Arm, form: str, output: Path | None) -> int:
+def write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:
     """Print or write a worked solution as text or HTML.
 
     Raises
     ------
     AnswerError
-        Another format.
+        There is no such format.
     """
     forms = {"text": explanation_text, "html": explanation_html}
     if form not in forms:
@@ -287,10 +287,10 @@ def write_explanation(arm: Arm, form: str, output: Path | None) -> int:
     return _deliver(forms[form](arm.description), output)
 
 
-def _deliver(text: str, output: Path | None) -> int:
+def _deliver(text: str, output: Path | None) -> ExitStatus:
     if output is None:
         sys.stdout.write(text)
     else:
         write_atomically(output, text)
         say(f"wrote {output}")
-    return 0
+    return ExitStatus.FINE

@@ -1,4 +1,4 @@
-"""Where the reports of `dhkit grade` go: to the terminal, into a file, or into a folder for a class."""
+"""Output of `dhkit grade`: reports on the terminal, in a file, or in a folder for a class."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ from dhkit.grading.sheets import SUFFIXES
 
 FORMS = ("text", "json", "gradescope", "junit", "html")
 FILE_WIDTH = 120
-"""Columns of text in a file."""
+"""Width of text in a file, columns."""
 UNSAFE = re.compile(r"[^\w.-]+")
-LONGEST = 80
+"""Characters that file names made from students' names do not have."""
+MAX_NAME_BYTES = 80
 
 
 @dataclass(frozen=True)
@@ -47,19 +48,19 @@ class Graded:
     report: GradeReport
     marks: Marks
 
-    def told(self, level: Feedback) -> Graded:
-        """Return what of it is told."""
+    def with_feedback(self, level: Feedback) -> Graded:
+        """Return the report and its marks with this level of feedback."""
         marks = self.marks if level == "full" else self.marks.without_rules()
         return replace(self, report=with_feedback(self.report, level), marks=marks)
 
 
 def check_output(output: Path | None, form: str, several: bool) -> None:
-    """Refuse, before anything is judged, an output that cannot be meant.
+    """Refuse an output that cannot be meant, before anything is judged.
 
     Raises
     ------
     AnswerError
-        It would overwrite a sheet, or is a file where a folder is needed.
+        The output would overwrite a sheet, or is a file where a folder is needed.
     """
     if output is None or output.is_dir():
         return
@@ -78,18 +79,18 @@ def check_output(output: Path | None, form: str, several: bool) -> None:
 def deliver(
     graded: Sequence[Graded], form: str, level: Feedback, output: Path | None, several: bool, read: bool = False
 ) -> None:
-    """Print reports, or write them; what is written into a folder is told on stdout as well."""
-    told = [one.told(level) for one in graded]
+    """Print reports, or write them; reports in a folder are printed as well."""
+    shown = [one.with_feedback(level) for one in graded]
     if output is not None and _is_folder(output, form, several):
-        _write_folder(graded, told, output)
+        _write_folder(graded, shown, output)
     elif output is not None:
-        write_atomically(output, _document(told, form, level, several))
+        write_atomically(output, _document(shown, form, level, several))
     if form == "json" and (output is None or output.is_dir()):
-        sys.stdout.write(_document(told, form, level, several))
+        sys.stdout.write(_document(shown, form, level, several))
     elif form == "text":
-        _print(told, several, read)
+        _print(shown, several, read)
     elif output is None:
-        sys.stdout.write(_document(told, form, level, several))
+        sys.stdout.write(_document(shown, form, level, several))
     if output is not None and form != "json":
         say(f"wrote {output}")
 
@@ -98,29 +99,29 @@ def _is_folder(output: Path, form: str, several: bool) -> bool:
     return output.is_dir() or (several and form == "text")
 
 
-def _print(told: Sequence[Graded], several: bool, read: bool) -> None:
+def _print(shown: Sequence[Graded], several: bool, read: bool) -> None:
     if several and not read:
-        console().print(terminal_class(*_columns(told)))
+        console().print(terminal_class(*_columns(shown)))
         return
-    for one in told:
+    for one in shown:
         if one.report.error:
             sys.stderr.write(f"dhkit: {fault_of(one.report)}\n")
         else:
             console().print(terminal_report(one.report, one.marks, read))
 
 
-def _document(told: Sequence[Graded], form: str, level: Feedback, several: bool) -> str:
-    """Return what a file of a format holds."""
-    first = told[0]
+def _document(shown: Sequence[Graded], form: str, level: Feedback, several: bool) -> str:
+    """Return the content of a file of a format."""
+    first = shown[0]
     match form:
         case "json":
-            return "".join(f"{_json(one, level)}\n" for one in told)
+            return "".join(f"{_json(one, level)}\n" for one in shown)
         case "gradescope":
             return jsons.dumps(gradescope(first.report, first.marks), ensure_ascii=False, indent=2) + "\n"
         case "junit":
-            return junit(*_columns(told))
+            return junit(*_columns(shown))
         case "html":
-            return html_class(*_columns(told)) if several else html_report(first.report, first.marks)
+            return html_class(*_columns(shown)) if several else html_report(first.report, first.marks)
         case _:
             file = io.StringIO()
             page = Console(file=file, width=FILE_WIDTH, highlight=False, color_system=None, soft_wrap=True)
@@ -136,11 +137,11 @@ def _columns(graded: Sequence[Graded]) -> tuple[list[GradeReport], list[Marks]]:
     return [one.report for one in graded], [one.marks for one in graded]
 
 
-def _write_folder(graded: Sequence[Graded], told: Sequence[Graded], folder: Path) -> None:
-    """Write a class: marks, its page and whole records for the teacher; a page for each student, with the feedback."""
+def _write_folder(graded: Sequence[Graded], shown: Sequence[Graded], folder: Path) -> None:
+    """Write the files of a class: marks, a page and full records for the teacher, and a page for each student."""
     for name in ("students", "records"):
         (folder / name).mkdir(parents=True, exist_ok=True)
-    for name, whole, part in zip(_names(graded), graded, told, strict=True):
+    for name, whole, part in zip(_names(graded), graded, shown, strict=True):
         write_atomically(folder / "records" / f"{name}.json", _json(whole, "full") + "\n")
         write_atomically(folder / "students" / f"{name}.html", html_report(part.report, part.marks))
     write_atomically(folder / "marks.csv", marks_csv(*_columns(graded)))
@@ -148,11 +149,11 @@ def _write_folder(graded: Sequence[Graded], told: Sequence[Graded], folder: Path
 
 
 def _names(graded: Sequence[Graded]) -> list[str]:
-    """Return names for files: of the students, each once also where a system takes A for a."""
+    """Return names of files, made from the students' names, that differ also where case does not count."""
     names: dict[str, str] = {}
     for one in graded:
-        wanted = one.report.student or Path(one.report.sheet or "sheet").stem
-        plain = UNSAFE.sub("_", wanted).encode()[:LONGEST].decode(errors="ignore").lstrip(".") or "sheet"
+        student = one.report.student or Path(one.report.sheet or "sheet").stem
+        plain = UNSAFE.sub("_", student).encode()[:MAX_NAME_BYTES].decode(errors="ignore").lstrip(".") or "sheet"
         name, number = plain, 1
         while name.casefold() in names:
             number += 1

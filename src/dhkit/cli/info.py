@@ -1,4 +1,4 @@
-"""What `dhkit robots`, `dhkit info` and `dhkit fk` show."""
+"""`dhkit robots`, `dhkit info` and `dhkit fk`: the library, a robot, and the pose of its tool."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ from dhkit.kinematics import classify, tool_reach
 
 
 def list_robots(json: bool) -> None:
-    """Print the library."""
+    """Print the robots of the library."""
     arms = [Arm.load(name).description for name in robots()]
     if json:
         keys = ("name", "n", "source", "kinds")
         print_json([{key: getattr(arm, key) for key in keys} | {"reach_m": tool_reach(arm)} for arm in arms])
         return
-    rows = [(arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _first(arm.source)) for arm in arms]
+    rows = [
+        (arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _shortened(arm.source)) for arm in arms
+    ]
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
 
 
@@ -46,19 +48,17 @@ def show(arm: Arm, json: bool) -> None:
     print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "friction", "assumed"), rows)
     for i, joint in enumerate(description.joints, start=1):
         if len(joint.bodies) > 1:
-            listed = (
-                f"{one['name']} of {one['mass_kg']:.4g} kg at {_vector(one['com_m'])} m" for one in _bodies(joint, arm)
-            )
-            say(f"link {i}: {', '.join(listed)}")
+            bodies = (f"{b['name']} of {b['mass_kg']:.4g} kg at {_vector(b['com_m'])} m" for b in _bodies(joint, arm))
+            say(f"link {i}: {', '.join(bodies)}")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")
     say(f"total mass {np.nansum(numbers.mass):.4g} kg{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
-    for what, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
+    for frame, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
         if not np.array_equal(T, np.eye(4)):
             xyz, angles = pose_parts(T, degrees=True)
-            say(f"{what}: {_vector(xyz)} m, XYZ {_vector(angles)}°")
+            say(f"{frame}: {_vector(xyz)} m, XYZ {_vector(angles)}°")
     for name, q in numbers.configurations.items():
-        entries = [_motion(x, joint) for x, joint in zip(q, description.joints, strict=True)]
+        entries = [_joint_text(x, joint) for x, joint in zip(q, description.joints, strict=True)]
         say(f"{name}: {', '.join(entries)}")
     for warning in description.warnings:
         say(f"warning: {warning}", "yellow")
@@ -72,15 +72,15 @@ def forward(arm: Arm, q: Sequence[str], *, degrees: bool, with_frames: bool, jso
     T, frames = arm.fk(values), arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
-        shown = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
-        asked = joint_entry(arm, "q", values, degrees=degrees)
-        print_json(asked | shown | ({"frames": frames.tolist()} if with_frames else {}))
+        pose = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
+        given = joint_entry(arm, "q", values, degrees=degrees)
+        print_json(given | pose | ({"frames": frames.tolist()} if with_frames else {}))
         return
     named = [(f"frame {i}", frame) for i, frame in enumerate(frames)] if with_frames else []
     unit = "°" if degrees else "rad"
     rows = []
-    for name, pose in [*named, ("tool", T)]:
-        xyz, angles = pose_parts(pose, degrees=degrees)
+    for name, frame in [*named, ("tool", T)]:
+        xyz, angles = pose_parts(frame, degrees=degrees)
         rows.append((name, *(f"{x:.6f}" for x in (*xyz + 0.0, *angles + 0.0))))
     print_table(("", "x [m]", "y [m]", "z [m]", *(f"{axis} [{unit}]" for axis in ("X", "Y'", "Z''"))), rows)
     say(f"\n{np.array2string(T + 0.0, precision=6, suppress_small=True)}")
@@ -103,14 +103,14 @@ def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...
 
 
 def _friction(viscous: float, forwards: float, backwards: float) -> str:
-    """Return a joint's viscous friction and dry friction in both directions, on the joint's side; empty for none."""
+    """Return a joint's viscous friction, and its dry friction in both directions, as text; empty for no friction."""
     dry = f"{forwards:.3g}" if forwards == -backwards else f"{forwards:.3g}/{backwards:.3g}"
     parts = [f"{viscous:.3g} qd" if viscous else "", f"±{dry}" if forwards == -backwards and forwards else dry]
     return " ".join(part for part in parts if part and part != "0")
 
 
 def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
-    """Return name, mass and centre of mass of each body of a link."""
+    """Return the name, mass and centre of mass of each body of a link."""
     values = resolved(arm.description.parameters)
     return [
         {
@@ -122,7 +122,7 @@ def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
     ]
 
 
-def _motion(value: float, joint: Joint) -> str:
+def _joint_text(value: float, joint: Joint) -> str:
     return f"{math.degrees(value):.4g}°" if joint.is_revolute else f"{value:.4g} m"
 
 
@@ -130,12 +130,12 @@ def _vector(entries: Iterable[float]) -> str:
     return f"({', '.join(f'{entry + 0.0:.5g}' for entry in entries)})"
 
 
-def _first(source: str) -> str:
+def _shortened(source: str) -> str:
     return source if len(source) <= 90 else f"{source[:87]}..."
 
 
-def _columns(joint: Joint) -> dict[str, str]:
-    """Return what is told of a joint by its name in numbers, and the key for it, with its unit."""
+def _number_keys(joint: Joint) -> dict[str, str]:
+    """Return the keys, with units, of a joint's numbers, by their names in :class:`~dhkit.description.Numbers`."""
     q, drive = ("rad", "N_m") if joint.is_revolute else ("m", "N")
     armature = "armature_kg_m2" if joint.is_revolute else "armature_kg"
     table = {"theta": "theta_rad", "d": "d_m", "a": "a_m", "alpha": "alpha_rad", "mass": "mass_kg"}
@@ -148,7 +148,7 @@ def _facts(arm: Arm) -> dict[str, Any]:
     fit = classify(description).fit
     joints = [
         {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
-        | {key: float(getattr(numbers, column)[i]) for column, key in _columns(joint).items()}
+        | {key: float(getattr(numbers, column)[i]) for column, key in _number_keys(joint).items()}
         | {"bodies": _bodies(joint, arm)}
         for i, joint in enumerate(description.joints)
     ]

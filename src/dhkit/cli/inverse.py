@@ -1,13 +1,16 @@
-"""`dhkit ik`: every way of an arm to put its tool where it is asked to, one a line."""
+"""`dhkit ik`: all solutions of an arm's inverse kinematics at a pose, one a line."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
+from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
@@ -15,60 +18,83 @@ from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
 from dhkit.kinematics.solutions import LIMIT_SLACK
 
-FLAG_WORDS = {
+FLAG_DESCRIPTIONS = {
     IKFlag.shoulder: "shoulder singular",
     IKFlag.elbow: "elbow stretched or folded",
     IKFlag.wrist: "wrist singular",
     IKFlag.clamped: "on the boundary",
 }
-MARK = "→"
-TURN = 2 * np.pi
+NEAREST_MARK = "→"
+
+
+class Method(StrEnum):
+    """The method that found solutions."""
+
+    CLOSED_FORM = "closed form"
+    SSIK = "ssik"
+    NUMERIC = "numeric"
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """What is said about one pose."""
+class ReachedPose:
+    """The solutions of one pose.
+
+    Attributes
+    ----------
+    arm, T
+        The arm, and the pose of its tool, shape (4, 4), m, world.
+    solutions, method
+        The solutions, and the method that found them.
+    note
+        Reason for using another method than the expected one; empty if there is none.
+    q
+        Joint values, shape (B, n), rad and m; angles with the whole turns that bring them inside the limits and near
+        ``near``.
+    shown
+        The branches that are shown.
+    near
+        Joint values whose nearest branch is marked, shape (n,), rad and m.
+    order
+        Convention of Euler angles.
+    degrees
+        Whether angles are printed in degrees.
+    """
 
     arm: Arm
     T: Array
-    """The pose, shape (4, 4)."""
-    found: IKSolutions
-    method: str
+    solutions: IKSolutions
+    method: Method
     note: str
-    """Why another method was used than one would expect, or nothing."""
     q: Array
-    """Joint values, shape (B, n): angles with the whole turns that bring them into the limits and near the seed."""
     shown: tuple[int, ...]
-    """Which branches count."""
     near: Array | None
     order: str
-    """Of Euler angles."""
     degrees: bool
 
     @property
     def nearest(self) -> int | None:
-        """The branch nearest to what was asked for, None where nothing was."""
+        """The branch nearest to ``near``; None without it."""
         if self.near is None or not self.shown:
             return None
-        gaps = np.sum((self.q - self.near) ** 2, axis=1)
-        return min(self.shown, key=lambda k: float(gaps[k]))
+        distances = np.sum((self.q - self.near) ** 2, axis=1)
+        return min(self.shown, key=lambda k: float(distances[k]))
 
     def flags(self, k: int) -> list[str]:
-        """Return what is special about a branch, in words."""
-        return [words for flag, words in FLAG_WORDS.items() if self.found.flags[k] & flag]
+        """Return descriptions of what is special about a branch."""
+        return [text for flag, text in FLAG_DESCRIPTIONS.items() if self.solutions.flags[k] & flag]
 
     @property
     def refusal(self) -> str:
-        """Why there is no solution to show, in words; nothing where there is one."""
+        """Reason why no solution is shown; empty if one is."""
         if self.shown:
             return ""
-        if self.found.valid.any():
+        if self.solutions.valid.any():
             return "reached, but by no branch inside the joint limits"
-        distance = float(self.found.distance)
-        if self.method == "numeric":
+        distance = float(self.solutions.distance)
+        if self.method is Method.NUMERIC:
             missing = f"misses the position by {distance:.4g} m" if distance > 0 else "misses the orientation"
             return f"no solution found by iteration: the best try {missing}"
-        if self.method == "ssik":
+        if self.method is Method.SSIK:
             return "out of reach: no solution found"
         return f"out of reach by {distance:.4g} m"
 
@@ -83,126 +109,129 @@ def run(
     limits: bool,
     numeric: bool,
     json: bool,
-) -> int:
-    """Print all solutions of fk(q) = T; return 0, or 1 where there is none."""
-    found, method, note = _solved(arm, T, near, limits=limits, numeric=numeric)
-    counts = found.allowed if limits else found.valid
-    answer = Answer(
+) -> ExitStatus:
+    """Print all solutions of fk(q) = T; the status is NO if there is none."""
+    solutions, method, note = _solve(arm, T, near, limits=limits, numeric=numeric)
+    shown = solutions.allowed if limits else solutions.valid
+    reached = ReachedPose(
         arm=arm,
         T=T,
-        found=found,
+        solutions=solutions,
         method=method,
         note=note,
-        q=_wound(found, near),
-        shown=tuple(int(k) for k in np.flatnonzero(counts)),
+        q=_with_whole_turns(solutions, near),
+        shown=tuple(int(k) for k in np.flatnonzero(shown)),
         near=near,
         order=order,
         degrees=degrees,
     )
     if json:
-        print_json(_facts(answer))
+        print_json(_facts(reached))
     else:
-        _print(answer)
-    return 0 if answer.shown else 1
+        _print(reached)
+    return ExitStatus.FINE if reached.shown else ExitStatus.NO
 
 
-def _solved(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool) -> tuple[IKSolutions, str, str]:
-    """Return solutions, how they were found, and why that way if it needs saying."""
+def _solve(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool) -> tuple[IKSolutions, Method, str]:
+    """Return solutions, the method that found them, and the reason for an unexpected method."""
     note = ""
     if not numeric:
         try:
-            return arm.ik(T, seed=near), "closed form" if classify(arm.description).fit else "ssik", ""
+            method = Method.CLOSED_FORM if classify(arm.description).fit else Method.SSIK
+            return arm.ik(T, seed=near), method, ""
         except ModelError as error:
             note = f"one solution by iteration: {error}"
-    found = arm.ik_numeric(T, near)
-    if not limits and not found.valid.any():
-        found = arm.ik_numeric(T, near, limits=False)
-    return found, "numeric", note
+    solutions = arm.ik_numeric(T, near)
+    if not limits and not solutions.valid.any():
+        solutions = arm.ik_numeric(T, near, limits=False)
+    return solutions, Method.NUMERIC, note
 
 
-def _wound(found: IKSolutions, near: Array | None) -> Array:
-    """Return all branches, each joint with the whole turns that bring it inside its limits, near the values given."""
-    # With the flag taken off no branch is left out for being outside.
-    everywhere = replace(found, flags=found.flags & ~np.uint8(IKFlag.out_of_limits))
+def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:
+    """Return all branches, shape (B, n), with the whole turns that bring joints inside their limits and near values."""
+    # Without this flag no branch is left out for being outside the limits.
+    everywhere = replace(solutions, flags=solutions.flags & ~np.uint8(IKFlag.out_of_limits))
     q = everywhere.within_limits(near)
-    turns = np.where(found.prismatic | (near is None), 0.0, np.rint(((0.0 if near is None else near) - found.q) / TURN))
-    outside = (q < found.lower - LIMIT_SLACK) | (q > found.upper + LIMIT_SLACK)
-    return np.where(outside, found.q + TURN * turns, q)
+    turns = np.where(
+        solutions.prismatic | (near is None), 0.0, np.rint(((0.0 if near is None else near) - solutions.q) / math.tau)
+    )
+    outside = (q < solutions.lower - LIMIT_SLACK) | (q > solutions.upper + LIMIT_SLACK)
+    return np.where(outside, solutions.q + math.tau * turns, q)
 
 
-def _print(answer: Answer) -> None:
-    arm, unit = answer.arm, "°" if answer.degrees else "rad"
+def _print(reached: ReachedPose) -> None:
+    arm, unit = reached.arm, "°" if reached.degrees else "rad"
     say(f"{arm.name}: {arm.family}", "bold")
-    if answer.note:
-        say(f"note: {answer.note}", "yellow")
-    xyz, angles = pose_parts(answer.T, order=answer.order, degrees=answer.degrees)
-    say(f"pose: x y z {_row(xyz)} m, {answer.order} {_row(angles)} {unit}\n")
-    if answer.refusal:
-        say(answer.refusal)
+    if reached.note:
+        say(f"note: {reached.note}", "yellow")
+    xyz, angles = pose_parts(reached.T, order=reached.order, degrees=reached.degrees)
+    say(f"pose: x y z {_row(xyz)} m, {reached.order} {_row(angles)} {unit}\n")
+    if reached.refusal:
+        say(reached.refusal)
         return
     prismatic = arm.description.numbers.prismatic
     units = ["m" if slides else unit for slides in prismatic]
     headings = ["", "branch", *(f"q{i + 1} [{unit}]" for i, unit in enumerate(units)), "limits", "special"]
-    print_table(headings, [_line(answer, k) for k in answer.shown])
-    say(f"\n{_summary(answer)}")
+    print_table(headings, [_line(reached, k) for k in reached.shown])
+    say(f"\n{_summary(reached)}")
 
 
-def _line(answer: Answer, k: int) -> tuple[str, ...]:
-    prismatic = answer.arm.description.numbers.prismatic
-    shown = np.where(prismatic, answer.q[k], np.degrees(answer.q[k])) if answer.degrees else answer.q[k]
-    digits = np.where(prismatic, 6, 4 if answer.degrees else 6)
+def _line(reached: ReachedPose, k: int) -> tuple[str, ...]:
+    prismatic = reached.arm.description.numbers.prismatic
+    shown = np.where(prismatic, reached.q[k], np.degrees(reached.q[k])) if reached.degrees else reached.q[k]
+    digits = np.where(prismatic, 6, 4 if reached.degrees else 6)
     values = [f"{_rounded(x, int(d)):.{d}f}" for x, d in zip(shown, digits, strict=True)]
-    mark = MARK if k == answer.nearest else ""
-    return mark, answer.found.branches[k], *values, _limits(answer, k), ", ".join(answer.flags(k))
+    mark = NEAREST_MARK if k == reached.nearest else ""
+    return mark, reached.solutions.branches[k], *values, _limits(reached, k), ", ".join(reached.flags(k))
 
 
-def _limits(answer: Answer, k: int) -> str:
-    """Return whether a branch is inside the limits, and which joints are not."""
-    if answer.found.allowed[k]:
+def _limits(reached: ReachedPose, k: int) -> str:
+    """Return whether a branch is inside the limits, and the joints that are not, as text."""
+    if reached.solutions.allowed[k]:
         return "inside"
-    numbers, q = answer.arm.description.numbers, answer.q[k]
+    numbers, q = reached.arm.description.numbers, reached.q[k]
     outside = np.flatnonzero((q < numbers.lower - LIMIT_SLACK) | (q > numbers.upper + LIMIT_SLACK))
     return f"outside: {', '.join(f'q{i + 1}' for i in outside)}"
 
 
-def _summary(answer: Answer) -> str:
-    found, nearest = answer.found, answer.nearest
-    reach, inside = int(np.sum(found.valid)), int(np.sum(found.allowed))
-    if answer.method == "closed form":
-        text = f"{reach} of {len(found)} branches reach the pose, {inside} inside the limits"
+def _summary(reached: ReachedPose) -> str:
+    solutions, nearest = reached.solutions, reached.nearest
+    count, inside = int(np.sum(solutions.valid)), int(np.sum(solutions.allowed))
+    if reached.method is Method.CLOSED_FORM:
+        text = f"{count} of {len(solutions)} branches reach the pose, {inside} inside the limits"
     else:
-        by = "iteration" if answer.method == "numeric" else answer.method
-        text = f"{reach} solution{'s' if reach > 1 else ''} found by {by}, {inside} inside the limits"
-    return text if nearest is None else f"{text}; {MARK} nearest: {found.branches[nearest]}"
+        by = "iteration" if reached.method is Method.NUMERIC else reached.method
+        text = f"{count} solution{'s' if count > 1 else ''} found by {by}, {inside} inside the limits"
+    return text if nearest is None else f"{text}; {NEAREST_MARK} nearest: {solutions.branches[nearest]}"
 
 
-def _facts(answer: Answer) -> dict[str, Any]:
-    """Return everything for machines."""
-    found, nearest = answer.found, answer.nearest
-    xyz, angles = pose_parts(answer.T, order=answer.order, degrees=answer.degrees)
+def _facts(reached: ReachedPose) -> dict[str, Any]:
+    """Return the solutions as JSON has them."""
+    solutions, nearest = reached.solutions, reached.nearest
+    xyz, angles = pose_parts(reached.T, order=reached.order, degrees=reached.degrees)
     branches = [
         {
-            "name": found.branches[k],
-            **joint_entry(answer.arm, "q", answer.q[k], degrees=answer.degrees),
-            "within_limits": bool(found.allowed[k]),
-            "flags": [flag.name for flag in FLAG_WORDS if found.flags[k] & flag],
+            "name": solutions.branches[k],
+            **joint_entry(reached.arm, "q", reached.q[k], degrees=reached.degrees),
+            "within_limits": bool(solutions.allowed[k]),
+            "flags": [flag.name for flag in FLAG_DESCRIPTIONS if solutions.flags[k] & flag],
         }
-        for k in answer.shown
+        for k in reached.shown
     ]
     return {
-        "robot": answer.arm.name,
-        "inverse_kinematics": str(answer.arm.family),
-        "method": answer.method,
-        "note": answer.note,
-        "T": answer.T.tolist(),
+        "robot": reached.arm.name,
+        "inverse_kinematics": str(reached.arm.family),
+        "method": reached.method,
+        "note": reached.note,
+        "T": reached.T.tolist(),
         "xyz_m": xyz.tolist(),
-        angle_key(f"euler_{answer.order}", degrees=answer.degrees): angles.tolist(),
-        "met": list(found.met),
-        "status": IKStatus(int(found.status_code)).name,
-        "distance_m": float(found.distance),
+        angle_key(f"euler_{reached.order}", degrees=reached.degrees): angles.tolist(),
+        "met": list(solutions.met),
+        "status": IKStatus(int(solutions.status_code)).name,
+        "distance_m": float(solutions.distance),
         "branches": branches,
-        "nearest": None if nearest is None else found.branches[nearest],
-        "reason": answer.refusal,
+        "nearest": None if nearest is None else solutions.branches[nearest],
+        "reason": reached.refusal,
     }
 
 

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from dhkit.cli.arguments import gathering, joint_limits, joint_values, objective, obstacles, payload, target
+from dhkit.cli.arguments import joint_limits, objective, obstacles, option_values, payload, target, with_long_options
 from dhkit.cli.options import Degrees, Json, Robot, Uniform, degrees_option, load_arm
+from dhkit.cli.output import MotionFiles
 from dhkit.errors import DescriptionError
 
 app = typer.Typer()
 
-PLAN_WORDS: dict[str, int | None] = {
+PLAN_OPTIONS: dict[str, int | None] = {
     **dict.fromkeys(("--from", "--to", "--via", "--matrix", "--like", "--objective", "--payload", "--box", "--sphere")),
     **dict.fromkeys(("--velocity", "--acceleration", "--jerk", "--torque")),
     "--xyz": 3,
@@ -22,7 +23,7 @@ PLAN_WORDS: dict[str, int | None] = {
 }
 
 
-@app.command(cls=gathering(PLAN_WORDS))
+@app.command(cls=with_long_options(PLAN_OPTIONS))
 def plan(
     robot: Robot,
     start: Annotated[
@@ -88,13 +89,13 @@ def plan(
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
     if sum(given is not None for given in (to, *pose.values())) != 1:
         raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
-    task = plan_command.Task(
+    settings = plan_command.PlanSettings(
         arm=arm,
-        start=joint_values(arm, [start], degrees, "values of --from", outside="refused"),
+        start=option_values(arm, start, "--from", degrees),
         goal=target(arm, **pose, euler=euler, order=order, degrees=degrees)
         if to is None
-        else joint_values(arm, [to], degrees, "values of --to", outside="refused"),
-        via=[joint_values(arm, [place], degrees, "values of --via", outside="refused") for place in via or ()],
+        else option_values(arm, to, "--to", degrees),
+        via=[option_values(arm, place, "--via", degrees) for place in via or ()],
         objective=objective(wanted),
         duration=duration,
         limits=joint_limits(
@@ -107,12 +108,12 @@ def plan(
         self_collision=self_collision,
         intervals=intervals,
         time_limit=time_limit,
+        line=line,
     )
-    files = plan_command.Files(output, html, figure)
-    return plan_command.run(task, files, line=line, degrees=degrees, json=json)
+    return plan_command.run(settings, MotionFiles(output, html, figure), degrees=degrees, json=json)
 
 
-MOTION_WORDS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
+MOTION_OPTIONS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
 Motion = Annotated[
     Path | None, typer.Option("--motion", help="Follow it: .npz, .mat, .csv or .yaml of dhkit or from elsewhere.")
 ]
@@ -149,7 +150,7 @@ PushOption = Annotated[
 ]
 
 
-@app.command(cls=gathering(MOTION_WORDS))
+@app.command(cls=with_long_options(MOTION_OPTIONS))
 def simulate(
     robot: Robot,
     controller: Annotated[
@@ -189,19 +190,18 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Simulate an arm under a controller; exit status 1 where the run does not get to its end."""
-    from dhkit.cli import simulate as simulate_command
-    from dhkit.cli import simulation_task as asked
+    from dhkit.cli import simulate as simulate_command, simulation_settings as given
     from dhkit.control import Sensors
 
     bare = load_arm(robot, uniform)
     sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
-    followed, named = asked.chosen_motion(bare, motion, start, to, duration, degrees, columns)
-    arm, plant = asked.moving_arm(bare, payload(load) or followed.payload, unmodelled)
-    task = asked.Task(
+    trajectory, text = given.chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = given.known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
+    settings = given.SimulationSettings(
         arm=arm,
         plant=plant,
-        motion=followed,
-        named=named,
+        motion=trajectory,
+        motion_text=text,
         controllers=[controller],
         bandwidth=bandwidth,
         damping=damping,
@@ -209,16 +209,16 @@ def simulate(
         options={
             "rate": None if continuous else rate,
             "plant_rate": plant_rate,
-            "friction": asked.friction_of(friction),
+            "friction": given.friction_of(friction),
             "restitution": None if no_stops else restitution,
-            "pushes": asked.pushes(push or ()),
+            "pushes": given.pushes(push or ()),
             "sensors": sensors,
         },
     )
-    return simulate_command.run(task, simulate_command.Files(output, html, figure), degrees=degrees, json=json)
+    return simulate_command.run(settings, MotionFiles(output, html, figure), degrees=degrees, json=json)
 
 
-@app.command(cls=gathering(MOTION_WORDS))
+@app.command(cls=with_long_options(MOTION_OPTIONS))
 def compare(
     robot: Robot,
     controllers: Annotated[str, typer.Option(help="Which, separated by commas; all unless given.")] = "",
@@ -243,30 +243,29 @@ def compare(
     json: Json = False,
 ) -> int:
     """Compare controllers on one motion; exit status 1 where one does not get to its end."""
-    from dhkit.cli import simulate as compare_command
-    from dhkit.cli import simulation_task as asked
+    from dhkit.cli import simulate as compare_command, simulation_settings as given
     from dhkit.control import CONTROLLERS
 
     bare = load_arm(robot, uniform)
-    followed, named = asked.chosen_motion(bare, motion, start, to, duration, degrees, columns)
-    arm, plant = asked.moving_arm(bare, payload(load) or followed.payload, unmodelled)
-    task = asked.Task(
+    trajectory, text = given.chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = given.known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
+    settings = given.SimulationSettings(
         arm=arm,
         plant=plant,
-        motion=followed,
-        named=named,
+        motion=trajectory,
+        motion_text=text,
         controllers=[name.strip() for name in controllers.split(",")] if controllers else list(CONTROLLERS),
         bandwidth=bandwidth,
         damping=damping,
         options={
             "rate": rate,
             "plant_rate": plant_rate,
-            "friction": asked.friction_of(friction),
+            "friction": given.friction_of(friction),
             "restitution": None if no_stops else restitution,
-            "pushes": asked.pushes(push or ()),
+            "pushes": given.pushes(push or ()),
         },
     )
-    return compare_command.run_comparison(task, figure, degrees=degrees, json=json)
+    return compare_command.run_comparison(settings, figure, degrees=degrees, json=json)
 
 
 @app.command()
@@ -284,7 +283,7 @@ def play(
     return play_command.play(load_arm(robot, uniform), file, html, degrees=degrees, names=columns)
 
 
-@app.command(cls=gathering({"--at": None}))
+@app.command(cls=with_long_options({"--at": None}))
 def picture(
     robot: Robot,
     output: Annotated[Path, typer.Option("--output", "-o", help="The file: .png, or .gif of a motion.")],

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have."""
+"""Arguments and options of several commands."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Robot = Annotated[
 ]
 
 
-def _use_degrees(wanted: bool) -> bool:
-    """Make messages give angles in the unit of the command's arguments."""
-    DEGREES.set(wanted)
-    return wanted
+def _use_degrees(degrees: bool) -> bool:
+    """Set the unit of angles in messages to that of the command's arguments."""
+    DEGREES.set(degrees)
+    return degrees
 
 
 def degrees_option(text: str) -> Any:
-    """Return the option ``--degrees`` with its help; messages then give angles in degrees too."""
+    """Return the option ``--degrees`` with a help text; with it, messages have angles in degrees too."""
     return typer.Option("--degrees", callback=_use_degrees, help=text)
 
 
@@ -33,6 +33,6 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
 def load_arm(robot: str, uniform: bool) -> Arm:
-    """Return a robot by name or file, with uniform rods for links if wanted."""
+    """Return a robot by name or file; ``uniform`` replaces its bodies by uniform rods."""
     arm = Arm.load(robot)
     return arm.with_uniform_links() if uniform else arm

@@ -1,4 +1,4 @@
-"""What the command prints: rich tables for people, JSON for machines."""
+"""Output of the command: rich tables for people, JSON for machines, and files."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -19,54 +20,71 @@ from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from dhkit.arm import Arm
+    from dhkit.control import SimulationResult
+    from dhkit.planning.obstacles import Scene
+    from dhkit.trajectories import Trajectory
+
 PIPE_WIDTH = 200
-"""Columns where the output is no terminal: tables then do not break."""
+"""Width of the output where it is no terminal, columns: tables then do not break."""
+FIGURES = (".png", ".svg", ".pdf")
+PAGES = (".html", ".htm")
+RESOLUTION = 120
+"""Resolution of a figure, dots per inch."""
 
 
-class ReaderGone(Exception):  # noqa: N818 - no error: whoever read had enough
-    """The output goes to a pipe that nobody reads any more."""
+class ReaderGone(Exception):  # noqa: N818 - no error: the reader had enough
+    """The reader of the pipe that the output goes to has closed it."""
 
 
 class _Output(Console):
     def on_broken_pipe(self) -> None:
-        raise _gone()
+        raise _reader_gone()
 
 
-def _gone() -> ReaderGone:
-    """Return what ends the command; what is written from now on goes nowhere."""
+def _reader_gone() -> ReaderGone:
+    """Return the exception that ends the command, and discard everything that is written from now on."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return ReaderGone()
 
 
 def console() -> Console:
-    """Return a console on today's stdout, as wide as the terminal."""
+    """Return a console on the present stdout, as wide as the terminal."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
     return _Output(width=width, highlight=False, soft_wrap=True)
 
 
 def say(text: str, style: str = "") -> None:
-    """Print a line of plain text: brackets in it are no markup."""
+    """Print a line of plain text, in which brackets are no markup."""
     console().print(Text(text, style=style))
 
 
-def print_json(value: Any, indent: int | None = None) -> None:
-    """Print a value as one JSON document; NaN and infinities are null."""
+def say_written(files: Iterable[object]) -> None:
+    """Print the paths of written files, a line each."""
+    say("\n".join(f"wrote {file}" for file in files))
+
+
+def print_json(value: object, indent: int | None = None) -> None:
+    """Print a value as one JSON document, in which NaN and infinity are null."""
     plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text
     try:
         sys.stdout.write(json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent) + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
-        raise _gone() from None
+        raise _reader_gone() from None
 
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
-    """Print a table, numbers to the right."""
+    """Print a table, with columns of numbers aligned to the right."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    listed = [list(row) for row in rows]
+    cells = [list(row) for row in rows]
     for k, heading in enumerate(headings):
-        numeric = bool(listed) and all(_is_number(row[k]) for row in listed)
+        numeric = bool(cells) and all(_is_number(row[k]) for row in cells)
         table.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold")
-    for row in listed:
+    for row in cells:
         table.add_row(*(Text(cell) for cell in row))
     console().print(table)
 
@@ -79,8 +97,8 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def finite(value: Any) -> Any:
-    """Return a value as JSON has it: NaN and infinities are null."""
+def finite(value: object) -> object:
+    """Return a value for JSON, in which NaN and infinity are null."""
     if isinstance(value, float):
         return value if value == value and abs(value) != float("inf") else None
     if isinstance(value, dict):
@@ -90,24 +108,18 @@ def finite(value: Any) -> Any:
     return value
 
 
-FIGURES = (".png", ".svg", ".pdf")
-PAGES = (".html", ".htm")
-RESOLUTION = 120
-"""Dots an inch."""
-
-
 def check_outputs(outputs: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
-    """Refuse what could not be written.
+    """Refuse files that could not be written.
 
     Parameters
     ----------
     outputs
-        Paths, and the suffixes that each may have; None for what is not asked for.
+        Paths, and the suffixes that each may have; None for a file that is not asked for.
 
     Raises
     ------
     DescriptionError
-        Another suffix, or a place that cannot be written to.
+        A path has another suffix, or its place cannot be written to.
     """
     for path, expected in outputs:
         if path is None:
@@ -117,9 +129,69 @@ def check_outputs(outputs: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
         check_place(path)
 
 
-def write_figure(figure: Any, path: Path) -> Path:
-    """Write a figure of matplotlib in the format of the path's suffix, whole or not at all, and return the path."""
-    picture = io.BytesIO()
-    figure.savefig(picture, format=path.suffix[1:].lower(), dpi=RESOLUTION)
-    write_atomically(path, picture.getvalue())
+def write_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure in the format of the path's suffix, whole or not at all, and return the path."""
+    content = io.BytesIO()
+    figure.savefig(content, format=path.suffix[1:].lower(), dpi=RESOLUTION)
+    write_atomically(path, content.getvalue())
     return path
+
+
+def output_folder(output: Path | None, name: str) -> Path:
+    """Return the folder that a command writes into: ``output``, or ``out/NAME``.
+
+    Raises
+    ------
+    DescriptionError
+        It is a file.
+    """
+    folder = output or Path("out") / name
+    if folder.exists() and not folder.is_dir():
+        raise DescriptionError(f"{folder}: not a folder")
+    return folder
+
+
+@dataclass(frozen=True)
+class MotionFiles:
+    """Files of a motion or a simulation that a command writes; None for those that are not asked for.
+
+    Attributes
+    ----------
+    data
+        The motion or the simulation itself.
+    page
+        A page that plays it.
+    figure
+        A figure of it.
+    """
+
+    data: Path | None
+    page: Path | None
+    figure: Path | None
+
+    def check(self, suffixes: Sequence[str]) -> None:
+        """Refuse files that could not be written, before anybody waits for them.
+
+        Raises
+        ------
+        DescriptionError
+            A path has another suffix, or its place cannot be written to.
+        """
+        check_outputs(((self.data, suffixes), (self.page, PAGES), (self.figure, FIGURES)))
+
+    def write(
+        self, arm: Arm, motion: Trajectory | SimulationResult, name: str, caption: str, obstacles: Scene | None = None
+    ) -> list[str]:
+        """Write the files of a motion, and return their paths; the name and the caption are those on the page."""
+        written = [] if self.data is None else [motion.save(self.data)]
+        if self.page is not None:
+            with arm.view() as view:
+                if obstacles is not None:
+                    view.obstacles(obstacles)
+                view.play(motion)
+                written.append(view.save_html(self.page, interactive=True, motions={name: motion}, caption=caption))
+        if self.figure is not None:
+            from dhkit.viewer import plot
+
+            written.append(write_figure(plot(motion), self.figure))
+        return [str(path) for path in written]

@@ -9,7 +9,8 @@ from pathlib import Path
 from dhkit.arm import Arm
 from dhkit.cli.arguments import columns, joint_values
 from dhkit.cli.browser import until_interrupted
-from dhkit.cli.output import PAGES, check_outputs, say
+from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.output import PAGES, check_outputs, say, say_written
 from dhkit.control import SimulationResult
 from dhkit.control.result_files import SIMULATION
 from dhkit.errors import DescriptionError
@@ -31,34 +32,32 @@ def run(
     rate: float,
     frames: bool,
     degrees: bool,
-) -> int:
+) -> ExitStatus:
     """Write a picture of an arm, or pictures of a motion."""
-    moving = motion is not None
-    check_outputs(((output, (".png", ".gif") if moving else (".png",)),))
-    if moving and at is not None:
+    check_outputs(((output, (".png",) if motion is None else (".png", ".gif")),))
+    if motion is not None and at is not None:
         raise DescriptionError("--at and --motion: expected one of them")
     shape = _size(size or ("480x360" if output.suffix.lower() == ".gif" else "960x720"))
     if motion is None:
         q = None if at is None else joint_values(arm, at, degrees)
         say(f"wrote {write_png(picture(arm.description, q, size=shape, frames=frames), output)}")
-        return 0
+        return ExitStatus.FINE
     played = _read(arm, motion, degrees=degrees)
     if output.suffix.lower() == ".gif":
         say(f"wrote {write_motion_gif(arm.description, played, output, rate=rate, size=shape, frames=frames)}")
-        return 0
-    for path in write_motion_pngs(arm.description, played, output, count=count, size=shape, frames=frames):
-        say(f"wrote {path}")
-    return 0
+        return ExitStatus.FINE
+    say_written(write_motion_pngs(arm.description, played, output, count=count, size=shape, frames=frames))
+    return ExitStatus.FINE
 
 
 def _size(text: str) -> tuple[int, int]:
-    found = SIZE.fullmatch(text)
-    if found is None:
+    match = SIZE.fullmatch(text)
+    if match is None:
         raise DescriptionError(f"--size {text[:40]}: expected width and height in px, such as 960x720")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
-def play(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str | None = None) -> int:
+def play(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str | None = None) -> ExitStatus:
     """Play a motion or a simulation of a file in the browser until it is interrupted, or write a page of it."""
     check_outputs(((page, PAGES),))
     played = _read(arm, path, degrees=degrees, names=names)
@@ -67,7 +66,7 @@ def play(arm: Arm, path: Path, page: Path | None, *, degrees: bool, names: str |
         if page is not None:
             caption = f"The motion of {path.name}."
             say(f"wrote {view.save_html(page, interactive=True, motions={path.name: played}, caption=caption)}")
-            return 0
+            return ExitStatus.FINE
         return until_interrupted(view.url, f"playing {path}", open_browser=True)
 
 

@@ -1,4 +1,4 @@
-"""A progress bar on stderr, once something takes long and someone is looking."""
+"""A progress bar on stderr, for work that takes long, where stderr is a terminal."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import threading
 from types import TracebackType
 from typing import Any
 
-PATIENCE = 1.0
-"""s: what takes longer shows how far it is."""
+DELAY = 1.0
+"""Time before the bar appears, s."""
 
 
 class ProgressBar:
@@ -17,18 +17,18 @@ class ProgressBar:
     Parameters
     ----------
     text
-        What it says at first.
+        The text at first.
     """
 
     def __init__(self, text: str) -> None:
         self._text = text
         self._done, self._total = 0.0, 0.0
-        self._timer = threading.Timer(PATIENCE, self._open)
+        self._timer = threading.Timer(DELAY, self._open)
         self._timer.daemon = True
         self._bar: Any = None
 
     def show(self, done: float, total: float, text: str | None = None) -> None:
-        """Say how far it is, as a share of a total, and perhaps with another text."""
+        """Show how much of the total is done, and another text if given."""
         self._done, self._total, self._text = done, total, self._text if text is None else text
         if self._bar is not None:
             self._bar.update(self._task, completed=done, total=total, description=self._text)

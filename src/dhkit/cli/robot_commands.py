@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from dhkit.arm import Arm
-from dhkit.cli.arguments import gathering, joint_values, target
+from dhkit.cli.arguments import OutsideLimits, option_values, target, with_long_options
 from dhkit.cli.options import Degrees, Json, Robot, Uniform, degrees_option, load_arm
-from dhkit.cli.output import print_json, say
+from dhkit.cli.output import print_json, say_written
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 
@@ -63,10 +63,10 @@ def build(
     if json:
         print_json({"files": [str(file) for file in files]})
     else:
-        say("\n".join(f"wrote {file}" for file in files))
+        say_written(files)
 
 
-@app.command(name="import-cad", cls=gathering({"--at": None}))
+@app.command(name="import-cad", cls=with_long_options({"--at": None}))
 def import_cad(
     folder: Annotated[
         Path,
@@ -124,7 +124,7 @@ def fk(
     info_command.forward(Arm.load(robot), q, degrees=degrees, with_frames=frames, json=json)
 
 
-@app.command(cls=gathering({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
+@app.command(cls=with_long_options({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
 def ik(
     robot: Robot,
     xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
@@ -150,7 +150,7 @@ def ik(
     return inverse_command.run(
         arm,
         target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees),
-        near=None if near is None else joint_values(arm, [near], degrees, "values of --near", outside="fine"),
+        near=None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED),
         order=order,
         degrees=degrees,
         limits=limits,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,87 +11,71 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
-from dhkit.cli.output import FIGURES, PAGES, check_outputs, print_json, print_table, say, write_figure
+from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.output import (
+    FIGURES,
+    MotionFiles,
+    check_outputs,
+    print_json,
+    print_table,
+    say,
+    say_written,
+    write_figure,
+)
 from dhkit.cli.progress import ProgressBar
-from dhkit.cli.simulation_task import Task
+from dhkit.cli.simulation_settings import SimulationSettings
 from dhkit.cli.units import joint_entry
 from dhkit.control import Comparison, Plant, SimulationResult, compare
 from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
 
-ACCOUNTED = 1e-6
-"""Share of the energy without account above which the steps are too long."""
-RESULTS = (".npz", ".mat", ".csv")
+MAX_ENERGY_ERROR = 1e-6
+"""Largest share of the energy that is turned over which may be without account; above it the steps are too long."""
+SUFFIXES = (".npz", ".mat", ".csv")
 
 
-@dataclass(frozen=True)
-class Files:
-    """What is to be written."""
-
-    result: Path | None = None
-    page: Path | None = None
-    figure: Path | None = None
-
-    def check(self) -> None:
-        """Refuse what could not be written, before anybody waits for it."""
-        check_outputs(((self.result, RESULTS), (self.page, PAGES), (self.figure, FIGURES)))
-
-    def write(self, arm: Arm, result: SimulationResult) -> Iterator[Path]:
-        """Write them, and yield each path."""
-        if self.result is not None:
-            yield result.save(self.result)
-        if self.page is not None:
-            with arm.view() as view:
-                view.play(result)
-                peak = 1000 * result.tool_norms.peak
-                caption = (
-                    f"A simulation of {result.t[-1]:.3g} s; the grey arm is what was asked for, and the tool is "
-                    f"{peak:.3g} mm away from it at most."
-                )
-                yield view.save_html(self.page, interactive=True, motions={"simulation": result}, caption=caption)
-        if self.figure is not None:
-            from dhkit.viewer import plot
-
-            yield write_figure(plot(result), self.figure)
-
-
-def run(task: Task, files: Files, *, degrees: bool, json: bool) -> int:
-    """Simulate, print the errors and write files; return 0, or 1 where the run did not get to its end."""
-    files.check()
-    name = task.controllers[0]
-    controller = task.controller(name)
+def run(settings: SimulationSettings, files: MotionFiles, *, degrees: bool, json: bool) -> ExitStatus:
+    """Simulate, print the errors and write files; the status is NO if the run did not get to its end."""
+    files.check(SUFFIXES)
+    name = settings.controllers[0]
+    controller = settings.controller(name)
     begin = time.perf_counter()
     failure, result = "", None
     try:
         with ProgressBar("simulating") as bar:
-            result = task.arm.simulate(
-                controller,
-                task.motion,
-                plant=task.plant,
-                progress=bar.show,
-                **task.options,
+            result = settings.arm.simulate(
+                controller, settings.motion, plant=settings.plant, progress=bar.show, **settings.options
             )
     except SimulationError as error:
         failure, result = str(error), error.result
     seconds = time.perf_counter() - begin
-    written = [] if result is None else [str(path) for path in files.write(task.arm, result)]
+    written: list[str] = []
+    if result is not None:
+        caption = (
+            f"A simulation of {result.t[-1]:.3g} s; the grey arm is what was asked for, and the tool is "
+            f"{1000 * result.tool_norms.peak:.3g} mm away from it at most."
+        )
+        written = files.write(settings.arm, result, "simulation", caption)
     if json:
-        facts = {} if result is None else facts_of(task.arm, result, degrees=degrees)
-        print_json({"robot": task.arm.name, "controller": name, "failure": failure or None, **facts, "files": written})
+        facts = {} if result is None else facts_of(settings.arm, result, degrees=degrees)
+        print_json(
+            {"robot": settings.arm.name, "controller": name, "failure": failure or None, **facts, "files": written}
+        )
     else:
         if result is not None:
-            _print(task, name, result, seconds, degrees=degrees)
+            _print(settings, name, result, seconds, degrees=degrees)
         if written:
-            say("\n" + "\n".join(f"wrote {path}" for path in written))
+            say("")
+            say_written(written)
     if failure:
         sys.stderr.write(f"dhkit: {' '.join(failure.split())}\n")
-    return 1 if failure else 0
+    return ExitStatus.NO if failure else ExitStatus.FINE
 
 
-def _print(task: Task, name: str, result: SimulationResult, seconds: float, *, degrees: bool) -> None:
+def _print(settings: SimulationSettings, name: str, result: SimulationResult, seconds: float, *, degrees: bool) -> None:
     description = result.description
-    say(f"{task.arm.name}: {name}, {task.rate}", "bold")
-    say(f"{task.about}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
+    say(f"{settings.arm.name}: {name}, {settings.rate}", "bold")
+    say(f"{settings.about}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
     unit = _units(description.numbers.prismatic, degrees)
     torque = np.abs(result.tau).max(axis=0)
     norms = (result.peak_error, result.rms_error, result.final_error)
@@ -120,18 +102,18 @@ def _print(task: Task, name: str, result: SimulationResult, seconds: float, *, d
         f"energy: drives {audit.drives:.4g} J, pushes {audit.pushes:.4g} J, friction {audit.friction:.4g} J, impacts "
         f"{audit.impacts:.4g} J; {audit.error:.1e} of what was turned over is without account"
     )
-    if not audit.error <= ACCOUNTED:
+    if not audit.error <= MAX_ENERGY_ERROR:
         say("the integration's steps are too long for this motion: give a larger --plant-rate")
 
 
 def _units(prismatic: NDArray[np.bool_], degrees: bool) -> list[tuple[str, float]]:
-    """Return each joint's unit of errors, and what a radian or metre is in it."""
-    turn = ("°", 180 / np.pi) if degrees else ("rad", 1.0)
-    return [("m", 1.0) if slides else turn for slides in prismatic.tolist()]
+    """Return the unit of each joint's errors, and the factor to it from rad or m."""
+    angle_unit = ("°", 180 / np.pi) if degrees else ("rad", 1.0)
+    return [("m", 1.0) if slides else angle_unit for slides in prismatic.tolist()]
 
 
 def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, Any]:
-    """Return what `--json` says of a run."""
+    """Return the numbers of a run that `--json` prints."""
     tool = result.tool_norms
     return {
         "duration_s": float(result.t[-1]),
@@ -145,46 +127,48 @@ def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, 
     }
 
 
-def run_comparison(task: Task, figure: Path | None, *, degrees: bool, json: bool) -> int:
-    """Compare controllers on one motion, print a table and write a figure; return 0, or 1 where one failed."""
+def run_comparison(settings: SimulationSettings, figure: Path | None, *, degrees: bool, json: bool) -> ExitStatus:
+    """Compare controllers on one motion, print a table and write a figure; the status is NO if one failed."""
     check_outputs(((figure, FIGURES),))
-    options = dict(task.options)
+    options = dict(settings.options)
     plant = Plant(
-        task.plant.description,
+        settings.plant.description,
         Friction.chosen(options.pop("friction")),
         options.pop("restitution"),
         tuple(options.pop("pushes")),
     )
-    names = list(task.controllers)
+    names = list(settings.controllers)
     with ProgressBar(f"simulating {names[0]}") as bar:
-        compared = compare(
-            task.arm.description,
-            task.motion,
+        comparison = compare(
+            settings.arm.description,
+            settings.motion,
             names,
-            task.bandwidth,
-            task.damping,
+            settings.bandwidth,
+            settings.damping,
             lambda name: bar.show(names.index(name) + 1, len(names), f"simulated {name}"),
             plant=plant,
             **options,
         )
-    if figure is not None and compared.results:
+    if figure is not None and comparison.results:
         from dhkit.viewer import plot_comparison
 
-        write_figure(plot_comparison(compared.results, f"{task.arm.name}: {task.about}, {task.rate}"), figure)
+        write_figure(
+            plot_comparison(comparison.results, f"{settings.arm.name}: {settings.about}, {settings.rate}"), figure
+        )
     if json:
-        facts = {name: facts_of(task.arm, result, degrees=degrees) for name, result in compared.results.items()}
-        print_json({"robot": task.arm.name, "controllers": facts, "failures": dict(compared.failures)})
+        facts = {name: facts_of(settings.arm, result, degrees=degrees) for name, result in comparison.results.items()}
+        print_json({"robot": settings.arm.name, "controllers": facts, "failures": dict(comparison.failures)})
     else:
-        _print_comparison(task, compared, degrees=degrees)
-        if figure is not None and compared.results:
+        _print_comparison(settings, comparison, degrees=degrees)
+        if figure is not None and comparison.results:
             say(f"\nwrote {figure}")
-    return 1 if compared.failures else 0
+    return ExitStatus.NO if comparison.failures else ExitStatus.FINE
 
 
-def _print_comparison(task: Task, compared: Comparison, *, degrees: bool) -> None:
-    say(f"{task.arm.name}: {task.about}, {task.rate}, {task.bandwidth:g} rad/s", "bold")
+def _print_comparison(settings: SimulationSettings, comparison: Comparison, *, degrees: bool) -> None:
+    say(f"{settings.arm.name}: {settings.about}, {settings.rate}, {settings.bandwidth:g} rad/s", "bold")
     say("")
-    headings, rows = compared.rows(degrees=degrees)
+    headings, rows = comparison.rows(degrees=degrees)
     print_table(headings, rows)
-    for name, reason in compared.failures.items():
+    for name, reason in comparison.failures.items():
         say(f"\n{name}: {reason}")

@@ -1,4 +1,4 @@
-"""A simulation as the command asks for it: the arm, what moves, the motion and the options."""
+"""Settings of a simulation: the arm, the plant, the motion and the options."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.cli.arguments import columns, joint_values, numbers
-from dhkit.cli.quickest import ends
+from dhkit.cli.arguments import columns, numbers, option_values, split_at
+from dhkit.cli.demo_motions import moved_configurations
 from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, make_controller
 from dhkit.description import Array, Payload
 from dhkit.description.joint_text import joint_text
@@ -19,56 +19,67 @@ from dhkit.dynamics import Friction
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, read_motion
 
-NOTHING = "none"
-"""The controller that gives no torque."""
-SHORTEST = 2.0
-"""s: duration of a motion for which none is asked, if the arm can do it in half of it."""
+NO_CONTROLLER = "none"
+"""Name of the controller that gives no torque."""
+MIN_DURATION = 2.0
+"""Shortest default duration of a motion, s; longer motions take twice their least time."""
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
-    """A simulation that is asked for."""
+class SimulationSettings:
+    """A simulation that is asked for.
+
+    Attributes
+    ----------
+    arm, plant
+        The arm that the controller knows, and the arm that is simulated.
+    motion, motion_text
+        The motion that is followed, and its description.
+    controllers
+        Names of the controllers.
+    bandwidth, damping
+        Bandwidth, rad/s, and damping ratio that the controllers' gains are tuned for.
+    options
+        Options of :meth:`dhkit.Arm.simulate`.
+    compensate
+        Whether the controller compensates friction.
+    """
 
     arm: Arm
-    """What the controller knows."""
     plant: Arm
-    """What moves."""
     motion: Trajectory
+    motion_text: str
     controllers: Sequence[str]
     bandwidth: float
-    """rad/s."""
     damping: float
     options: dict[str, Any]
-    """As for :meth:`Arm.simulate`."""
     compensate: bool = False
-    named: str = "a motion"
-    """What the motion is, in words."""
 
     def controller(self, name: str) -> Controller | None:
-        """Return a controller by name, tuned.
+        """Return a tuned controller by name; None for no controller.
 
         Raises
         ------
         ValueError
-            No such controller.
+            There is no such controller.
         """
-        if name == NOTHING:
+        if name == NO_CONTROLLER:
             return None
         if name not in CONTROLLERS:
-            raise ValueError(f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NOTHING}")
+            raise ValueError(f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NO_CONTROLLER}")
         q = self.motion.q(self.motion.duration / 2)
-        made = make_controller(name, self.arm.description, self.bandwidth, self.damping, q)
-        return FrictionCompensation(made, self.arm) if self.compensate else made
+        controller = make_controller(name, self.arm.description, self.bandwidth, self.damping, q)
+        return FrictionCompensation(controller, self.arm) if self.compensate else controller
 
     @property
     def about(self) -> str:
-        """The motion and what the plant carries, in words."""
+        """Description of the motion and of the plant's payload."""
         load = "" if self.plant is self.arm else ", with a payload that the controller does not know of"
-        return f"{self.named}, {self.motion.duration:.4g} s{load}"
+        return f"{self.motion_text}, {self.motion.duration:.4g} s{load}"
 
     @property
     def rate(self) -> str:
-        """How often the controller is called, in words."""
+        """Description of the rate of the controller's calls."""
         rate = self.options["rate"]
         return "continuous" if rate is None else f"{rate:g} Hz"
 
@@ -82,53 +93,50 @@ def chosen_motion(
     degrees: bool,
     names: str | None = None,
 ) -> tuple[Trajectory, str]:
-    """Return the motion of a file, or the quintic between two configurations; and what it is, in words.
+    """Return the motion of a file, or the quintic between two configurations; and its description.
 
-    Without a start, it begins in a named configuration, or at zero; without a goal, it ends with every joint moved by 1
-    rad or less; without a duration, it takes twice the least time, and 2 s at least.
+    By default the motion begins in a named configuration, or at zero; it ends with every joint moved by 1 rad or less;
+    and it takes twice the least time, but at least 2 s.
 
     Raises
     ------
     DescriptionError
-        A file beside configurations, one that cannot be read, or a motion that goes nowhere.
+        A file is given beside configurations or cannot be read, or both configurations are the same.
     """
     if path is not None:
         if start or goal or duration is not None:
             raise DescriptionError("--motion: found --from, --to or --duration too; expected the file alone")
         return read_motion(path, arm.description, degrees=degrees, columns=columns(names)), str(path)
-    here, there = ends(arm)
-    here = here if start is None else joint_values(arm, [start], degrees, "values of --from", outside="refused")
-    there = there if goal is None else joint_values(arm, [goal], degrees, "values of --to", outside="refused")
-    if start is None and np.array_equal(here, there):
-        here = ends(arm)[1]
-    if np.array_equal(here, there):
+    begin, end = moved_configurations(arm)
+    begin = begin if start is None else option_values(arm, start, "--from", degrees)
+    end = end if goal is None else option_values(arm, goal, "--to", degrees)
+    if start is None and np.array_equal(begin, end):
+        begin = moved_configurations(arm)[1]
+    if np.array_equal(begin, end):
         raise DescriptionError("--from and --to are the same; expected two configurations")
     if duration is None:
-        duration = max(SHORTEST, 2 * arm.quintic(here, there).duration) if _has_limits(arm) else SHORTEST
-    words = f"quintic from {_name_of(arm, here)} to {_name_of(arm, there)}"
-    return arm.quintic(here, there, duration), words
+        numbers = arm.description.numbers
+        has_limits = np.isfinite(numbers.velocity).any() or np.isfinite(numbers.effort).any()
+        duration = max(MIN_DURATION, 2 * arm.quintic(begin, end).duration) if has_limits else MIN_DURATION
+    text = f"quintic from {_configuration_text(arm, begin)} to {_configuration_text(arm, end)}"
+    return arm.quintic(begin, end, duration), text
 
 
-def _name_of(arm: Arm, q: Array) -> str:
-    """Return a configuration's name, or its values."""
-    known = {"zero": np.zeros(arm.n)} | dict(arm.configurations)
-    found = next((name for name, values in known.items() if np.array_equal(values, q)), None)
+def _configuration_text(arm: Arm, q: Array) -> str:
+    """Return the name of a configuration, shape (n,), or its values."""
+    configurations = {"zero": np.zeros(arm.n)} | dict(arm.configurations)
+    name = next((name for name, values in configurations.items() if np.array_equal(values, q)), None)
     slides = arm.description.numbers.prismatic.tolist()
-    return found or "(" + ", ".join(joint_text(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
+    return name or "(" + ", ".join(joint_text(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
 
 
-def _has_limits(arm: Arm) -> bool:
-    numbers = arm.description.numbers
-    return bool(np.isfinite(numbers.velocity).any() or np.isfinite(numbers.effort).any())
-
-
-def moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) -> tuple[Arm, Arm]:
-    """Return the arm that the controller knows, and the one that moves with what it carries.
+def known_and_moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) -> tuple[Arm, Arm]:
+    """Return the arm that the controller knows, and the arm that moves with the payload.
 
     Raises
     ------
     DescriptionError
-        No payload that could be unmodelled.
+        There is no payload that could be unmodelled.
     """
     if carried is None:
         if unmodelled:
@@ -139,12 +147,12 @@ def moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) -> tuple[Arm
 
 
 def friction_of(text: str) -> bool | Friction:
-    """Return what ``--friction`` asks for: none, stiction, or a width of smooth friction in rad/s.
+    """Return the friction of a text: none, stiction, or the width of smooth friction in rad/s.
 
     Raises
     ------
     DescriptionError
-        Another word, or no width.
+        The text is another word, or the width is not positive.
     """
     if text in ("none", "stiction"):
         return text == "stiction"
@@ -159,20 +167,20 @@ def friction_of(text: str) -> bool | Friction:
 
 
 def pushes(texts: Sequence[str]) -> list[Push]:
-    """Return forces on the tool over a time: "FX FY FZ @ BEGIN END", N in world axes, and s.
+    """Return pushes on the tool, of texts "FX FY FZ @ BEGIN END": a force in the world, N, and its times, s.
 
     Raises
     ------
     DescriptionError
-        Other numbers, or no expressions.
+        There are other numbers, or a word is no expression.
     ValueError
-        An end before the beginning.
+        A push ends before it begins.
     """
-    found = []
+    parsed = []
     for text in texts:
-        force, at, window = text.partition("@")
-        if not at:
+        force, times = split_at(text)
+        if times is None:
             raise DescriptionError(f'--push: found {text!r}; expected "FX FY FZ @ BEGIN END", N and s')
-        begin, end = numbers([window], "--push", [2])
-        found.append(Push(numbers([force], "--push", [3]), begin=float(begin), end=float(end)))
-    return found
+        begin, end = numbers([times], "--push", [2])
+        parsed.append(Push(numbers([force], "--push", [3]), begin=float(begin), end=float(end)))
+    return parsed

@@ -1,4 +1,4 @@
-"""Output on pipes and terminals that do not know every letter: what they lack is written in plain letters."""
+"""Output on pipes and terminals whose encoding lacks letters: such letters are written in plain ones."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, TextIO, cast
 
 PLAIN = dict(zip("→←↑↓−–≤≥·…′", ("->", "<-", "^", "v", "-", "-", "<=", ">=", "*", "...", "'"), strict=True))
-"""Signs whose decomposition has no ASCII letters."""
+"""ASCII for signs whose decomposition has no ASCII letters."""
 
 
-def accept_every_letter() -> None:
-    """Have stdout and stderr replace letters that their encoding lacks, as cp1252 lacks theta, in place of failing."""
-    codecs.register_error("dhkit.plain", _replaced)
+def replace_unknown_letters() -> None:
+    """Make stdout and stderr replace letters that their encoding lacks, as cp1252 lacks theta, instead of failing."""
+    codecs.register_error("dhkit.plain", _replace_letters)
     if sys.stdout is None:  # closed by the shell
         sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - to the end
     if sys.stderr is None:
@@ -25,11 +25,11 @@ def accept_every_letter() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="dhkit.plain")
-    sys.stderr = cast(TextIO, _Forgiving(sys.stderr))
+    sys.stderr = cast(TextIO, _MessageStream(sys.stderr))
 
 
-class _Forgiving:
-    """A stream for messages: where they cannot be written, nothing else is lost."""
+class _MessageStream:
+    """A stream for messages: one that cannot be written does not end the command."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -47,7 +47,7 @@ class _Forgiving:
         return getattr(self._stream, name)
 
 
-def _replaced(error: UnicodeError) -> tuple[str, int]:
+def _replace_letters(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(_plain, error.object[error.start : error.end])), error.end

@@ -1,8 +1,6 @@
-"""Joint values and angles for machines: in radians or degrees as was asked for, under keys that say which."""
+"""Joint values and angles for machines: in radians or degrees, under keys that name the unit."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +13,7 @@ def angle_key(name: str, *, degrees: bool) -> str:
     return f"{name}_{'deg' if degrees else 'rad'}"
 
 
-def joint_entry(arm: Arm, name: str, values: Array, *, degrees: bool = False) -> dict[str, list[Any]]:
-    """Return joint values, shape (..., n), rad and m, by a key with the angles' unit; sliding joints stay in m."""
-    turning = ~arm.description.numbers.prismatic & degrees
-    return {angle_key(name, degrees=degrees): np.where(turning, np.degrees(values), values).tolist()}
+def joint_entry(arm: Arm, name: str, values: Array, *, degrees: bool = False) -> dict[str, object]:
+    """Return joint values, shape (..., n), rad and m, under a key with the unit of angles; sliding joints stay in m."""
+    in_degrees = ~arm.description.numbers.prismatic & degrees
+    return {angle_key(name, degrees=degrees): np.where(in_degrees, np.degrees(values), values).tolist()}

@@ -1,8 +1,7 @@
-"""`dhkit workspace`: where an arm's tool can be, in numbers, as a figure and as a page."""
+"""`dhkit workspace`: the workspace of an arm in numbers, as a figure and as a page."""
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -10,35 +9,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
-from dhkit.cli.output import print_json, print_table, say
+from dhkit.cli.output import output_folder, print_json, print_table, say, say_written, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
-from dhkit.description import write_atomically
-from dhkit.errors import DescriptionError, ModelError
+from dhkit.errors import ModelError
 from dhkit.kinematics.manipulability import velocity_ellipsoid
 from dhkit.kinematics.singularities import Singularities, singularities
-from dhkit.kinematics.workspace import Workspace
-from dhkit.kinematics.workspace import workspace as sample
+from dhkit.kinematics.workspace import Workspace, workspace as sample
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-SHOWN = 12_000
-"""Points on the page: more are slow without a graphics card."""
+MAX_POINTS = 12_000
+"""Most points on the page: more are slow without a graphics processor."""
 
 
 def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -> None:
-    """Sample an arm's workspace, print its figures, and write a picture and a page into a folder."""
-    folder = output or Path("out") / arm.name
-    if folder.exists() and not folder.is_dir():
-        raise DescriptionError(f"{folder}: not a folder")
+    """Sample an arm's workspace, print its numbers, and write a figure and a page into a folder."""
+    from dhkit.viewer import plot
+
+    folder = output_folder(output, arm.name)
     with ProgressBar("sampling") as bar:
         space = sample(arm.description, samples, seed, progress=bar.show)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [_figure(space, folder / "workspace.png"), _page(arm, space, folder / "workspace.html")]
+    files = [write_figure(plot(space), folder / "workspace.png"), _page(arm, space, folder / "workspace.html")]
     if json:
         print_json(_facts(arm, space) | {"files": [str(file) for file in files]})
         return
     _print(arm, space)
-    say("\n" + "\n".join(f"wrote {file}" for file in files))
+    say("")
+    say_written(files)
 
 
 def _print(arm: Arm, space: Workspace) -> None:
@@ -57,14 +55,14 @@ def _print(arm: Arm, space: Workspace) -> None:
     q = ", ".join(_value(arm, i, x) for i, x in enumerate(space.best))
     place = ", ".join(f"{x + 0.0:.4f}" for x in arm.fk(space.best)[:3, 3])
     say(f"best {space.manipulability.max():.4g} with the tool at ({place}) m, joints ({q})")
-    found = _singularities(arm)
-    if found is not None:
+    singular = _singularities(arm)
+    if singular is not None:
         say("\nsingular where, limits aside")
-        say("\n".join(f"  {line}" for line in str(found).splitlines()))
+        say("\n".join(f"  {line}" for line in str(singular).splitlines()))
 
 
 def _singularities(arm: Arm) -> Singularities | None:
-    """Return where the arm is singular, None where that is not known in closed form."""
+    """Return the singularities of the arm; None if they are not known in closed form."""
     try:
         return singularities(arm.description)
     except ModelError:
@@ -73,8 +71,8 @@ def _singularities(arm: Arm) -> Singularities | None:
 
 def _size(space: Workspace) -> str:
     if space.estimate is None or space.grid is None:
-        kept = "one point" if space.grid is None else ("one point", "a curve", "a curved surface")[space.freedoms]
-        return f"the tool keeps to {kept}, which has no volume"
+        extent = "one point" if space.grid is None else ("one point", "a curve", "a curved surface")[space.freedoms]
+        return f"the tool keeps to {extent}, which has no volume"
     kind = ("length", "area", "volume")[space.estimate.dimension - 1]
     return f"{kind} reached: about {space.estimate}, an estimate by cells of {space.grid.edge:.3g} m"
 
@@ -112,7 +110,7 @@ def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
 
 
 def _singular_facts(found: Singularities) -> dict[str, Any]:
-    """Return each kind's joint, counted from 1 as in words, its singular values, rad or m, and its words."""
+    """Return the joint of each kind of singularity, from 1, its singular values, rad or m, and its description."""
     joints = {kind: None if joint is None else joint + 1 for kind, joint in found.joints.items()}
     return {
         kind: {"joint": joints[kind], "values_rad": list(found.values[kind]), "words": found.words[kind]}
@@ -120,21 +118,12 @@ def _singular_facts(found: Singularities) -> dict[str, Any]:
     }
 
 
-def _figure(space: Workspace, path: Path) -> Path:
-    from dhkit.viewer import plot
-
-    buffer = io.BytesIO()
-    plot(space).savefig(buffer, format="png", dpi=120)
-    write_atomically(path, buffer.getvalue())
-    return path
-
-
 def _page(arm: Arm, space: Workspace, path: Path) -> Path:
-    """Write a page with the arm as it is first shown, its ellipsoid there, and the points that it reaches."""
+    """Write a page with the arm in its first configuration, its ellipsoid there, and points that the tool reaches."""
     from dhkit.viewer import heat_colors
     from dhkit.viewer.scene import first_configuration
 
-    shown = _cut_open(space)
+    shown = _shown_points(space)
     with arm.view() as view:
         view.points(space.positions[shown], heat_colors(space.manipulability[shown]))
         view.ellipsoid(velocity_ellipsoid(arm.description, first_configuration(arm.description)))
@@ -144,9 +133,9 @@ def _page(arm: Arm, space: Workspace, path: Path) -> Path:
     return path
 
 
-def _cut_open(space: Workspace) -> NDArray[np.intp]:
-    """Return which points to show: behind the arm, where y is above frame 0's, so that what is inside is seen."""
+def _shown_points(space: Workspace) -> NDArray[np.intp]:
+    """Return the points to show: of a volume only those with y above frame 0's, behind the arm, to see inside."""
     behind = np.flatnonzero(space.positions[:, 1] >= space.description.numbers.T_world_base[1, 3])
     if space.grid is None or len(space.grid.axes) < 3 or len(behind) < space.samples / 10:
-        return np.arange(min(SHOWN, space.samples), dtype=np.intp)
-    return behind[:SHOWN]
+        return np.arange(min(MAX_POINTS, space.samples), dtype=np.intp)
+    return behind[:MAX_POINTS]

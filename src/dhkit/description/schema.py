@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Mapping
 from decimal import Decimal
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import (
     BaseModel,
@@ -129,7 +129,7 @@ class InertiaForm(Form):
     xz: Number = 0
 
 
-KeyedInertia = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)]
+InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)]
 
 
 class BodyForm(Form):
@@ -348,21 +348,17 @@ def _place_text(path: KeyPath, document: Document) -> str:
 
 def _key_hint(path: KeyPath) -> str:
     """Return the known key that is most similar to an unknown one, or all known keys."""
-    forms: dict[str, type[Form]] = {
-        "joint": JointForm,
-        "units": UnitsForm,
-        "body": BodyForm,
-        "bodies": BodyForm,
-        "inertia": InertiaForm,
-        "drive": DriveForm,
-        "shape": ShapeForm,
-        "base": BaseForm,
-        "tool": ToolForm,
-        "cylinder": RoundForm,
-        "capsule": RoundForm,
-        "sphere": BallForm,
-    }
-    tables = [forms[part] for part in path[:-1] if isinstance(part, str) and part in forms]
-    known = list((tables[-1] if tables else RobotForm).model_fields)
+    form: type[Form] = RobotForm
+    for part in path[:-1]:
+        if isinstance(part, str) and part in form.model_fields:
+            form = _form_in(form.model_fields[part].annotation) or form
+    known = list(form.model_fields)
     close = difflib.get_close_matches(str(path[-1])[:80], known, n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
+
+
+def _form_in(annotation: object) -> type[Form] | None:
+    """Return the form that a field's annotation is made of, such as that of a list's entries."""
+    if isinstance(annotation, type) and issubclass(annotation, Form):
+        return annotation
+    return next(filter(None, map(_form_in, get_args(annotation))), None)

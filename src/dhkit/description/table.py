@@ -66,7 +66,8 @@ class DHTable:
         headings = ("joint", "θ", f"d [{units.length}]", f"a{shift} [{units.length}]", f"α{shift}")
         rows, latex_rows = [], []
         for i, joint in enumerate(description.joints, start=1):
-            entries = dict(zip(COLUMNS, _row(joint, units), strict=True))
+            texts = angle(joint.theta), length(joint.d, units), length(joint.a, units), angle(joint.alpha)
+            entries = dict(zip(COLUMNS, texts, strict=True))
             plain, latex = (
                 [_with_variable(key, entry, joint, variable) for key, entry in entries.items()]
                 for variable in (f"q{i}", f"q_{{{i}}}")
@@ -97,11 +98,6 @@ class DHTable:
         titles = ["$i$", r"$\theta_i$", f"$d_i$ {unit}", f"$a{shift}$ {unit}", rf"$\alpha{shift}$"]
         lines = [" & ".join(titles) + r" \\ \hline", *(" & ".join(row) + r" \\" for row in self.latex_rows)]
         return "\n".join([r"\begin{tabular}{ccccc}", *lines, r"\end{tabular}"])
-
-
-def _row(joint: Joint, units: Units) -> tuple[str, str, str, str]:
-    """Return the entries of a joint's row as text, in the order of COLUMNS."""
-    return angle(joint.theta), length(joint.d, units), length(joint.a, units), angle(joint.alpha)
 
 
 def _with_variable(column: str, entry: str, joint: Joint, variable: str) -> str:

@@ -41,13 +41,17 @@ def toml_document(text: str) -> Document:
     return document
 
 
-def plain_numbers(value: Any) -> Any:
-    """Return a document, or a part of one, with doubles in place of decimals."""
-    if isinstance(value, Mapping):
-        return {key: plain_numbers(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [plain_numbers(entry) for entry in value]
-    return float(value) if isinstance(value, Decimal) else value
+def plain_numbers(document: Document) -> Document:
+    """Return a document with doubles in place of decimals."""
+
+    def plain(value: object) -> object:
+        if isinstance(value, Mapping):
+            return {key: plain(entry) for key, entry in value.items()}
+        if isinstance(value, list):
+            return [plain(entry) for entry in value]
+        return float(value) if isinstance(value, Decimal) else value
+
+    return {key: plain(value) for key, value in document.items()}
 
 
 def _decimal(text: str) -> Decimal:

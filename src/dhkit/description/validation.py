@@ -42,7 +42,7 @@ COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 MAX_TABLE_ANGLE, MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
 """rad: larger angles of the table, or joint limits, are probably degrees; see MAX_DEGREES."""
 MAX_DEGREES = 1080.0
-"""Angles beyond this number are no degrees either, so nothing is said."""
+"""Largest number that is probably an angle in degrees: three turns; larger ones give no warning."""
 
 Value = Callable[[str, Expression], float]
 """Returns the number of an expression, SI and radians; the text names the expression in messages."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import (
     AfterValidator,
@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from dhkit.description.schema import titled_schema
+from dhkit.description.schema import JsonSchema, KeyPath, key_text, length_bound, shortened, titled_schema
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 from dhkit.lab.tool_panel import EULER_ORDERS
@@ -216,74 +216,66 @@ FORMS: dict[str, type] = {
 """The forms of tables inside the file, by the keys of the tables."""
 
 
-def assignment_schema() -> dict[str, Any]:
+def assignment_schema() -> JsonSchema:
     """Return the JSON Schema of assignment files, made from the definition that validates them."""
     return titled_schema("dhkit assignment, format 1", TypeAdapter(AssignmentForm).json_schema())
 
 
-def validated(document: Mapping[str, Any]) -> AssignmentForm:
+def validated(document: Mapping[str, object]) -> AssignmentForm:
     """Check a parsed assignment's keys, types and sizes.
 
     Raises
     ------
     DescriptionError
-        The message names the first error: its place, what was found and what was expected.
+        The message names the first fault: its place, what was found and what was expected.
     """
     try:
         return TypeAdapter(AssignmentForm).validate_python(dict(document))
     except ValidationError as error:
-        # A mistyped key is also a missing one: what is there says more than what is not.
-        found = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
-        raise DescriptionError(_one_line(found[0])) from None
+        # A mistyped key is also a missing one: the unknown key is the more useful message.
+        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "unexpected_keyword_argument")
+        raise DescriptionError(_fault_text(faults[0])) from None
 
 
-def _one_line(error: ErrorDetails) -> str:
-    path, found = tuple(error["loc"]), error["input"]
+def _fault_text(error: ErrorDetails) -> str:
+    path, value = tuple(error["loc"]), error["input"]
+    where = _place_text(path)
     match error["type"]:
         case "missing":
-            return f"{_place(path[:-1])}key {path[-1]!r} is missing"
+            return f"{_place_text(path[:-1])}key {path[-1]!r} is missing"
         case "unexpected_keyword_argument":
             key = str(path[-1])
-            return f"{_place(path[:-1])}unknown key {key[:80]!r}{_hint(key, _known(path[:-1]))}"
+            return f"{_place_text(path[:-1])}unknown key {key[:80]!r}{_hint(key, _known_keys(path[:-1]))}"
         case "text":
-            return _place(path) + error["msg"]
+            return f"{where}{error['msg']}"
         case "too_long" | "too_short":
-            bounds = error["ctx"]
-            bound = f"at most {bounds['max_length']}" if "max_length" in bounds else f"at least {bounds['min_length']}"
-            return f"{_place(path)}found {len(found)} entries; expected {bound}"
+            return f"{where}found {len(value)} entries; expected {length_bound(error)}"
         case "string_too_long":
-            return f"{_place(path)}found {len(found)} characters; expected at most {error['ctx']['max_length']}"
+            return f"{where}found {len(value)} characters; expected {length_bound(error)}"
         case "dataclass_type":
-            expected = "a table"
+            expectation = "a table"
         case "tuple_type":
-            expected = "a list"
+            expectation = "a list"
         case _:
-            expected = error["msg"].removeprefix("Input should be ").replace("a valid ", "a ")
-    return f"{_place(path)}found {_shown(found)}; expected {expected}"
+            expectation = error["msg"].removeprefix("Input should be ").replace("a valid ", "a ")
+    return f"{where}found {shortened(value)}; expected {expectation}"
 
 
-def _place(path: tuple[int | str, ...]) -> str:
-    """Say where in words: ``step 2: goal 1: pose.xyz[0]: ``."""
-    words = ""
-    while len(path) > 1 and path[0] in ("step", "goal") and isinstance(path[1], int):
-        words += f"{path[0]} {path[1] + 1}: "
-        path = path[2:]
-    keys = "".join(f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path).removeprefix(".")
-    return words + (f"{keys}: " if keys else "")
+def _place_text(path: KeyPath) -> str:
+    """Return where a value stands, steps and goals by number: ``step 2: goal 1: pose.xyz[0]: ``."""
+    if len(path) > 1 and path[0] in ("step", "goal") and isinstance(path[1], int):
+        return f"{path[0]} {path[1] + 1}: {_place_text(path[2:])}"
+    return key_text(path)
 
 
-def _known(path: tuple[int | str, ...]) -> list[str]:
+def _known_keys(path: KeyPath) -> list[str]:
     """Return the keys of the table that a path leads to."""
     names = [part for part in path if isinstance(part, str)]
+    form = FORMS[names[-1]] if names else AssignmentForm
     aliases = {"begin": "from", "end": "to"}
-    return [aliases.get(field.name, field.name) for field in fields(FORMS[names[-1]] if names else AssignmentForm)]
+    return [aliases.get(field.name, field.name) for field in fields(form)]
 
 
-def _hint(name: str, known: tuple[str, ...] | list[str]) -> str:
+def _hint(name: str, known: Sequence[str]) -> str:
     close = difflib.get_close_matches(name[:80].lower(), known, n=1)
     return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
-
-
-def _shown(found: object) -> str:
-    text = repr(found)
-    return text if len(text) <= 60 else f"{text[:57]}..."

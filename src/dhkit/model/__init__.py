@@ -1,4 +1,4 @@
-"""A description as URDF and as Pinocchio model, what its links look like, and descriptions from URDFs of others."""
+"""Descriptions as URDF and as Pinocchio model, shapes of links, and descriptions from URDFs and CAD files of others."""
 
 from dhkit.model.cad_assembly import CadImport, import_cad
 from dhkit.model.example_robots import ExampleChain, example_chains, example_robots, example_urdf, urdf_source

@@ -19,13 +19,10 @@ def library_urdf(name: str) -> str:
 
 def write_assets(root: Path) -> None:
     """Write urdf/ and meshes/ below a folder."""
-    (root / "urdf").mkdir(exist_ok=True)
-    written = list(write_puma560_meshes(root / "meshes" / "puma560"))
+    meshes = write_puma560_meshes(root / "meshes" / "puma560")
     for name in robots():
-        path = root / "urdf" / f"{name}.urdf"
-        write_atomically(path, library_urdf(name))
-        written.append(path)
-    log.info("wrote %d files below %s", len(written), root)
+        write_atomically(root / "urdf" / f"{name}.urdf", library_urdf(name))
+    log.info("wrote %d files below %s", len(meshes) + len(robots()), root)
 
 
 if __name__ == "__main__":

@@ -230,18 +230,18 @@ def _in_metres(
     without_unit = {i: [part.mesh for part in several if part.unit is None] for i, several in parts.items()}
     without_unit = {i: meshes for i, meshes in without_unit.items() if meshes}
     file_units = sorted({part.unit for several in parts.values() for part in several if part.unit is not None})
-    found = unit or (unit_of(Assembly(description, frames, without_unit, str(folder))) if without_unit else "m")
-    meshes = {i: [part.in_metres(unit, found) for part in several] for i, several in parts.items()}
+    found_unit = unit or (unit_of(Assembly(description, frames, without_unit, str(folder))) if without_unit else "m")
+    meshes = {i: [part.in_metres(unit, found_unit) for part in several] for i, several in parts.items()}
     assembly = Assembly(description, frames, meshes, str(folder))
     listed = " and ".join(f"{file_unit:g} m" for file_unit in file_units)
     if unit is None and file_units:
         check_size(assembly)
-        others = f"; {found} for the other files, found by size" if without_unit else ""
+        others = f"; {found_unit} for the other files, found by size" if without_unit else ""
         return assembly, f"unit: {listed}, as the files state it{others}: {assembly.sizes_text}", True
     size, length = assembly.size, description.reach
     sizes = f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
     if unit is None:
-        return assembly, f"unit: {found}, found by size: {sizes}", True
+        return assembly, f"unit: {found_unit}, found by size: {sizes}", True
     is_usual = USUAL_SIZES[0] * length <= size <= USUAL_SIZES[1] * length
     is_overridden = any(file_unit != UNITS[unit] for file_unit in file_units)
     override = f", for all files in place of the {listed} that files state" if is_overridden else ""

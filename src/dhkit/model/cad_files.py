@@ -138,8 +138,8 @@ def assign_parts(
     mapped = {name for several in stated.values() for name in several}
     numbers = {name: link_number(Path(name).stem if suffixes else name) for name in names if name not in mapped}
     first = names[0] if names else "forearm.stl"
-    found = f"; found {_name_list(names)}; "
-    hint = f'{found}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
+    names_found = f"; found {_name_list(names)}; "
+    hint = f'{names_found}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
     if without_number := [name for name, number in numbers.items() if number is None]:
         raise ModelError(f"{where}: no single link number in {_name_list(without_number)}{hint}")
     parts: dict[int, tuple[str, ...]] = {}
@@ -149,7 +149,7 @@ def assign_parts(
     for number, several in parts.items():
         if len(several) > 1:
             raise ModelError(
-                f"{where}: {_name_list(several)} have the same link number{found}if all are of that link, "
+                f"{where}: {_name_list(several)} have the same link number{names_found}if all are of that link, "
                 f'--map "{number}={",".join(several[:MAX_LISTED_NAMES])}"; --map "-={several[-1]}" leaves a part out'
             )
     note = "parts by the numbers in their names"

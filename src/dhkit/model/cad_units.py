@@ -25,7 +25,7 @@ CORNER_TOLERANCE = 1e-5
 
 Text files have six digits."""
 MAX_MEAN_AXIS_DISTANCE = 0.05
-"""Largest mean distance of the joints' axes from their links' boxes in the right unit, as a share of the arm's length."""
+"""Largest mean distance of the axes from their links' boxes in the right unit, as a share of the arm's length."""
 MIN_DISTANCE_RATIO = 2.0
 """In the second best unit the axes must be this many times farther from the boxes than in the best."""
 MAX_AXIS_DISTANCE = 0.1

@@ -1,7 +1,8 @@
 """COLLADA files as triangles in metres with z up: geometry, nodes, units, and each material's diffuse colour.
 
-Exporters of robots write little of COLLADA 1.4.1 (Khronos 2008), and this reads that: triangles, polylists and polygons
-of ``<library_geometries>``, placed by the nodes of the visual scene. Textures and other files are never opened.
+Exporters of robots write little of COLLADA 1.4.1 (Khronos 2008), and only that is read: triangles, polylists and
+polygons of ``<library_geometries>``, placed by the nodes of the visual scene. No other file, such as a texture, is
+opened.
 """
 
 from __future__ import annotations
@@ -19,71 +20,61 @@ from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
 Element = ElementTree.Element
-MOST_PIECES = 5_000
-"""Geometries that the nodes of one file may place: nodes can name each other, so that a small file could place any
-number."""
-MOST_DEPTH = 64
+MAX_PIECES = 5_000
+"""Largest number of geometries that a file's nodes may place: nodes can repeat each other without a limit."""
+MAX_NODE_DEPTH = 64
+"""Largest nesting depth of nodes, nodes that name other nodes included."""
 TO_Z_UP = {
     "X_UP": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
     "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "Z_UP": np.eye(3),
 }
 """Rotations from a file's axes to those of Z_UP, x to the right and z up: X_UP has -y, Y_UP x to the right (ibid.)."""
-POLYGONS = ("triangles", "polylist", "polygons")
+POLYGON_TAGS = ("triangles", "polylist", "polygons")
+TRANSFORM_LENGTHS = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}
+"""Numbers of a node's transform elements."""
 
 
 def collada_mesh(content: bytes) -> TriangleMesh:
-    """Return the triangles of a COLLADA file that has passed :func:`dhkit.description.mesh_files.check_mesh_file`, m.
+    """Return the triangles of a COLLADA file that :func:`dhkit.description.mesh_files.check_mesh_file` accepts, m.
 
     Raises
     ------
     ModelError
-        A reference to nothing, a number that is none, or more pieces than :data:`MOST_PIECES`.
+        A reference to nothing, a number that is none, or more pieces than :data:`MAX_PIECES`.
     """
     return _Document(content).mesh()
 
 
 def collada_unit(content: bytes) -> float | None:
-    """Return the unit that a COLLADA file states for the whole of it, m; None where it has none.
+    """Return the unit that a COLLADA file states, m; None if it states none.
 
     Raises
     ------
     ModelError
         No XML, or a unit that is no positive number.
     """
-    return _stated_unit(_Document(content).root)
-
-
-def _stated_unit(root: Element) -> float | None:
-    unit = root.find("asset/unit")
-    if unit is None or unit.get("meter") is None:
-        return None
-    found = _numbers(unit.get("meter", ""))
-    if len(found) != 1 or not (np.isfinite(found[0]) and found[0] > 0):
-        raise ModelError(f"<unit meter> is {unit.get('meter', '')[:20]}; expected a positive number")
-    return float(found[0])
+    return _Document(content).unit()
 
 
 class _Document:
     """A parsed file, its elements found by their identifiers."""
 
     def __init__(self, content: bytes) -> None:
-        self.root = self._parsed(content)
+        self.root = _without_namespaces(content)
         self.by_id = {element.get("id", ""): element for element in self.root.iter() if element.get("id")}
         self.geometries: dict[str, list[tuple[str, TriangleMesh]]] = {}
         self.pieces = 0
 
-    @staticmethod
-    def _parsed(content: bytes) -> Element:
-        """Return the root with the namespace taken off every tag."""
-        try:
-            iterator = ElementTree.iterparse(io.BytesIO(content), events=("end",))  # noqa: S314 - no entities, bounded
-            for _, element in iterator:
-                element.tag = element.tag.rpartition("}")[2]
-        except (ElementTree.ParseError, LookupError, ValueError) as error:
-            raise ModelError(f"no XML: {error}") from None
-        root: Element = iterator.root  # type: ignore[attr-defined]
-        return root
+    def unit(self) -> float | None:
+        unit = self.root.find("asset/unit")
+        text = None if unit is None else unit.get("meter")
+        if text is None:
+            return None
+        numbers = _numbers(text)
+        if len(numbers) != 1 or not (np.isfinite(numbers[0]) and numbers[0] > 0):
+            raise ModelError(f"<unit meter> is {text[:20]}; expected a positive number")
+        return float(numbers[0])
 
     def mesh(self) -> TriangleMesh:
         instance = self.root.find("scene/instance_visual_scene")
@@ -91,12 +82,11 @@ class _Document:
         if scene is not None:
             pieces = [piece for node in scene.findall("node") for piece in self._node(node, np.eye(4), 0)]
         else:
-            pieces = [mesh for one in self.root.iter("geometry") for _, mesh in self._geometry(one)]
+            pieces = [mesh for geometry in self.root.iter("geometry") for _, mesh in self._geometry(geometry)]
         if not pieces:
             raise ModelError("no triangles")
-        coloured = all(piece.colours is not None for piece in pieces)
-        mesh = joined_meshes(pieces if coloured else [TriangleMesh(piece.vertices, piece.faces) for piece in pieces])
-        scale = _stated_unit(self.root) or 1.0
+        mesh = joined_meshes(pieces)
+        scale = self.unit() or 1.0
         up = (self.root.findtext("asset/up_axis") or "Y_UP").strip()
         if up not in TO_Z_UP:
             raise ModelError(f"<up_axis> is {up[:20]!r}; expected X_UP, Y_UP or Z_UP")
@@ -105,84 +95,98 @@ class _Document:
         return mesh.scaled(scale).moved(T)
 
     def _named(self, element: Element) -> Element:
-        """Return what an element's url or source names inside this file."""
+        """Return the element of this file that an element's url or source names."""
         url = element.get("url") or element.get("source") or ""
-        found = self.by_id.get(url.removeprefix("#"))
-        if not url.startswith("#") or found is None:
+        named = self.by_id.get(url.removeprefix("#"))
+        if not url.startswith("#") or named is None:
             raise ModelError(f"<{element.tag}> names {url[:60]!r}; expected an element of this file")
-        return found
+        return named
 
     def _node(self, node: Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
-        if depth > MOST_DEPTH:
-            raise ModelError(f"nodes that name each other more than {MOST_DEPTH} deep")
+        """Yield the geometries of a node and the nodes in it, T the pose of the node around it."""
+        if depth > MAX_NODE_DEPTH:
+            raise ModelError(f"nodes that name each other more than {MAX_NODE_DEPTH} deep")
         for element in node:
             T = T @ _transform(element)
         linear = T[:3, :3]
         for instance in node.findall("instance_geometry"):
-            colours = self._materials(instance)
+            colours = self._material_colours(instance)
             for symbol, mesh in self._geometry(self._named(instance)):
                 self.pieces += 1
-                if self.pieces > MOST_PIECES:
-                    raise ModelError(f"more than {MOST_PIECES} pieces")
+                if self.pieces > MAX_PIECES:
+                    raise ModelError(f"more than {MAX_PIECES} pieces")
                 placed = mesh.turned() if np.linalg.det(linear) < 0 else mesh
                 colour = colours.get(symbol)
-                tinted = None if colour is None else np.tile(colour, (len(mesh.faces), 1))
-                yield TriangleMesh(placed.vertices @ linear.T + T[:3, 3], placed.faces, tinted)
-        for child in node.findall("node"):
+                face_colours = None if colour is None else np.tile(colour, (len(mesh.faces), 1))
+                yield TriangleMesh(placed.vertices @ linear.T + T[:3, 3], placed.faces, face_colours)
+        for child in (*node.findall("node"), *map(self._named, node.findall("instance_node"))):
             yield from self._node(child, T, depth + 1)
-        for other in node.findall("instance_node"):
-            yield from self._node(self._named(other), T, depth + 1)
 
-    def _materials(self, instance: Element) -> dict[str, NDArray[np.uint8]]:
-        """Return the diffuse colour of each symbol that a geometry's triangles are painted with."""
+    def _material_colours(self, instance: Element) -> dict[str, NDArray[np.uint8]]:
+        """Return the diffuse colour of each material symbol of a geometry."""
         colours = {}
         for bound in instance.iter("instance_material"):
-            material = self.by_id.get((bound.get("target") or "").removeprefix("#"))
-            used = None if material is None else material.find("instance_effect")
-            effect = None if used is None else self.by_id.get((used.get("url") or "").removeprefix("#"))
-            found = None if effect is None else next((e.find("color") for e in effect.iter("diffuse")), None)
-            if found is not None and found.text:
-                rgb = np.clip(_numbers(found.text)[:3], 0, 1)
+            material = self._named_or_none(bound, "target")
+            instance_effect = None if material is None else material.find("instance_effect")
+            effect = None if instance_effect is None else self._named_or_none(instance_effect, "url")
+            color = None if effect is None else next((e.find("color") for e in effect.iter("diffuse")), None)
+            if color is not None and color.text:
+                rgb = np.clip(_numbers(color.text)[:3], 0, 1)
                 colours[bound.get("symbol", "")] = np.round(255 * rgb).astype(np.uint8)
         return colours
+
+    def _named_or_none(self, element: Element, key: str) -> Element | None:
+        return self.by_id.get((element.get(key) or "").removeprefix("#"))
 
     def _geometry(self, geometry: Element) -> list[tuple[str, TriangleMesh]]:
         """Return a geometry's triangles for each material symbol, in its own coordinates."""
         key = geometry.get("id", "")
         if key not in self.geometries:
             mesh = geometry.find("mesh")
-            kinds = [] if mesh is None else [element for element in mesh if element.tag in POLYGONS]
-            self.geometries[key] = [(element.get("material", ""), self._polygons(element)) for element in kinds]
+            elements = [] if mesh is None else [element for element in mesh if element.tag in POLYGON_TAGS]
+            self.geometries[key] = [(element.get("material", ""), self._polygons(element)) for element in elements]
         return self.geometries[key]
 
     def _polygons(self, element: Element) -> TriangleMesh:
-        inputs = element.findall("input")
-        places = {one.get("semantic"): one for one in inputs}
-        if "VERTEX" not in places:
+        inputs = {source.get("semantic"): source for source in element.findall("input")}
+        if "VERTEX" not in inputs:
             raise ModelError(f"<{element.tag}> without an input of vertices")
-        offsets = [_whole(one.get("offset", "0")) for one in inputs]
-        stride, offset = max(offsets) + 1, _whole(places["VERTEX"].get("offset", "0"))
-        vertices = self._positions(self._named(places["VERTEX"]))
+        offsets = [_whole_number(source.get("offset", "0")) for source in element.findall("input")]
+        stride, offset = max(offsets) + 1, _whole_number(inputs["VERTEX"].get("offset", "0"))
+        vertices = self._positions(self._named(inputs["VERTEX"]))
         corners, counts = _corners(element, stride, offset)
         if len(corners) and (corners.min() < 0 or corners.max() >= len(vertices)):
             raise ModelError(f"a face with vertex {corners.max()}; the file has vertices 0 to {len(vertices) - 1}")
         return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
     def _positions(self, vertices: Element) -> Array:
-        position = next((one for one in vertices.findall("input") if one.get("semantic") == "POSITION"), None)
+        inputs = {source.get("semantic"): source for source in reversed(vertices.findall("input"))}
+        position = inputs.get("POSITION")
         if position is None:
             raise ModelError("<vertices> without an input of positions")
         source = self._named(position)
-        accessor, data = source.find("technique_common/accessor"), source.find("float_array")
-        stride = 3 if accessor is None else _whole(accessor.get("stride", "3"))
-        numbers = _numbers("" if data is None else data.text or "")
+        accessor = source.find("technique_common/accessor")
+        stride = 3 if accessor is None else _whole_number(accessor.get("stride", "3"))
+        numbers = _numbers(source.findtext("float_array") or "")
         if stride < 3 or len(numbers) % stride:
             raise ModelError(f"{len(numbers)} coordinates with a stride of {stride}; expected whole points")
         return numbers.reshape(-1, stride)[:, :3]
 
 
+def _without_namespaces(content: bytes) -> Element:
+    """Return the root of an XML document, its tags without namespaces."""
+    try:
+        iterator = ElementTree.iterparse(io.BytesIO(content), events=("end",))  # noqa: S314 - no entities, bounded
+        for _, element in iterator:
+            element.tag = element.tag.rpartition("}")[2]
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise ModelError(f"no XML: {error}") from None
+    root: Element = iterator.root  # type: ignore[attr-defined]
+    return root
+
+
 def _corners(element: Element, stride: int, offset: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the vertex numbers of an element's polygons, one after the other, and how many each polygon has."""
+    """Return the vertex indices of an element's polygons, one after the other, and how many each polygon has."""
     lists = [_numbers(p.text or "").astype(np.intp) for p in element.findall("p")]
     if any(len(p) % stride for p in lists):
         raise ModelError(f"<{element.tag}> with an incomplete list of indices")
@@ -202,10 +206,10 @@ def _corners(element: Element, stride: int, offset: int) -> tuple[NDArray[np.int
 def _transform(element: Element) -> Array:
     """Return the (4, 4) matrix of a node's transform element, the identity for any other."""
     T = np.eye(4)
-    if element.tag not in ("matrix", "translate", "rotate", "scale"):
+    if element.tag not in TRANSFORM_LENGTHS:
         return T
     numbers = _numbers(element.text or "")
-    if len(numbers) != {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}[element.tag]:
+    if len(numbers) != TRANSFORM_LENGTHS[element.tag]:
         raise ModelError(f"<{element.tag}> has {len(numbers)} numbers")
     if element.tag == "matrix":
         T = numbers.reshape(4, 4)
@@ -228,7 +232,7 @@ def _numbers(text: str) -> Array:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
 
 
-def _whole(text: str) -> int:
+def _whole_number(text: str) -> int:
     if not (text.isdecimal() and len(text) < 4):
         raise ModelError(f"found {text[:20]!r}; expected a small whole number")
     return int(text)

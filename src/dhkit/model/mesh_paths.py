@@ -1,4 +1,4 @@
-"""Where the meshes that a URDF names lie, and whether they lie in the robot's own folders."""
+"""Files of the meshes that a URDF names, and checks that they lie in the robot's own folders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from dhkit.errors import ModelError
 
 MAX_PARENTS = 20
-"""Folders above a URDF that are looked at for a package.xml."""
+"""Largest number of folders above a URDF that are searched for a package.xml."""
 MAX_PACKAGE_BYTES = 100_000
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
 
@@ -19,9 +19,9 @@ SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
 class MeshFinder:
     """Finds the files that a URDF's mesh elements name.
 
-    A file must lie in the robot's root or below one of the package folders, links followed. The root is the nearest
-    folder above the URDF with a package.xml, else the URDF's own folder. Nothing is fetched: of URIs only
-    ``package://NAME/...`` is read, with NAME a folder in ``package_dirs``, or the package that the URDF lies in.
+    A file must lie in the robot's root or below one of the package folders, also when links are followed. The root is
+    the nearest folder above the URDF with a package.xml, or else the URDF's own folder. Nothing is downloaded: of URIs
+    only ``package://NAME/...`` is read, with NAME a folder in ``package_dirs``, or the URDF's own package.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ class MeshFinder:
         self.folder = urdf.resolve().parent
         self.packages = _packages_above(self.folder)
         self.root = self.packages[0][0] if self.packages else self.folder
-        given = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
+        folders = [package_dirs] if isinstance(package_dirs, str | Path) else package_dirs
         try:
-            self.package_dirs = [Path(folder).resolve() for folder in given]
+            self.package_dirs = [Path(folder).resolve() for folder in folders]
         except (OSError, RuntimeError, ValueError, TypeError) as error:
             raise ModelError(f"package_dirs: {error}") from None
         for folder in self.package_dirs:
@@ -55,62 +55,58 @@ class MeshFinder:
         Raises
         ------
         ModelError
-            Another scheme, a package that is not known, no such file, or one outside the robot's folders.
+            Another scheme, an unknown package, no such file, or one outside the robot's folders.
         """
         if not uri.isprintable():
             raise ModelError(f"mesh {uri[:80]!r}: not a file name")
+        mesh = f"mesh {uri[:120]!r}"
         try:
-            file = self._file(uri).resolve()
+            file = self._file(uri.replace("\\", "/"), mesh).resolve()
             is_file = file.is_file()
         except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that no file can have
-            raise ModelError(f"mesh {uri[:120]!r} cannot be found") from None
-        roots = [self.root, *self.package_dirs]
-        if not any(file.is_relative_to(root) for root in roots):
-            raise ModelError(f"mesh {uri[:120]!r} lies outside the robot's folder {self.root}")
+            raise ModelError(f"{mesh} cannot be found") from None
+        if not any(file.is_relative_to(root) for root in (self.root, *self.package_dirs)):
+            raise ModelError(f"{mesh} lies outside the robot's folder {self.root}")
         if not is_file:
-            raise ModelError(f"mesh {uri[:120]!r} is not there")
+            raise ModelError(f"{mesh} is not there")
         return file.relative_to(self.mesh_folder).as_posix()
 
-    def _file(self, uri: str) -> Path:
-        name = uri.replace("\\", "/")
+    def _file(self, name: str, mesh: str) -> Path:
+        """Return the file of a name or URI, which need not exist; ``mesh`` begins messages."""
         if name.startswith("package://"):
             package, _, rest = name.removeprefix("package://").lstrip("/").partition("/")
             inner = PurePosixPath(rest)
             if not package or package in (".", "..") or inner.is_absolute():
-                raise ModelError(f"mesh {uri[:120]!r}: expected package://NAME/path")
-            for folder in self.package_dirs:
-                if (folder / package).is_dir():
-                    return folder / package / inner
-            for folder, own in self.packages:
-                if package in (own, folder.name):
-                    return folder / inner
-            if package == self.root.name:
-                return self.root / inner
-            raise ModelError(f"mesh {uri[:120]!r}: no package {package!r}; package_dirs names the folder it lies in")
+                raise ModelError(f"{mesh}: expected package://NAME/path")
+            folders = [folder / package for folder in self.package_dirs if (folder / package).is_dir()]
+            folders += [folder for folder, own in self.packages if package in (own, folder.name)]
+            folders += [self.root] if package == self.root.name else []
+            if not folders:
+                raise ModelError(f"{mesh}: no package {package!r}; package_dirs names the folder it lies in")
+            return folders[0] / inner
         if SCHEME.match(name):
-            raise ModelError(f"mesh {uri[:120]!r}: expected package:// or a path relative to the URDF")
+            raise ModelError(f"{mesh}: expected package:// or a path relative to the URDF")
         if PurePosixPath(name).is_absolute():
-            raise ModelError(f"mesh {uri[:120]!r} is an absolute path; expected one relative to the URDF")
+            raise ModelError(f"{mesh} is an absolute path; expected one relative to the URDF")
         return self.folder / PurePosixPath(name)
 
 
 def _packages_above(folder: Path) -> list[tuple[Path, str]]:
     """Return the folders at and above a folder that are packages, with their names, the nearest first."""
-    found = []
-    for above in (folder, *folder.parents)[:MAX_PARENTS]:
-        manifest = above / "package.xml"
+    packages = []
+    for parent in (folder, *folder.parents)[:MAX_PARENTS]:
+        manifest = parent / "package.xml"
         try:
             if not manifest.is_file() or manifest.stat().st_size > MAX_PACKAGE_BYTES:
                 continue
-            text = manifest.read_text(encoding="utf-8", errors="replace")
+            packages.append((parent, _package_name(manifest.read_text(encoding="utf-8", errors="replace"))))
         except OSError:
             continue
-        found.append((above, _package_name(text)))
-    return found
+    return packages
 
 
 def _package_name(manifest: str) -> str:
-    """Return the name that a package.xml states; empty where it cannot be read safely."""
+    """Return the name that a package.xml states; empty if it cannot be read safely."""
     if "<!DOCTYPE" in manifest or "<!ENTITY" in manifest:
         return ""
     try:

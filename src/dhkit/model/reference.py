@@ -36,7 +36,8 @@ def import_pinocchio() -> ModuleType:
             f"Pinocchio cannot be imported ({error}); pip install pin (Linux, macOS) or conda install pinocchio; "
             "everything that needs no reference model works without it"
         ) from None
-    return pinocchio
+    module: ModuleType = pinocchio
+    return module
 
 
 @takes_robot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -27,8 +28,8 @@ def model_errors(path: Path) -> Iterator[None]:
 
 def mesh_paths(description: Description) -> tuple[str, ...]:
     """Return the paths of a description's meshes, each once: base, links, tool."""
-    links = (description.base, *description.joints, description.tool)
-    geometries = (shape.geometry for link in links for shape in link.shapes)
+    shapes = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    geometries = (shape.geometry for shape in itertools.chain(*shapes))
     return tuple(dict.fromkeys(geometry.path for geometry in geometries if isinstance(geometry, Mesh)))
 
 

@@ -1,8 +1,8 @@
-"""What an arm looks like: the shapes that its description gives, and links drawn from the table where it gives none.
+"""Shapes of an arm's links: those of its description, or solids drawn from the table for links without shapes.
 
 A link goes from its own joint's axis to the next: by d along the first, then by a along the common normal of the two.
-Drawn, these are a column and a tube. On the next axis it carries a drum, in which the next link turns on a slimmer,
-longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are shares of the arm's reach.
+These are drawn as a column and a tube. On the next axis the link has a drum, in which the next link turns on a slimmer,
+longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are relative to the arm's reach.
 """
 
 from __future__ import annotations
@@ -20,44 +20,45 @@ from dhkit.description.assets import inside
 from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import matrix
 from dhkit.description.parameters import resolved
+from dhkit.description.traversal import with_values
 from dhkit.display import repr_line
-from dhkit.expressions import Expression, exact, substitute
+from dhkit.expressions import Expression, exact
 
 Solid: TypeAlias = tuple[Geometry, Array]
-"""A geometry and its (4, 4) pose in its link's DH frame."""
+"""A geometry and its pose in its link's DH frame, shape (4, 4), m."""
 
 BASE_COLOR = "#4a4f57"
-"""Foot and gripper: dark, so that they are not taken for links."""
+"""Foot and gripper: dark, to tell them from links."""
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
-"""Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), told apart by colour-blind people too."""
-ROOT, TIP = 0.05, 0.028
-"""Radius of the first and of the last drum, shares of the reach: arms taper."""
-TUBE = 0.62
-"""Radius of a tube, of the smaller drum at its ends: drums stay seen as drums."""
-FLAT = 0.9
-"""Half the height of a drum, of its radius: the tube, which is narrower, ends in it."""
-HUB_RADIUS, HUB_LENGTH = 0.8, 1.2
-"""A hub, of its drum: slimmer, and seen at both faces."""
-NESTED_RADIUS, NESTED_HALF = 0.78, 1.25
-"""Drums about one point get slimmer and longer than the one before, so that each is seen."""
-LOW_DRUM = 0.3
-"""Half the height of the first drum, at most, of the height of the next axis: the drum stays below it."""
-BLOCK = 1.3
-"""Half the length of a slider's block, of its half width."""
-BAR, STOP = 0.55, 0.8
-"""Half widths of a slider's bar and of the stops on a rail's ends, of its block's."""
-PLATE, POST = 1.8, 2.0
-"""Radius of the foot's plate and height of the post between it and a drum at frame 0, of the drum's radius."""
-THIN = 0.25
-"""Thickness of plates and stops, of the radius of the drum or the half width of the block."""
-NECK = 1.25
-"""Where the gripper begins on an arm that ends in its last drum, of the drum's and hub's extent."""
-SEEN = 1e-3
-"""A neck shorter than this share of its radius is not drawn."""
+"""Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), which colour-blind people can tell apart too."""
+FIRST_DRUM_RADIUS, LAST_DRUM_RADIUS = 0.05, 0.028
+"""Radius of the first and of the last drum, relative to the reach: arms taper."""
+TUBE_RADIUS = 0.62
+"""Radius of a tube, relative to the smaller drum at its ends, so that drums stay visible."""
+DRUM_HALF_HEIGHT = 0.9
+"""Half the height of a drum, relative to its radius: the tube, which is narrower, ends inside the drum."""
+HUB_RADIUS, HUB_HALF_LENGTH = 0.8, 1.2
+"""Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
+NESTED_RADIUS, NESTED_HALF_HEIGHT = 0.78, 1.25
+"""Of drums about one point each is slimmer and longer than the one before by these factors, so that all are visible."""
+MAX_FIRST_DRUM_HALF = 0.3
+"""Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
+BLOCK_HALF_LENGTH = 1.3
+"""Half the length of a slider's block, relative to its half width."""
+BAR_HALF_WIDTH, STOP_HALF_WIDTH = 0.55, 0.8
+"""Half widths of a slider's bar and of the stops at a rail's ends, relative to the block's."""
+PLATE_RADIUS, POST_HEIGHT = 1.8, 2.0
+"""Radius of the foot's plate and height of the post below a drum at frame 0, relative to the drum's radius."""
+THICKNESS = 0.25
+"""Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
+GRIPPER_START = 1.25
+"""Distance at which the gripper begins on an arm that ends in its last drum, relative to the joint's extent."""
+MIN_NECK_LENGTH = 1e-3
+"""Shortest neck that is drawn, relative to its radius."""
 
 IDENTITY: Array = np.eye(4)
 ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-"""Lays along x what stands along z."""
+"""The rotation that takes z to x."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +70,7 @@ class Part:
     geometry: Geometry
     """Sizes in m, numbers without parameters; cylinders and capsules lie along z, centred."""
     T_link_part: Array
-    """Shape (4, 4): the solid in DH frame ``link``, m."""
+    """The solid in DH frame ``link``, shape (4, 4), m."""
     color: str
     """``#rrggbb``."""
     file: Path | None = None
@@ -98,55 +99,43 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
     joints, base, tool = description.joints, description.base, description.tool
     parts: list[Part] = []
-    shown: list[Part] = []
+    all_described: list[Part] = []
     for i, shapes in enumerate((base.shapes, *(joint.shapes for joint in joints))):
         color = PALETTE[(i - 1) % len(PALETTE)] if i else BASE_COLOR
-        given = _given(description, shapes, i, IDENTITY, color)
-        shown += given
-        parts += given or _parts(i, arm.link(i), color)
-    at_tool = _given(description, tool.shapes, n, T_last_tool, BASE_COLOR)
-    if shown and not description.drawn:
-        return (*shown, *at_tool)
-    if not at_tool and (not given or not np.array_equal(T_last_tool, IDENTITY)):
-        at_tool = [*_parts(n, arm.neck(), color), *_parts(n, arm.gripper(), BASE_COLOR)]
+        described = _described_parts(description, shapes, i, IDENTITY, color)
+        all_described += described
+        parts += described or _drawn_parts(i, arm.link(i), color)
+    at_tool = _described_parts(description, tool.shapes, n, T_last_tool, BASE_COLOR)
+    if all_described and not description.drawn:
+        return (*all_described, *at_tool)
+    if not at_tool and (not described or not np.array_equal(T_last_tool, IDENTITY)):
+        at_tool = [*_drawn_parts(n, arm.neck(), color), *_drawn_parts(n, arm.gripper(), BASE_COLOR)]
     return (*parts, *at_tool)
 
 
-def _parts(link: int, solids: Iterable[Solid], color: str) -> list[Part]:
+def _drawn_parts(link: int, solids: Iterable[Solid], color: str) -> list[Part]:
     return [Part(link, geometry, T, color) for geometry, T in solids]
 
 
-def _given(description: Description, shapes: Sequence[Shape], link: int, T_link_frame: Array, color: str) -> list[Part]:
+def _described_parts(
+    description: Description, shapes: Sequence[Shape], link: int, T_link_frame: Array, color: str
+) -> list[Part]:
     """Return shapes in a frame of a link as parts; none if a mesh's file is missing."""
     values, parts = resolved(description.parameters), []
     for shape in shapes:
         geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
-            file = inside(description.mesh_folder, geometry.path, "shape")
+            file = inside(description.mesh_folder, geometry.path, "shape.mesh")
             if file is None or not is_mesh_file(file):
                 return []
         T_link_part = T_link_frame @ matrix(shape.placement, values)
-        parts.append(Part(link, _known(geometry, values), T_link_part, shape.color or color, file))
+        parts.append(Part(link, with_values(geometry, values), T_link_part, shape.color or color, file))
     return parts
-
-
-def _known(geometry: Geometry, values: dict[str, Expression]) -> Geometry:
-    """Return a geometry with the parameters' values in it."""
-    match geometry:
-        case Mesh(path, scale):
-            return Mesh(
-                path, (substitute(scale[0], values), substitute(scale[1], values), substitute(scale[2], values))
-            )
-        case Box((x, y, z)):
-            return Box((substitute(x, values), substitute(y, values), substitute(z, values)))
-        case Sphere(radius):
-            return Sphere(substitute(radius, values))
-    return type(geometry)(substitute(geometry.radius, values), substitute(geometry.length, values))
 
 
 @dataclass(frozen=True, eq=False)
 class _Link:
-    """The way of a link: along its joint's axis by d to a corner, from there along the common normal by a to its end.
+    """The path of a link: along its joint's axis by d to a corner, from there along the common normal by a to its end.
 
     The base has only the second half. Poses are in the link's DH frame.
     """
@@ -162,73 +151,76 @@ class _Link:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether the axes of its two joints are."""
+        """Whether the axes of its two joints are parallel."""
         return np.array_equal(np.abs(self.T_corner[:3, 2]), np.abs(self.T_end[:3, 2]))
 
     def is_straight(self, within: float) -> bool:
-        """Whether it ends on the axis that it begins on, up to a distance in m."""
+        """Whether the link ends on the axis on which it begins, up to a distance in m."""
         return self.is_parallel and abs(self.a) < within
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """The sizes of a joint, m; places are along its axis, from the end of the link before it."""
+    """The sizes of a joint, m; heights are along its axis, from the end of the link before it."""
 
     prismatic: bool
     radius: float
-    """Of the drum; half the width of a slider's block."""
+    """Radius of the drum; half the width of a slider's block."""
     half: float
     """Half the drum's height; half the block's length."""
     lift: float = 0.0
-    """The drum's centre."""
+    """Height of the drum's centre."""
     stroke: tuple[float, float] = (0.0, 0.0)
-    """The range of a slider's corner."""
+    """Lowest and highest height of a slider's corner."""
     theta: float = 0.0
     """A slider's angle about its axis, rad."""
     is_rod: bool = False
-    """Whether the slider's bar moves, in a block of the link before; else the block does, on a rail."""
+    """Whether the slider's bar moves, in a block of the link before; otherwise the block moves, on a rail."""
 
     @property
     def near(self) -> float:
-        """The end of a slider's stroke next to the link before; 0 if the stroke goes past it."""
+        """The height in a slider's stroke nearest to the link before; 0 if the stroke goes past it."""
         return float(np.clip(0.0, *self.stroke))
 
     @property
     def extent(self) -> float:
-        """How far the joint's solids reach around the corner of the link after it."""
-        return 0.0 if self.is_rod else max(self.radius, HUB_LENGTH * self.half)
+        """Largest distance of the joint's solids from the corner of the link after it, m."""
+        return 0.0 if self.is_rod else max(self.radius, HUB_HALF_LENGTH * self.half)
 
 
 def _links(description: Description) -> list[_Link]:
-    """Return the ways of links 0 to n."""
+    """Return the paths of links 0 to n."""
     numbers = description.numbers
     rows = np.stack([numbers.a, numbers.cos_alpha, numbers.sin_alpha], axis=1).tolist()
     d, straight = [0.0, *numbers.d.tolist()], (0.0, 1.0, 0.0)
-    # A row's a and alpha lead to the end of its own link; in the modified convention to that of the link before.
+    # A row's a and alpha describe the end of its own link, in the modified convention that of the link before.
     if description.convention is Convention.STANDARD:
-        return [_Link(x, a, _bend(-a, c, -s), IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)]
-    return [_Link(x, a, IDENTITY, _bend(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
+        return [
+            _Link(x, a, _normal_pose(-a, c, -s), IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
+        ]
+    return [_Link(x, a, IDENTITY, _normal_pose(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
 
 
 def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
     """Return the sizes of joints 1 to n."""
     numbers, n = description.numbers, description.n
     scale = max(description.reach, float(np.linalg.norm(numbers.T_last_tool[:3, 3]))) or 1.0
+    taper = LAST_DRUM_RADIUS - FIRST_DRUM_RADIUS
     joints: list[_Joint] = []
     for i, (before, after) in enumerate(pairwise(links)):
-        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (ROOT + (TIP - ROOT) * i / n), 0.0
-        half = radius * (BLOCK if prismatic else FLAT)
+        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (FIRST_DRUM_RADIUS + taper * i / n), 0.0
+        half = radius * (BLOCK_HALF_LENGTH if prismatic else DRUM_HALF_HEIGHT)
         if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
             radius = min(radius, NESTED_RADIUS * joints[-1].radius)
-            half = max(half, NESTED_HALF * joints[-1].extent / HUB_LENGTH)
+            half = max(half, NESTED_HALF_HEIGHT * joints[-1].extent / HUB_HALF_LENGTH)
         if not joints and abs(after.d) > radius:  # frame 0 is on the floor: the drum stands on it, not in it
-            half = min(half, LOW_DRUM * abs(after.d))
-            lift = float(np.copysign(HUB_LENGTH * half, after.d))
+            half = min(half, MAX_FIRST_DRUM_HALF * abs(after.d))
+            lift = float(np.copysign(HUB_HALF_LENGTH * half, after.d))
         if not prismatic:
             joints.append(_Joint(False, radius, half, lift))
             continue
         low, high = np.clip((numbers.lower[i], numbers.upper[i]), -scale, scale) + after.d
-        # What goes on along the bar would be inside a rail: so the bar moves, but not down through a base's column.
+        # A straight next link would lie inside a rail, so its bar moves instead, unless it would move through a base.
         is_rod = after.is_straight(radius) and not all(link.is_straight(radius) for link in links[: i + 1])
         joints.append(_Joint(True, radius, half, 0.0, (low, high), float(numbers.theta[i]), is_rod))
     return joints
@@ -247,9 +239,9 @@ class _Drawing:
         """Draw link i in its DH frame."""
         link = self.links[i]
         ends = self.joints[max(i - 1, 0) : i + 1]
-        tube = TUBE * min(joint.radius for joint in ends)
+        tube = TUBE_RADIUS * min(joint.radius for joint in ends)
         if i:
-            yield from _inner_side(link, self.joints[i - 1], tube)
+            yield from _own_joint_solids(link, self.joints[i - 1], tube)
         elif not self.joints[0].prismatic:
             yield from self._foot()
         if link.a:
@@ -257,10 +249,10 @@ class _Drawing:
         if link.a and link.d:
             yield Sphere(_size(tube)), link.T_corner
         if i < len(self.joints):
-            yield from _outer_side(link, self.joints[i])
+            yield from _next_joint_solids(link, self.joints[i])
 
     def _foot(self) -> Iterator[Solid]:
-        """Draw what an arm stands on: a plate on the floor, and a post to the first drum if that is higher.
+        """Draw a plate on the floor, and a post from it to the first drum if that is higher.
 
         The floor is frame 0's plane if the arm rises from it, the world's z = 0 if frame 0 is above that.
         """
@@ -268,18 +260,18 @@ class _Drawing:
         T_world_end = self.T_world_base @ T_base_end
         up = -1.0 if joint.lift < 0 else 1.0
         raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
-        depth = max(raised, 0.0 if joint.lift else joint.extent + POST * joint.radius)
-        yield _cylinder(T_base_end, PLATE * joint.radius, -up * depth, -up * (depth - THIN * joint.radius))
+        depth = max(raised, 0.0 if joint.lift else joint.extent + POST_HEIGHT * joint.radius)
+        yield _cylinder(T_base_end, PLATE_RADIUS * joint.radius, -up * depth, -up * (depth - THICKNESS * joint.radius))
         if depth:
             yield _cylinder(T_base_end, joint.radius, -up * depth, joint.lift)
 
     def neck(self) -> Iterator[Solid]:
-        """Draw what is between the last link and the gripper, in DH frame n."""
-        radius, T_end_gripper, root = TUBE * self.joints[-1].radius, *self._gripper_place()
+        """Draw the neck between the last link and the gripper, in DH frame n."""
+        radius, T_end_gripper, root = TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
         offset = self.T_last_tool[:3, 3]
         length = float(np.linalg.norm(offset))
-        if length > SEEN * radius:
-            yield _cylinder(_towards(offset), radius, 0.0, length)
+        if length > MIN_NECK_LENGTH * radius:
+            yield _cylinder(_frame_towards(offset), radius, 0.0, length)
         if root:
             yield _cylinder(T_end_gripper, radius, 0.0, root)
 
@@ -292,69 +284,76 @@ class _Drawing:
             yield _box(T @ _shift(x=side * size), (0.2 * size, 0.4 * size), root + 0.7 * size, root + 1.9 * size)
 
     def _gripper_place(self) -> tuple[Array, float]:
-        """Return the gripper's pose, z ahead, and how far ahead it begins, m: an arm may end inside its last drum."""
+        """Return the gripper's pose, z forwards, and the distance at which it begins, m.
+
+        An arm may end inside its last drum: then the gripper begins outside of it.
+        """
         before, last, joint = *self.links[-2:], self.joints[-1]
         T = self.T_last_tool
         length = abs(last.d) + abs(last.a) + float(np.linalg.norm(T[:3, 3]))
-        root = max(0.0, NECK * joint.extent - length)
+        root = max(0.0, GRIPPER_START * joint.extent - length)
         if last.d or not np.array_equal(T, IDENTITY):
             return T, root
         a = last.a or (before.a if before.is_parallel and not joint.prismatic else 0.0)
         return (_about_z(0.0 if a > 0 else np.pi) @ ALONG_X if a else T), root
 
 
-def _inner_side(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
-    """Draw what a link moves on: a hub and the column above it, a rod, or a block on a rail."""
+def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
+    """Draw a link's part of its own joint: a hub and the column above it, a rod, or a block on a rail."""
     if not joint.prismatic:
-        T_start, half = link.T_corner @ _shift(z=-link.d), HUB_LENGTH * joint.half
+        T_start, half = link.T_corner @ _shift(z=-link.d), HUB_HALF_LENGTH * joint.half
         yield _cylinder(T_start, HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
         if link.d:
             yield _cylinder(T_start, tube, 0.0, link.d)
         return
     T, (low, high), wide = link.T_corner @ _about_z(-joint.theta), joint.stroke, joint.radius
     if joint.is_rod:
-        yield _box(T, (BAR * wide, BAR * wide), *_span(joint.near - high, joint.near - low, joint.half))
+        yield _box(
+            T,
+            (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide),
+            *_bar_ends(joint.near - high, joint.near - low, joint.half),
+        )
     else:
         yield _box(T, (wide, wide), -joint.half, joint.half)
 
 
-def _outer_side(link: _Link, joint: _Joint) -> Iterator[Solid]:
-    """Draw what the next link moves in or on: a drum, a block around a rod, or a rail with its stops."""
+def _next_joint_solids(link: _Link, joint: _Joint) -> Iterator[Solid]:
+    """Draw a link's part of the next joint: a drum, a block around a rod, or a rail with its stops."""
     T, wide = link.T_end, joint.radius
     if not joint.prismatic:
         yield _cylinder(T, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
     elif joint.is_rod:
         yield _box(T, (wide, wide), min(-joint.half, joint.near), max(joint.half, joint.near))
     else:
-        low, high = _span(*joint.stroke, joint.half + THIN * wide)
-        yield _box(T, (BAR * wide, BAR * wide), low, high)
-        yield _box(T, (STOP * wide, STOP * wide), low, low + THIN * wide)
-        yield _box(T, (STOP * wide, STOP * wide), high - THIN * wide, high)
+        low, high = _bar_ends(*joint.stroke, joint.half + THICKNESS * wide)
+        yield _box(T, (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide), low, high)
+        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), low, low + THICKNESS * wide)
+        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), high - THICKNESS * wide, high)
 
 
-def _span(low: float, high: float, margin: float) -> tuple[float, float]:
-    """Return the ends of a bar from 0 over a stroke, with a margin for the block where it does not begin."""
+def _bar_ends(low: float, high: float, margin: float) -> tuple[float, float]:
+    """Return the ends of a bar from 0 over a stroke, with a margin for the block at the ends other than 0."""
     if low == high == 0:
         return -margin, margin
     return min(0.0, low - margin * (low < 0)), max(0.0, high + margin * (high > 0))
 
 
 def _cylinder(T: Array, radius: float, start: float, end: float) -> Solid:
-    """Return a cylinder about the z axis of T, from start to end."""
+    """Return a cylinder about the z axis of T, from height start to end, m."""
     return Cylinder(_size(radius), _size(abs(end - start))), T @ _shift(z=(start + end) / 2)
 
 
 def _box(T: Array, half: tuple[float, float], start: float, end: float) -> Solid:
-    """Return a box about the z axis of T, from start to end; half widths along x and y."""
+    """Return a box about the z axis of T, from height start to end, m; half widths along x and y."""
     return Box((_size(2 * half[0]), _size(2 * half[1]), _size(end - start))), T @ _shift(z=(start + end) / 2)
 
 
 def _size(value: float) -> Expression:
-    """Return a length as a short decimal: six digits are a micrometre in a metre."""
+    """Return a length, m, rounded to six digits: a micrometre in a metre."""
     return exact(float(f"{value:.6g}"))
 
 
-def _bend(a: float, cos_alpha: float, sin_alpha: float) -> Array:
+def _normal_pose(a: float, cos_alpha: float, sin_alpha: float) -> Array:
     return np.array([[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]])
 
 
@@ -367,8 +366,8 @@ def _about_z(angle: float) -> Array:
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 
-def _towards(point: Array) -> Array:
-    """Return a frame at the origin whose z axis points to a point other than it."""
+def _frame_towards(point: Array) -> Array:
+    """Return a frame at the origin whose z axis points to another point, shape (3,), m."""
     from scipy.spatial.transform import Rotation
 
     T = np.eye(4)

@@ -171,10 +171,10 @@ def same_vertices(vertices: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         Indices of rows, shape (c,), and numbers of sets, shape (k,), from 0 to c - 1.
     """
     rows = np.ascontiguousarray(vertices + 0.0, dtype=np.float64)  # adding zero turns -0.0 into 0.0
-    words = rows.view(np.uint64)
-    digest = words[:, 0] * HASH_FACTORS[0]
+    bits = rows.view(np.uint64)
+    digest = bits[:, 0] * HASH_FACTORS[0]
     for k in (1, 2):
-        digest = (digest ^ (digest >> np.uint64(29))) * HASH_FACTORS[k] + words[:, k] * HASH_FACTORS[(k + 1) % 3]
+        digest = (digest ^ (digest >> np.uint64(29))) * HASH_FACTORS[k] + bits[:, k] * HASH_FACTORS[(k + 1) % 3]
     # As np.unique works, but with a sort that need not be stable: a third of the time.
     order = np.argsort(digest)
     ordered = digest[order]

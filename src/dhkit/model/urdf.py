@@ -1,11 +1,14 @@
-"""Descriptions as URDF text: the reference path's first step.
+"""Descriptions as URDF text: the first step of the reference path.
 
-Link i of the URDF has its frame right behind joint i, where the joint variable ends; what is left of row i, its own
-theta included, lies behind it. So every origin is a shift with rpy (alpha, 0, theta), and no angle is ever taken back
-out of a rotation matrix. Each DH frame is a link of its own, ``dh0`` ... ``dhn``, and so is ``tool``.
+Link i of the URDF has its frame directly behind joint i, where the joint variable ends; the rest of row i, its own
+theta included, lies behind it. So every origin is a translation with rpy (alpha, 0, theta), and no angle is ever
+computed from a rotation matrix. Each DH frame is a link of its own, ``dh0`` ... ``dhn``, and so is ``tool``.
 
-A URDF has no place for gravity and for the rotors' reflected inertia: a comment says what they are, and
+A URDF cannot hold gravity and the rotors' reflected inertia: a comment states them, and
 :func:`dhkit.model.pinocchio_model` sets them.
+
+The origins of rows are derived here independently of :func:`dhkit.description.link_transforms` and of
+:func:`dhkit.description.exact_poses.fixed_row`, so that Pinocchio's model checks those.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import NamedTuple, SupportsFloat
 from xml.etree import ElementTree
 
 import numpy as np
@@ -32,31 +35,29 @@ from dhkit.description import (
     takes_robot,
     write_atomically,
 )
-from dhkit.errors import ModelError
+from dhkit.description.bodies import INERTIA_PLACES
+from dhkit.model.robot_folder import MESHES, copy_files, model_errors
 from dhkit.model.shapes import Part, link_parts
 
-MESHES = "meshes"
-"""Folder beside a URDF that its meshes are copied into."""
 UNLIMITED = 1e6
 """Effort and velocity of a joint that the description leaves unlimited; a URDF must give numbers."""
+SHAPE_DECIMALS = 12
+"""Decimals of the poses of shapes, m and rad: further decimals are rounding errors."""
 
-DRAWN = 12
-"""Decimals of where a part is drawn, m and rad: what is below is rounding."""
+Element = ElementTree.Element
+PathMap = Callable[[str], str]
+"""From a mesh's path in the robot file to its path in the URDF."""
 
 
 class Origin(NamedTuple):
-    """A URDF origin: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """A URDF origin, m and rad: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
     xyz: Array
     rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @takes_robot
-def urdf_text(
-    description: Description,
-    mesh_path: Callable[[str], str] | None = None,
-    collision_path: Callable[[str], str] | None = None,
-) -> str:
+def urdf_text(description: Description, mesh_path: PathMap | None = None, collision_path: PathMap | None = None) -> str:
     """Return a description as URDF text, SI and radians, numbers as the shortest decimals that read back equal.
 
     Parameters
@@ -66,42 +67,46 @@ def urdf_text(
     mesh_path
         From a mesh's path in the robot file to its path in the URDF; ``meshes/...`` if not given.
     collision_path
-        The same for collisions, where another mesh of the same scale stands for it; ``mesh_path`` if not given.
+        The same for collisions, which may use another mesh of the same scale; ``mesh_path`` if not given.
     """
-    name_mesh = mesh_path or (lambda path: f"{MESHES}/{path}")
-    names = {"visual": name_mesh, "collision": collision_path or name_mesh}
-    return _urdf(description, link_parts(description), names)
+    visual_path = mesh_path or (lambda path: f"{MESHES}/{path}")
+    paths = {"visual": visual_path, "collision": collision_path or visual_path}
+    return _urdf(description, link_parts(description), paths)
 
 
 def mechanics_urdf_text(description: Description) -> str:
-    """Return a description as URDF text without visual and collision elements: what a Pinocchio model needs."""
+    """Return a description as URDF text without visual and collision elements, for a Pinocchio model."""
     return _urdf(description, (), {})
 
 
-def _urdf(description: Description, drawn: Iterable[Part], names: Mapping[str, Callable[[str], str]]) -> str:
-    robot = ElementTree.Element("robot", name=description.name)
-    robot.append(ElementTree.Comment(_what_a_urdf_cannot_say(description)))
+def _urdf(description: Description, drawn: Iterable[Part], paths: Mapping[str, PathMap]) -> str:
+    robot, numbers, n = ElementTree.Element("robot", name=description.name), description.numbers, description.n
+    robot.append(ElementTree.Comment(_comment(description)))
     parts: dict[int, list[Part]] = {}
     for part in drawn:
         parts.setdefault(part.link, []).append(part)
 
-    ElementTree.SubElement(robot, "link", name="world")
-    _fixed(robot, "world", "dh0", _origin_of(description.numbers.T_world_base))
-    base = ElementTree.SubElement(robot, "link", name="dh0")
+    _child(robot, "link", name="world")
+    _add_fixed_joint(robot, "world", "dh0", _origin_of(numbers.T_world_base))
+    base = _child(robot, "link", name="dh0")
     if description.base.body is not None:
-        _add_base_inertial(base, description)
+        mass, com, tensor = numbers.base_body
+        _add_inertial(base, Origin(com), mass, tensor)
     for part in parts.get(0, []):
-        _add_part(base, part, np.eye(4), names)
-    for i in range(1, description.n + 1):
+        _add_part(base, part, np.eye(4), paths)
+    for i in range(1, n + 1):
         _add_joint(robot, description, i)
-        link = ElementTree.SubElement(robot, "link", name=f"link{i}")
-        _add_inertial(link, description, i)
+        link = _child(robot, "link", name=f"link{i}")
+        frame_origin, T_link_frame = _frame_origin(description, i), _frame_matrix(description, i)
+        if not np.isnan(mass := numbers.mass[i - 1]):
+            com = T_link_frame[:3, :3] @ numbers.com[i - 1] + frame_origin.xyz
+            _add_inertial(link, Origin(com, frame_origin.rpy), mass, numbers.inertia[i - 1])
         for part in parts.get(i, []):
-            _add_part(link, part, _behind_matrix(description, i), names)
-        _fixed(robot, f"link{i}", f"dh{i}", _behind(description, i))
-        ElementTree.SubElement(robot, "link", name=f"dh{i}")
-    _fixed(robot, f"dh{description.n}", "tool", _origin_of(description.numbers.T_last_tool))
-    ElementTree.SubElement(robot, "link", name="tool")
+            _add_part(link, part, T_link_frame, paths)
+        _add_fixed_joint(robot, f"link{i}", f"dh{i}", frame_origin)
+        _child(robot, "link", name=f"dh{i}")
+    _add_fixed_joint(robot, f"dh{n}", "tool", _origin_of(numbers.T_last_tool))
+    _child(robot, "link", name="tool")
     ElementTree.indent(robot)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding="unicode") + "\n"
 
@@ -115,7 +120,7 @@ def write_urdf(description: Description, path: str | Path, mesh_prefix: str | No
     path
         The file; its folder is created.
     mesh_prefix
-        What the URDF names its meshes by, in place of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
+        Beginning of the meshes' names in the URDF, in place of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
 
     Raises
     ------
@@ -123,39 +128,33 @@ def write_urdf(description: Description, path: str | Path, mesh_prefix: str | No
         A file cannot be written or read.
     """
     path = Path(path)
-    written = [path]
-    try:
-        for part in link_parts(description):
-            if isinstance(part.geometry, Mesh) and part.file is not None:
-                copy = path.parent / MESHES / PurePosixPath(part.geometry.path)
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                if copy not in written:
-                    write_atomically(copy, part.file.read_bytes())
-                    written.append(copy)
-        prefix = f"{MESHES}/" if mesh_prefix is None else mesh_prefix
+    prefix = f"{MESHES}/" if mesh_prefix is None else mesh_prefix
+    with model_errors(path):
+        sources = {
+            str(MESHES / PurePosixPath(part.geometry.path)): part.file
+            for part in link_parts(description)
+            if isinstance(part.geometry, Mesh) and part.file is not None
+        }
+        copies = copy_files(sources, path.parent)
         write_atomically(path, urdf_text(description, lambda mesh: f"{prefix}{mesh}"))
-    except OSError as error:
-        raise ModelError(f"{error.filename or path}: {error.strerror}") from None
-    return tuple(written)
+    return (path, *copies)
 
 
-def _what_a_urdf_cannot_say(description: Description) -> str:
-    numbers = description.numbers
-    armature = " ".join(map(_text, numbers.armature))
-    gravity = " ".join(map(_text, numbers.gravity))
+def _comment(description: Description) -> str:
+    """Return the values that a URDF cannot hold, as text for an XML comment."""
     lines = [
         f"Made by dhkit from the {description.convention.value} DH table of {description.name}.",
-        "A URDF cannot carry: gravity "
-        f"({gravity}) m/s^2 in the world frame; reflected rotor inertia, joint 1 to {description.n}: {armature}.",
+        f"A URDF cannot carry: gravity ({_texts(description.numbers.gravity)}) m/s^2 in the world frame; reflected "
+        f"rotor inertia, joint 1 to {description.n}: {_texts(description.numbers.armature)}.",
     ]
     if description.source:
         lines.append(f"Source: {description.source}")
-    # Two hyphens would end an XML comment, whatever stands around them.
+    # Two hyphens would end an XML comment.
     return " " + re.sub("-(?=-)", "- ", " ".join(lines)) + " "
 
 
-def _behind(description: Description, i: int) -> Origin:
-    """Return where DH frame i lies in link i (i from 1)."""
+def _frame_origin(description: Description, i: int) -> Origin:
+    """Return the origin of DH frame i in link i (i from 1)."""
     k, n = i - 1, description.numbers
     if description.convention is Convention.MODIFIED:
         return Origin(np.zeros(3), (0.0, 0.0, n.theta[k]))
@@ -163,119 +162,100 @@ def _behind(description: Description, i: int) -> Origin:
     return Origin(along_x, (n.alpha[k], 0.0, n.theta[k]))
 
 
-def _behind_matrix(description: Description, i: int) -> Array:
-    """Return :func:`_behind` as a (4, 4) matrix, from the exact cosines."""
+def _frame_matrix(description: Description, i: int) -> Array:
+    """Return :func:`_frame_origin` as a (4, 4) matrix, from the exact cosines."""
     k, n = i - 1, description.numbers
     ct, st, ca, sa = n.cos_theta[k], n.sin_theta[k], n.cos_alpha[k], n.sin_alpha[k]
     if description.convention is Convention.MODIFIED:
         ca, sa = 1.0, 0.0
     T = np.eye(4)
     T[:3, :3] = [[ct, -st * ca, st * sa], [st, ct * ca, -ct * sa], [0.0, sa, ca]]
-    T[:3, 3] = _behind(description, i).xyz
+    T[:3, 3] = _frame_origin(description, i).xyz
     return T
 
 
 def _joint_origin(description: Description, i: int) -> Origin:
-    """Return where joint i lies in the link before it (dh0 for the first)."""
+    """Return the origin of joint i in the link before it (dh0 for the first)."""
     k, n = i - 1, description.numbers
     if description.convention is Convention.STANDARD:
-        return _behind(description, i - 1) if k else Origin(np.zeros(3))
-    cos_before, sin_before, theta_before = (n.cos_theta[k - 1], n.sin_theta[k - 1], n.theta[k - 1]) if k else (1, 0, 0)
+        return _frame_origin(description, i - 1) if k else Origin(np.zeros(3))
+    # Frame i - 1 is rotated by the theta of its own row against the link.
+    ct, st, theta = (n.cos_theta[k - 1], n.sin_theta[k - 1], n.theta[k - 1]) if k else (1, 0, 0)
     x, y, z = n.a[k], -n.d[k] * n.sin_alpha[k], n.d[k] * n.cos_alpha[k]
-    turned = np.array([cos_before * x - sin_before * y, sin_before * x + cos_before * y, z])
-    return Origin(turned, (n.alpha[k], 0.0, theta_before))
+    return Origin(np.array([ct * x - st * y, st * x + ct * y, z]), (n.alpha[k], 0.0, theta))
 
 
-def _add_joint(robot: ElementTree.Element, description: Description, i: int) -> None:
+def _add_joint(robot: Element, description: Description, i: int) -> None:
     k, numbers, joint = i - 1, description.numbers, description.joints[i - 1]
-    element = ElementTree.SubElement(robot, "joint", name=joint.name, type=joint.type.value)
+    element = _child(robot, "joint", name=joint.name, type=joint.type.value)
     _add_origin(element, _joint_origin(description, i))
-    ElementTree.SubElement(element, "parent", link=f"link{i - 1}" if k else "dh0")
-    ElementTree.SubElement(element, "child", link=f"link{i}")
-    ElementTree.SubElement(element, "axis", xyz="0 0 1")
-    free = 2 * math.pi if joint.is_revolute else max(1.0, description.reach)
+    _child(element, "parent", link=f"link{i - 1}" if k else "dh0")
+    _child(element, "child", link=f"link{i}")
+    _child(element, "axis", xyz="0 0 1")
+    free = math.tau if joint.is_revolute else max(1.0, description.reach)
     lower, upper = numbers.lower[k], numbers.upper[k]
-    ElementTree.SubElement(
+    _child(
         element,
         "limit",
-        lower=_text(lower if np.isfinite(lower) else -free),
-        upper=_text(upper if np.isfinite(upper) else free),
-        effort=_text(min(numbers.effort[k], UNLIMITED)),
-        velocity=_text(min(numbers.velocity[k], UNLIMITED)),
+        lower=_texts([lower if np.isfinite(lower) else -free]),
+        upper=_texts([upper if np.isfinite(upper) else free]),
+        effort=_texts([min(numbers.effort[k], UNLIMITED)]),
+        velocity=_texts([min(numbers.velocity[k], UNLIMITED)]),
     )
     if numbers.viscous[k] or numbers.coulomb[k].any():
         friction = float(np.abs(numbers.coulomb[k]).mean())
-        ElementTree.SubElement(element, "dynamics", damping=_text(numbers.viscous[k]), friction=_text(friction))
+        _child(element, "dynamics", damping=_texts([numbers.viscous[k]]), friction=_texts([friction]))
 
 
-def _fixed(robot: ElementTree.Element, parent: str, child: str, origin: Origin) -> None:
-    joint = ElementTree.SubElement(robot, "joint", name=f"{child}_fixed", type="fixed")
+def _add_fixed_joint(robot: Element, parent: str, child: str, origin: Origin) -> None:
+    joint = _child(robot, "joint", name=f"{child}_fixed", type="fixed")
     _add_origin(joint, origin)
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=child)
+    _child(joint, "parent", link=parent)
+    _child(joint, "child", link=child)
 
 
-def _add_inertial(link: ElementTree.Element, description: Description, i: int) -> None:
-    k, numbers = i - 1, description.numbers
-    if np.isnan(numbers.mass[k]):
-        return
-    behind = _behind(description, i)
-    element = ElementTree.SubElement(link, "inertial")
-    T_link_frame = _behind_matrix(description, i)
-    com = T_link_frame[:3, :3] @ numbers.com[k] + behind.xyz
-    _add_origin(element, Origin(com, behind.rpy))
-    _add_mass(element, numbers.mass[k], numbers.inertia[k])
+def _add_inertial(link: Element, origin: Origin, mass: float, tensor: Array) -> None:
+    inertial = _child(link, "inertial")
+    _add_origin(inertial, origin)
+    _child(inertial, "mass", value=_texts([mass]))
+    moments = {f"i{key}": _texts([tensor[place]]) for key, place in sorted(INERTIA_PLACES.items())}
+    _child(inertial, "inertia", **moments)
 
 
-def _add_base_inertial(link: ElementTree.Element, description: Description) -> None:
-    mass, com, tensor = description.numbers.base_body
-    element = ElementTree.SubElement(link, "inertial")
-    _add_origin(element, Origin(com))
-    _add_mass(element, mass, tensor)
-
-
-def _add_mass(element: ElementTree.Element, mass: float, tensor: Array) -> None:
-    ElementTree.SubElement(element, "mass", value=_text(mass))
-    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ElementTree.SubElement(element, "inertia", {name: _text(tensor[place]) for name, place in names.items()})
-
-
-def _add_part(
-    link: ElementTree.Element, part: Part, T_link_frame: Array, names: Mapping[str, Callable[[str], str]]
-) -> None:
+def _add_part(link: Element, part: Part, T_link_frame: Array, paths: Mapping[str, PathMap]) -> None:
     """Add a drawn part as visual and as collision."""
     rgb = [int(part.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    for T, tag, attributes in _solids(part):
-        for purpose, name_mesh in names.items():
-            named = {key: name_mesh(text) if key == "filename" else text for key, text in attributes.items()}
-            element = ElementTree.SubElement(link, purpose)
-            origin = _origin_of(T_link_frame @ part.T_link_part @ T)
-            _add_origin(element, Origin(np.round(origin.xyz, DRAWN), tuple(np.round(origin.rpy, DRAWN))))
-            ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), tag, named)
+    for z, tag, attributes in _solids(part):
+        T_part_solid = np.eye(4)
+        T_part_solid[2, 3] = z
+        origin = _origin_of(T_link_frame @ part.T_link_part @ T_part_solid)
+        for purpose, path in paths.items():
+            named = {key: path(text) if key == "filename" else text for key, text in attributes.items()}
+            element = _child(link, purpose)
+            _add_origin(
+                element, Origin(np.round(origin.xyz, SHAPE_DECIMALS), tuple(np.round(origin.rpy, SHAPE_DECIMALS)))
+            )
+            _child(_child(element, "geometry"), tag, **named)
             if purpose == "visual":
-                material = ElementTree.SubElement(element, "material", name=f"color_{part.color[1:].lower()}")
-                ElementTree.SubElement(material, "color", rgba=" ".join(f"{c:.4g}" for c in (*rgb, 1.0)))
+                material = _child(element, "material", name=f"color_{part.color[1:].lower()}")
+                _child(material, "color", rgba=" ".join(f"{c:.4g}" for c in (*rgb, 1.0)))
 
 
-def _solids(part: Part) -> list[tuple[Array, str, dict[str, str]]]:
-    """Return URDF geometries of a part, with where they lie in it; a capsule is a cylinder and two balls."""
-    at = np.eye(4)
+def _solids(part: Part) -> list[tuple[float, str, dict[str, str]]]:
+    """Return URDF geometries of a part with their heights on its z axis, m; a capsule is a cylinder and two balls."""
     match part.geometry:
         case Mesh(path, scale):
-            return [(at, "mesh", {"filename": path, "scale": " ".join(_text(float(factor)) for factor in scale)})]
+            return [(0.0, "mesh", {"filename": path, "scale": _texts(scale)})]
         case Box(size):
-            return [(at, "box", {"size": " ".join(_text(float(edge)) for edge in size)})]
+            return [(0.0, "box", {"size": _texts(size)})]
         case Sphere(radius):
-            return [(at, "sphere", {"radius": _text(float(radius))})]
-        case Cylinder(radius, length):
-            return [(at, "cylinder", {"radius": _text(float(radius)), "length": _text(float(length))})]
-        case Capsule(radius, length):
-            ends = []
-            for side in (-0.5, 0.5):
-                end = np.eye(4)
-                end[2, 3] = side * float(length)
-                ends.append((end, "sphere", {"radius": _text(float(radius))}))
-            return [(at, "cylinder", {"radius": _text(float(radius)), "length": _text(float(length))}), *ends]
+            return [(0.0, "sphere", {"radius": _texts([radius])})]
+        case Cylinder(radius, length) | Capsule(radius, length):
+            cylinder = (0.0, "cylinder", {"radius": _texts([radius]), "length": _texts([length])})
+            if isinstance(part.geometry, Cylinder):
+                return [cylinder]
+            ends = (side * float(length) for side in (-0.5, 0.5))
+            return [cylinder, *((end, "sphere", {"radius": _texts([radius])}) for end in ends)]
 
 
 def _origin_of(T: Array) -> Origin:
@@ -283,12 +263,14 @@ def _origin_of(T: Array) -> Origin:
     return Origin(xyz, (float(roll), float(pitch), float(yaw)))
 
 
-def _add_origin(element: ElementTree.Element, origin: Origin) -> None:
-    ElementTree.SubElement(
-        element, "origin", xyz=" ".join(map(_text, origin.xyz)), rpy=" ".join(_text(angle) for angle in origin.rpy)
-    )
+def _add_origin(element: Element, origin: Origin) -> None:
+    _child(element, "origin", xyz=_texts(origin.xyz), rpy=_texts(origin.rpy))
 
 
-def _text(number: float) -> str:
-    """Return the shortest decimal that reads back as this double (at most 17 digits)."""
-    return repr(float(number) + 0.0).removesuffix(".0")
+def _child(parent: Element, tag: str, **attributes: str) -> Element:
+    return ElementTree.SubElement(parent, tag, attributes)
+
+
+def _texts(numbers: Iterable[SupportsFloat]) -> str:
+    """Return the shortest decimals, of at most 17 digits, that read back as the same doubles."""
+    return " ".join(repr(float(number) + 0.0).removesuffix(".0") for number in numbers)

@@ -249,7 +249,8 @@ class _Reader:
     def _geometry(self, name: ElementName, shape: Element) -> tuple[Geometry | None, float]:
         """Return the first known geometry of a visual or collision element, and its largest size or scale."""
         where = f"{name}: {shape.tag}"
-        for element in shape.find("geometry") or ():
+        parent = shape.find("geometry")
+        for element in [] if parent is None else parent:
             keys = GEOMETRY_SIZES.get(element.tag, ())
             sizes = [size for key, count in keys for size in numbers(where, element, key, count)]
             entries = [exact(size) for size in sizes] if sizes and min(sizes) > 0 else []

@@ -1,4 +1,4 @@
-"""Programs that somebody else wrote, run in processes of their own and compared with an arm."""
+"""Programs of other people, run in processes of their own and compared with an arm."""
 
 from dhkit.programs.checks import check
 from dhkit.programs.process import Limits, ProgramError

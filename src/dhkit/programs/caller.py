@@ -1,4 +1,4 @@
-"""A program's function, called for a score: its failures counted, its time taken."""
+"""A program's function, called for a score, with its failures counted and its calls timed."""
 
 from __future__ import annotations
 
@@ -7,22 +7,30 @@ from collections import Counter
 from typing import Any
 
 from dhkit.description import Array
-from dhkit.programs.process import ProgramError
+from dhkit.programs.process import Failure, ProgramError
 from dhkit.programs.program import Program
 
-CLOSE = 1e-6
-"""Between a pose and the one that is reached: entries of the rotations, and positions in shares of the arm's reach."""
-EXAMPLES = 5
-"""Failing poses that are listed."""
-MOST_FAILURES = 3
-"""Failures in a row (of those that end a program) after which it is not called again."""
-LONGEST = 600.0
-"""s of all calls of a function together."""
-FATAL = {"late", "memory", "processes", "ended", "garbage"}
+POSE_TOLERANCE = 1e-6
+"""Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
+MAX_DETAILS = 5
+"""Most kinds of failures that a report lists."""
+MAX_FATAL_FAILURES = 3
+"""Failures in a row that end a program, after which it is not called again."""
+MAX_TIME = 600.0
+"""Longest time of all calls of a function together, s."""
+FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.ENDED, Failure.GARBAGE}
 
 
 class Caller:
-    """A program's function, called until it has failed fatally several times in a row."""
+    """A program's function, called until it has failed fatally several times in a row.
+
+    Attributes
+    ----------
+    failures
+        Number of failures, by their messages.
+    seconds
+        Times of the calls that did not fail, s.
+    """
 
     def __init__(self, program: Program, function: str) -> None:
         self.program, self.function = program, function
@@ -32,18 +40,18 @@ class Caller:
         self._begun = time.perf_counter()
 
     def __call__(self, *arguments: Any) -> Array:
-        """Return the function's value, as :meth:`Program.fk` and the like give it.
+        """Return the function's value, as :meth:`Program.fk` and the others return it.
 
         Raises
         ------
         ProgramError
-            It failed, or has failed too often.
+            The call failed, or too many calls have failed.
         """
-        if self._fatal >= MOST_FAILURES:
-            raise ProgramError("not called any more", "ended")
-        if time.perf_counter() - self._begun > LONGEST:
-            self.failures[f"scoring took longer than {LONGEST:g} s: not called any more"] = 1
-            raise ProgramError("not called any more", "late")
+        if self._fatal >= MAX_FATAL_FAILURES:
+            raise ProgramError("not called any more", Failure.ENDED)
+        if time.perf_counter() - self._begun > MAX_TIME:
+            self.failures[f"scoring took longer than {MAX_TIME:g} s: not called any more"] = 1
+            raise ProgramError("not called any more", Failure.LATE)
         begin = time.perf_counter()
         try:
             value: Array = getattr(self.program, self.function)(*arguments)
@@ -55,9 +63,9 @@ class Caller:
         self.seconds.append(time.perf_counter() - begin)
         return value
 
-    def said(self) -> tuple[str, ...]:
-        """Return what its failures were, the most frequent first."""
+    def failure_texts(self) -> tuple[str, ...]:
+        """Return the failures as text, the most frequent first."""
         return tuple(
             f"{text} ({count} {'time' if count == 1 else 'times'})"
-            for text, count in self.failures.most_common(EXAMPLES)
+            for text, count in self.failures.most_common(MAX_DETAILS)
         )

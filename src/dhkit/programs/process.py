@@ -1,4 +1,4 @@
-"""A process that runs a program, the threads that read from it, and the one that watches what it takes."""
+"""A process that runs a program, with threads that read its output and watch its memory and processes."""
 
 from __future__ import annotations
 
@@ -16,60 +16,75 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
 
 import psutil
 
 from dhkit.errors import DhkitError
 
 HERE = Path(__file__).parent
-LONGEST_LINE = 1 << 22
-"""Bytes of an answer."""
-MOST_LINES = 1_000
-"""Answers that nobody has read yet."""
-OUTPUT = 1 << 16
-"""Bytes that are kept of what a program prints: the last."""
-MOST_PROCESSES = 64
-MOMENT = 0.3
-"""s from the end of a program's answers to its own end."""
-PERIOD = 0.05
-"""s between two looks at memory and processes."""
-LONGEST_END = 5.0
-"""s that the supervisor may take to end what a program started."""
+MAX_LINE_BYTES = 1 << 22
+"""Largest answer, bytes."""
+MAX_UNREAD_ANSWERS = 1_000
+"""Most answers that wait to be read."""
+MAX_OUTPUT_BYTES = 1 << 16
+"""Bytes that are kept of a program's printed output: the last ones."""
+MAX_PROCESSES = 64
+EXIT_DELAY = 0.3
+"""Longest time from the end of a program's answers to its own end, s."""
+WATCH_PERIOD = 0.05
+"""Time between two looks at memory and processes, s."""
+MAX_END_TIME = 5.0
+"""Longest time that the supervisor may take to end the processes that a program started, s."""
 
-Failure: TypeAlias = Literal["raised", "late", "memory", "processes", "ended", "garbage", "unreadable"]
-"""How a program fails: its function raised an exception, took too long, the process needed too much memory, started too
-many processes, ended, wrote what is no answer, or never became ready."""
+
+class Failure(StrEnum):
+    """How a call of a program failed."""
+
+    RAISED = "raised"
+    """The function raised an exception, or returned something else than it must."""
+    LATE = "late"
+    """The function took too long."""
+    MEMORY = "memory"
+    """The processes needed too much memory."""
+    PROCESSES = "processes"
+    """The program started too many processes."""
+    ENDED = "ended"
+    """The process ended."""
+    GARBAGE = "garbage"
+    """The process wrote something that is no answer."""
+    UNREADABLE = "unreadable"
+    """The program cannot be loaded."""
 
 
 class ProgramError(DhkitError):
-    """A call of a program that failed.
+    """A call of a program failed.
 
     Attributes
     ----------
     failure
-        How.
+        How the call failed.
     line
-        Of the program's source, counted from 1; None where it is not known.
+        Line of the program's source, from 1; None if it is not known.
     """
 
     def __init__(self, text: str, failure: Failure, line: int | None = None) -> None:
         super().__init__(text if line is None else f"line {line}: {text}")
-        self.failure: Failure = failure
+        self.failure = failure
         self.line = line
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a program may take.
+    """Limits of a program.
 
     Attributes
     ----------
     seconds
-        Of the clock, for one call.
+        Longest time of one call, s.
     memory
-        Bytes, of all its processes together.
+        Largest memory of all its processes together, bytes.
     """
 
     seconds: float = 5.0
@@ -77,7 +92,17 @@ class Limits:
 
 
 class Process:
-    """A process, the threads that read from it, and the one that watches what it takes."""
+    """A process that runs a program.
+
+    Parameters
+    ----------
+    command
+        Called with the program's folder; returns what is executed.
+    limits
+        Limits of the program.
+    sandbox
+        ``"bwrap"``, or None.
+    """
 
     def __init__(self, command: Callable[[Path], list[str]], limits: Limits, sandbox: str | None) -> None:
         self.failure: Failure | None = None
@@ -88,9 +113,9 @@ class Process:
         except BaseException:
             self._folder.cleanup()
             raise
-        self._known: dict[int, psutil.Process] = {}
-        self._lines: queue.Queue[bytes | None] = queue.Queue(MOST_LINES)
-        self._printed = bytearray()
+        self._descendants: dict[int, psutil.Process] = {}
+        self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
+        self._output = bytearray()
         self._closed = threading.Event()
         self._count = 0
         self._threads = [
@@ -106,67 +131,67 @@ class Process:
         return self._count
 
     def write(self, line: bytes, deadline: float, seconds: float) -> None:
-        """Send a request; to a process that has ended, nothing.
+        """Send a request; to a process that has ended, nothing is sent.
 
         Raises
         ------
         ProgramError
-            It is not read until the deadline, which so many seconds end at.
+            The request is not read by the deadline, which is ``seconds`` after its beginning.
         """
         with suppress(BrokenPipeError):
             while line:
                 left = deadline - time.monotonic()
                 if left <= 0 or not select.select([], [self._requests], [], left)[1]:
-                    raise self._failed("late", seconds)
+                    raise self._error(Failure.LATE, seconds)
                 with suppress(BlockingIOError):
                     line = line[os.write(self._requests, line) :]
 
-    def read(self, deadline: float, seconds: float) -> dict[str, Any]:
-        """Return the next answer; it must come within so many seconds, which end at the deadline.
+    def read(self, deadline: float, seconds: float) -> dict[str, object]:
+        """Return the next answer, which must come by the deadline, ``seconds`` after the beginning of the wait.
 
         Raises
         ------
         ProgramError
-            It does not come in time, is no JSON object, or the process ended.
+            The answer does not come in time or is no JSON object, or the process has ended.
         """
         try:
             line = self._lines.get(timeout=max(0.0, deadline - time.monotonic()))
         except queue.Empty:
-            raise self._failed("late", seconds) from None
+            raise self._error(Failure.LATE, seconds) from None
         if line is None:
-            raise self._failed("ended", seconds)
+            raise self._error(Failure.ENDED, seconds)
         try:
             message = json.loads(line)
         except (ValueError, RecursionError):
             message = None
         if not isinstance(message, dict):
-            raise self._failed("garbage", seconds)
+            raise self._error(Failure.GARBAGE, seconds)
         return message
 
     def output(self) -> str:
-        """Return the last part of what was printed."""
-        return bytes(self._printed).decode("utf-8", "replace")
+        """Return the last part of the printed output."""
+        return bytes(self._output).decode("utf-8", "replace")
 
     def close(self) -> None:
-        """End the process and all that it started, and wait until they are gone."""
+        """End the process and all processes that it started, and wait until they are gone."""
         if self._closed.is_set():
             return
-        self.failure = self.failure or "ended"
+        self.failure = self.failure or Failure.ENDED
         self._closed.set()
-        self._look()
+        self._find_descendants()
         with suppress(OSError):
-            self._process.send_signal(signal.SIGTERM)  # the supervisor ends what the program started, and itself
+            self._process.send_signal(signal.SIGTERM)  # the supervisor ends the program's processes and itself
         try:
-            self._process.wait(LONGEST_END)
+            self._process.wait(MAX_END_TIME)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        # What was seen and is still there: its supervisor was killed by the program.
-        self._kill_known()
+        # Processes that were seen and are still there: the program has killed their supervisor.
+        self._kill_descendants()
         os.close(self._requests)
         for thread in self._threads:
             if thread is not threading.current_thread():
-                thread.join(LONGEST_END)
+                thread.join(MAX_END_TIME)
         self._folder.cleanup()
 
     def _start(self, command: Callable[[Path], list[str]], sandbox: str | None) -> None:
@@ -176,7 +201,7 @@ class Process:
         os.set_blocking(self._requests, False)
         self._answers, answers = os.pipe()
         try:
-            self._process = subprocess.Popen(  # noqa: S603 - a program of others is what it is for
+            self._process = subprocess.Popen(  # noqa: S603 - this module is made to run programs of others
                 [
                     *(sys.executable, "-I", "-S", str(HERE / "supervisor.py")),
                     *map(str, (requests, answers, 4 * self._limits.memory)),
@@ -194,23 +219,24 @@ class Process:
             os.close(requests)
             os.close(answers)
 
-    def _failed(self, how: Failure, seconds: float) -> ProgramError:
-        self.failure = self.failure or how
+    def _error(self, failure: Failure, seconds: float) -> ProgramError:
+        """Note a failure, unless another was noted before, and return its error."""
+        self.failure = self.failure or failure
         texts: dict[Failure, str] = {
-            "late": f"no answer within {seconds:g} s",
-            "memory": f"needed more than {self._limits.memory / (1 << 30):.3g} GB of memory",
-            "processes": f"started more than {MOST_PROCESSES} processes",
-            "ended": f"the program ended{self._status()}",
-            "garbage": "wrote what is no answer",
+            Failure.LATE: f"no answer within {seconds:g} s",
+            Failure.MEMORY: f"needed more than {self._limits.memory / (1 << 30):.3g} GB of memory",
+            Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
+            Failure.ENDED: f"the program ended{self._exit_status_text()}",
+            Failure.GARBAGE: "wrote what is no answer",
         }
-        printed = self.output().strip().splitlines() if self.failure == "ended" else []
-        said = f": {printable(printed[-1])[:200]}" if printed else ""
-        return ProgramError(texts[self.failure] + said, self.failure)
+        lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
+        last_line = f": {printable(lines[-1])[:200]}" if lines else ""
+        return ProgramError(texts[self.failure] + last_line, self.failure)
 
-    def _status(self) -> str:
-        """Return with which status the program ended, in words; nothing where it still runs."""
+    def _exit_status_text(self) -> str:
+        """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
-            status = self._process.wait(MOMENT)
+            status = self._process.wait(EXIT_DELAY)
             if status > 128:
                 with suppress(ValueError):
                     return f" by {signal.Signals(status - 128).name}"
@@ -218,69 +244,69 @@ class Process:
         return ""
 
     def _receive(self) -> None:
-        """Take the answers' lines; a line that is too long, or nobody reads, ends the process."""
+        """Queue the lines of answers; a line that is too long, or too many of them, ends the process."""
         with os.fdopen(self._answers, "rb") as file:
-            while line := file.readline(LONGEST_LINE):
+            while line := file.readline(MAX_LINE_BYTES):
                 try:
                     self._lines.put_nowait(line if line.endswith(b"\n") else b"")
                 except queue.Full:
-                    self._give_up("garbage")
+                    self._terminate(Failure.GARBAGE)
                     break
-        # It has closed its answers: nothing comes any more, whether or not the process goes on.
+        # The process has closed its answers: no more come, whether or not it goes on.
         with suppress(queue.Full):
             self._lines.put_nowait(None)
 
     def _drain(self) -> None:
-        """Take what is printed, and keep its end."""
+        """Read the printed output, and keep its end."""
         stream = self._process.stdout
         assert stream is not None  # noqa: S101 - for mypy: it is a pipe
         with stream:
-            while piece := os.read(stream.fileno(), OUTPUT):
-                self._printed += piece
-                del self._printed[:-OUTPUT]
+            while piece := os.read(stream.fileno(), MAX_OUTPUT_BYTES):
+                self._output += piece
+                del self._output[:-MAX_OUTPUT_BYTES]
 
     def _watch(self) -> None:
-        """Look at memory and number of processes."""
-        while not self._closed.wait(PERIOD):
-            self._look()
+        """Watch the memory and the number of processes, and end the process beyond its limits."""
+        while not self._closed.wait(WATCH_PERIOD):
+            self._find_descendants()
             memory = 0
-            for process in list(self._known.values()):
+            for process in list(self._descendants.values()):
                 try:
                     memory += process.memory_info().rss
                 except psutil.Error:
-                    self._known.pop(process.pid, None)
+                    self._descendants.pop(process.pid, None)
             if (self._process.poll() or 0) < 0:  # the program has killed its supervisor
-                self.failure = self.failure or "ended"
-                self._kill_known()
+                self.failure = self.failure or Failure.ENDED
+                self._kill_descendants()
             elif memory > self._limits.memory:
-                self._give_up("memory")
-            elif len(self._known) > MOST_PROCESSES:
-                self._give_up("processes")
+                self._terminate(Failure.MEMORY)
+            elif len(self._descendants) > MAX_PROCESSES:
+                self._terminate(Failure.PROCESSES)
 
-    def _look(self) -> None:
-        """Note the processes that there are."""
+    def _find_descendants(self) -> None:
+        """Note the processes that the program has started."""
         with suppress(psutil.Error):
             for process in psutil.Process(self._process.pid).children(recursive=True):
-                self._known.setdefault(process.pid, process)
+                self._descendants.setdefault(process.pid, process)
 
-    def _kill_known(self) -> None:
-        for process in list(self._known.values()):
+    def _kill_descendants(self) -> None:
+        for process in list(self._descendants.values()):
             with suppress(psutil.Error):
                 process.kill()
 
-    def _give_up(self, how: Failure) -> None:
-        self.failure = self.failure or how
+    def _terminate(self, failure: Failure) -> None:
+        self.failure = self.failure or failure
         with suppress(OSError):
             self._process.send_signal(signal.SIGTERM)
 
 
 def printable(text: str) -> str:
-    """Return a program's text without characters that a terminal takes as commands."""
+    """Return a program's text with spaces for unprintable characters, which a terminal may take as commands."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return the variables that a program gets: none of ours."""
+    """Return the environment of a program, which has none of our variables."""
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     paths = {"HOME": str(folder), "TMPDIR": str(folder), "PATH": "/usr/local/bin:/usr/bin:/bin"}
     return {"LANG": "C.UTF-8"} | paths | dict.fromkeys(threads, "1")
@@ -290,10 +316,10 @@ def _sandboxed(program: list[str], folder: Path, sandbox: str | None) -> list[st
     if sandbox is None:
         return program
     if sandbox != "bwrap":
-        raise ProgramError(f"sandbox {sandbox!r}: expected 'bwrap'", "unreadable")
+        raise ProgramError(f"sandbox {sandbox!r}: expected 'bwrap'", Failure.UNREADABLE)
     bwrap = shutil.which("bwrap")
     if bwrap is None:
-        raise ProgramError("bwrap is not installed (Debian: apt-get install bubblewrap)", "unreadable")
+        raise ProgramError("bwrap is not installed (Debian: apt-get install bubblewrap)", Failure.UNREADABLE)
     home = str(Path.home())
     hidden = [part for path in dict.fromkeys((home, "/tmp", "/run")) for part in ("--tmpfs", path)]  # noqa: S108
     needed = dict.fromkeys((sys.prefix, sys.base_prefix, str(HERE)))

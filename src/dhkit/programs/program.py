@@ -1,4 +1,4 @@
-"""A program that somebody else wrote, called through lines of JSON in a process of its own."""
+"""A program of another person, called through lines of JSON in a process of its own."""
 
 from __future__ import annotations
 
@@ -11,149 +11,150 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import repr_line
-from dhkit.programs.process import HERE, Limits, Process, ProgramError, printable
+from dhkit.programs.process import HERE, Failure, Limits, Process, ProgramError, printable
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
 
 FUNCTIONS = ("fk", "ik", "controller")
-"""What a program may define."""
-LARGEST_SOURCE = 1_000_000
-"""Bytes of a source file."""
-MOST_SOLUTIONS = 64
-"""Of a pose: no arm of six joints has more than 16."""
-LONGEST_START = 30.0
-"""s from the start to the first line: importing numpy on a busy machine takes some."""
+"""Functions that a program may define."""
+MAX_SOURCE_BYTES = 1_000_000
+MAX_SOLUTIONS = 64
+"""Most solutions of a pose: no arm of six joints has more than 16."""
+MAX_START_TIME = 30.0
+"""Longest time from the start to the first line, s: importing numpy on a busy machine takes some seconds."""
 
 
 class Program:
-    """A program that is started when it is first called, and again after it failed in a way that ended it.
+    """A program that is started when it is first called, and again after a failure that ended it.
 
     Parameters
     ----------
     source
-        A ``.py`` or ``.m`` file with functions of :data:`FUNCTIONS`; or a command and its arguments, which speak the
-        protocol of docs/own-code.md on their descriptors 3 and 4. No shell reads them.
+        A ``.py`` or ``.m`` file with functions of :data:`FUNCTIONS`; or a command and its arguments, which follows the
+        protocol of docs/own-code.md on its descriptors 3 and 4. No shell reads the command.
     limits
-        What it may take.
+        Limits of time and memory.
     sandbox
-        ``"bwrap"`` runs it in bubblewrap: without a network, and with nothing writable but a folder of its own.
+        ``"bwrap"`` runs the program in bubblewrap: without a network, and with one writable folder of its own.
 
     Raises
     ------
     ProgramError
-        The file cannot be read, or what runs it is not installed.
+        The file cannot be read, or the interpreter is not installed.
     """
 
     def __init__(
         self, source: str | Path | Sequence[str], limits: Limits | None = None, sandbox: str | None = None
     ) -> None:
         if os.name != "posix":
-            raise ProgramError("programs run on Linux and macOS alone", "unreadable")
+            raise ProgramError("programs run on Linux and macOS alone", Failure.UNREADABLE)
         self.limits = limits or Limits()
         source = Path(source) if isinstance(source, str) else source
         self.name = source.name if isinstance(source, Path) else source[0]
         self.functions: tuple[str, ...] = ()
         self.imported: tuple[str, ...] = ()
-        """Modules that it was asked not to import, and did: ``dhkit``."""
+        """Modules that it imported although it must not: ``dhkit``."""
         self._source, self._sandbox = source, sandbox
         self._process: Process | None = None
         self._lock = threading.Lock()
         self._closed = False
 
     def start(self) -> None:
-        """Start the program, unless it runs, and wait until it says which functions it has.
+        """Start the program, unless it runs, and wait until it has named its functions.
 
         Raises
         ------
         ProgramError
-            It cannot be loaded.
+            The program cannot be loaded.
         """
         with self._lock:
-            self._started()
+            self._running_process()
 
-    def call(self, function: str, **arguments: Any) -> Any:
-        """Return what a function gives: nested lists of floats, None for NaN and infinity.
+    def call(self, function: str, **arguments: object) -> object:
+        """Return the value of a function: nested lists of floats, in which None stands for NaN and infinity.
 
         Parameters
         ----------
         function
-            One of :attr:`functions`.
+            Name of the function, one of :attr:`functions`.
         arguments
             Numbers, nested lists of numbers, or dicts of such, in the order in which the function takes them.
 
         Raises
         ------
         ProgramError
-            It failed; where its process has ended or is not to be trusted any more, the next call starts another.
+            The call failed. If the process has ended or cannot be trusted any more, the next call starts another.
         """
         with self._lock:
-            running = self._started()
+            running = self._running_process()
             if function not in self.functions:
-                raise ProgramError(f"{self.name} has no function {function}", "unreadable")
-            answer = self._asked(running, {"call": function, "arguments": arguments})
+                raise ProgramError(f"{self.name} has no function {function}", Failure.UNREADABLE)
+            answer = self._answer_to(running, {"call": function, "arguments": arguments})
         if "error" in answer:
-            raise ProgramError(_text(answer["error"]), "raised", _line(answer))
+            raise ProgramError(_text(answer["error"]), Failure.RAISED, _line(answer))
         if "value" not in answer:
-            raise ProgramError("an answer without a value", "garbage")
+            raise ProgramError("an answer without a value", Failure.GARBAGE)
         return answer["value"]
 
     def fk(self, q: Array) -> Array:
-        """Return the pose that the program gives for joint values, shape (n,), as shape (4, 4).
+        """Return the program's pose of the tool, shape (4, 4), m, at joint values, shape (n,), rad and m.
 
         Raises
         ------
         ProgramError
-            It failed, or gave something else.
+            The call failed, or returned something else.
         """
         T = _numbers("fk", self.call("fk", q=q.tolist()))
         if T.shape != (4, 4):
-            raise ProgramError(f"fk returned shape {T.shape}; expected (4, 4)", "raised")
+            raise ProgramError(f"fk returned shape {T.shape}; expected (4, 4)", Failure.RAISED)
         if not np.isfinite(T).all():
-            raise ProgramError("fk returned NaN or infinity", "raised")
+            raise ProgramError("fk returned NaN or infinity", Failure.RAISED)
         return T
 
     def ik(self, T: Array, n: int) -> Array:
-        """Return the solutions that the program gives for a pose, shape (4, 4), as shape (B, n); rows may hold NaN.
+        """Return the program's solutions, shape (B, n), rad and m, of a pose, shape (4, 4), m; rows may have NaN.
 
         Raises
         ------
         ProgramError
-            It failed, or gave something else.
+            The call failed, or returned something else.
         """
         rows = _numbers("ik", self.call("ik", T=T.tolist()))
         if rows.size and (rows.ndim > 2 or rows.shape[-1] != n):
-            raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", "raised")
-        if rows.size > MOST_SOLUTIONS * n:
-            raise ProgramError(f"ik returned {rows.size // n} solutions; expected at most {MOST_SOLUTIONS}", "raised")
+            raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", Failure.RAISED)
+        if rows.size > MAX_SOLUTIONS * n:
+            raise ProgramError(
+                f"ik returned {rows.size // n} solutions; expected at most {MAX_SOLUTIONS}", Failure.RAISED
+            )
         return rows.reshape(-1, n)
 
     def controller(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques that the program gives: a controller as :meth:`dhkit.Arm.simulate` takes it.
+        """Return the program's torques, N m and N: this is a controller as :meth:`dhkit.Arm.simulate` takes it.
 
         Raises
         ------
         ProgramError
-            It failed, or gave something else.
+            The call failed, or returned something else.
         """
-        wanted = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
-        torques = self.call("controller", t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=wanted)
+        to_follow = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
+        torques = self.call("controller", t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=to_follow)
         return _numbers("controller", torques)
 
     @property
     def output(self) -> str:
-        """The last part of what the program has printed."""
+        """The last part of the program's printed output."""
         running = self._process
         return "" if running is None else running.output()
 
     def close(self) -> None:
-        """End the program and all that it started, in the middle of a call too; it is not started again."""
+        """End the program and all processes that it started, also during a call; it is not started again."""
         self._closed = True
         self._end(keep=True)
         with self._lock:
@@ -168,28 +169,28 @@ class Program:
     def __repr__(self) -> str:
         return repr_line(f"Program {self.name}", said=", ".join(self.functions) or "not started")
 
-    def _started(self) -> Process:
+    def _running_process(self) -> Process:
         if self._closed:
-            raise ProgramError(f"{self.name} was closed", "ended")
+            raise ProgramError(f"{self.name} was closed", Failure.ENDED)
         running = self._process
         if running is not None and running.failure is None:
             return running
         self._end()
         running = self._process = Process(self._command, self.limits, self._sandbox)
-        first = self._answer(running, LONGEST_START, lambda message: "functions" in message or "error" in message)
+        first = self._read_until(running, MAX_START_TIME, lambda answer: "functions" in answer or "error" in answer)
         if "error" in first:
             self._end()
-            raise ProgramError(_text(first["error"]), "unreadable", _line(first))
+            raise ProgramError(_text(first["error"]), Failure.UNREADABLE, _line(first))
         functions = first["functions"]
         if not isinstance(functions, list) or not set(map(str, functions)) <= set(FUNCTIONS) or not functions:
             self._end()
-            raise ProgramError(f"{self.name} defines none of {', '.join(FUNCTIONS)}", "unreadable")
+            raise ProgramError(f"{self.name} defines none of {', '.join(FUNCTIONS)}", Failure.UNREADABLE)
         self.functions = tuple(map(str, functions))
         return running
 
-    def _asked(self, running: Process, request: dict[str, Any]) -> dict[str, Any]:
+    def _answer_to(self, running: Process, request: dict[str, object]) -> dict[str, object]:
         number = running.next_number()
-        # Octave reads one character beyond a line: the empty line behind it.
+        # Octave reads one character beyond a line, here of the empty line behind it.
         line, seconds = json.dumps({"id": number, **request}).encode() + b"\n\n", self.limits.seconds
         try:
             running.write(line, time.monotonic() + seconds, seconds)
@@ -197,10 +198,12 @@ class Program:
             self._end(keep=True)
             raise
 
-        # Answers to requests that were given up come late: they are passed over.
-        return self._answer(running, seconds, lambda message: message.get("id") == number)
+        # Late answers to earlier requests are passed over.
+        return self._read_until(running, seconds, lambda message: message.get("id") == number)
 
-    def _answer(self, running: Process, seconds: float, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    def _read_until(
+        self, running: Process, seconds: float, is_answer: Callable[[dict[str, object]], bool]
+    ) -> dict[str, object]:
         deadline = time.monotonic() + seconds
         while True:
             try:
@@ -208,9 +211,10 @@ class Program:
             except ProgramError:
                 self._end(keep=True)
                 raise
-            if isinstance(message.get("imported"), list):
-                self.imported = tuple(sorted({*self.imported, *map(str, message["imported"])} & {"dhkit"}))
-            if wanted(message):
+            imported = message.get("imported")
+            if isinstance(imported, list):
+                self.imported = tuple(sorted({*self.imported, *map(str, imported)} & {"dhkit"}))
+            if is_answer(message):
                 return message
 
     def _end(self, keep: bool = False) -> None:
@@ -220,30 +224,32 @@ class Program:
                 self._process = None
 
     def _command(self, folder: Path) -> list[str]:
-        """Return what is executed, with a copy of the source in the program's folder."""
+        """Copy the source into the program's folder, and return the command to execute."""
         source = self._source
         if not isinstance(source, Path):
-            found = shutil.which(source[0])
-            if found is None:
-                raise ProgramError(f"{source[0]}: there is no such program", "unreadable")
-            return [found, *source[1:]]
+            executable = shutil.which(source[0])
+            if executable is None:
+                raise ProgramError(f"{source[0]}: there is no such program", Failure.UNREADABLE)
+            return [executable, *source[1:]]
         try:
             if not source.is_file():
-                raise ProgramError(f"{source}: expected a file", "unreadable")
-            if source.stat().st_size > LARGEST_SOURCE:
-                raise ProgramError(f"{source}: expected at most {LARGEST_SOURCE} bytes", "unreadable")
+                raise ProgramError(f"{source}: expected a file", Failure.UNREADABLE)
+            if source.stat().st_size > MAX_SOURCE_BYTES:
+                raise ProgramError(f"{source}: expected at most {MAX_SOURCE_BYTES} bytes", Failure.UNREADABLE)
             copy = folder / source.name
             copy.write_bytes(source.read_bytes())
         except OSError as error:
-            raise ProgramError(f"{source}: {error.strerror}", "unreadable") from None
+            raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
         if source.suffix == ".py":
             return [sys.executable, "-I", "-B", "-u", str(HERE / "python_runner.py"), str(copy)]
         if source.suffix == ".m":
             octave = shutil.which("octave-cli") or shutil.which("octave")
             if octave is None:
-                raise ProgramError(f"{source.name}: GNU Octave, which runs .m files, is not installed", "unreadable")
+                raise ProgramError(
+                    f"{source.name}: GNU Octave, which runs .m files, is not installed", Failure.UNREADABLE
+                )
             return [octave, "--no-gui", "--quiet", "--norc", "--no-history", str(HERE / "octave_runner.m"), str(copy)]
-        raise ProgramError(f"{source}: expected a .py or .m file", "unreadable")
+        raise ProgramError(f"{source}: expected a .py or .m file", Failure.UNREADABLE)
 
 
 def protect_from_children() -> None:
@@ -252,18 +258,18 @@ def protect_from_children() -> None:
         ctypes.CDLL(None).prctl(4, 0, 0, 0, 0)  # PR_SET_DUMPABLE
 
 
-def _numbers(function: str, value: Any) -> Array:
-    """Return an answer as an array, null as NaN."""
+def _numbers(function: str, value: object) -> Array:
+    """Return an answer as an array, in which null is NaN."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise ProgramError(f"{function} returned what is no array of numbers", "raised") from None
+        raise ProgramError(f"{function} returned what is no array of numbers", Failure.RAISED) from None
 
 
-def _text(error: Any) -> str:
+def _text(error: object) -> str:
     return " ".join(printable(str(error)).split())[:500] or "failed"
 
 
-def _line(message: dict[str, Any]) -> int | None:
+def _line(message: dict[str, object]) -> int | None:
     line = message.get("line")
     return line if isinstance(line, int) and not isinstance(line, bool) and 0 < line < 10**7 else None

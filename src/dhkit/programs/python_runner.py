@@ -1,7 +1,8 @@
-"""Answer requests with the functions of a Python file; executed by its path in a process of its own, without dhkit.
+"""Answer requests with the functions of a Python file.
 
-Requests are lines of JSON on descriptor 3, answers lines of JSON on descriptor 4: docs/own-code.md has the protocol.
-What the file prints goes to standard output.
+This file is executed by its path in a process of its own, and imports nothing of dhkit. Requests are lines of JSON on
+descriptor 3, answers lines of JSON on descriptor 4: docs/own-code.md has the protocol. The file's printed output goes
+to standard output.
 """
 
 from __future__ import annotations
@@ -18,18 +19,18 @@ FUNCTIONS = ("fk", "ik", "controller")
 
 
 def main(path: str) -> None:
-    """Load the file, say what it defines, and answer until requests end."""
+    """Load the file, name the functions that it defines, and answer requests until they end."""
     import numpy as np
 
     requests, answers = os.fdopen(REQUESTS, "rb"), os.fdopen(ANSWERS, "wb", 0)
     name = os.path.basename(path)  # noqa: PTH119
 
-    def say(message: dict[str, object]) -> None:
+    def write(message: dict[str, object]) -> None:
         message["imported"] = sorted({module.split(".")[0] for module in sys.modules} & {"dhkit"})
         answers.write(json.dumps(message).encode() + b"\n")
 
-    def failed(error: BaseException) -> dict[str, object]:
-        """Return what is said of an exception: its last line, and the line of the file where it left."""
+    def error_fields(error: BaseException) -> dict[str, object]:
+        """Return the text of an exception, and the last line of the file in its traceback."""
         line = error.lineno if isinstance(error, SyntaxError) and error.filename == name else None
         for frame in traceback.extract_tb(error.__traceback__):
             if frame.filename == name:
@@ -37,14 +38,14 @@ def main(path: str) -> None:
         text = error.msg if isinstance(error, SyntaxError) else str(error)
         return {"error": f"{type(error).__name__}: {text}"[:500].rstrip(": "), "line": line}
 
-    space: dict[str, Any] = {"__name__": "student", "__file__": name}
+    namespace: dict[str, Any] = {"__name__": "student", "__file__": name}
     try:
         with open(path, "rb") as file:  # noqa: PTH123
-            exec(compile(file.read(), name, "exec"), space)  # noqa: S102 - this process is made for it
+            exec(compile(file.read(), name, "exec"), namespace)  # noqa: S102 - this process is made for it
     except BaseException as error:
-        say(failed(error))
+        write(error_fields(error))
         return
-    say({"functions": [function for function in FUNCTIONS if callable(space.get(function))]})
+    write({"functions": [function for function in FUNCTIONS if callable(namespace.get(function))]})
     for line in requests:
         if not line.strip():
             continue
@@ -52,21 +53,21 @@ def main(path: str) -> None:
         answer: dict[str, object] = {"id": request["id"]}
         try:
             values = [argument(np, value) for value in request["arguments"].values()]
-            answer["value"] = plain(np, space[request["call"]](*values))
+            answer["value"] = plain(np, namespace[request["call"]](*values))
         except BaseException as error:
-            answer |= failed(error)
-        say(answer)
+            answer |= error_fields(error)
+        write(answer)
 
 
 def argument(np: Any, value: Any) -> Any:
-    """Return a request's value as a function gets it: lists as arrays, objects with attributes."""
+    """Return an argument of a request as a function gets it: lists as arrays, objects with attributes."""
     if isinstance(value, dict):
         return SimpleNamespace(**{name: argument(np, part) for name, part in value.items()})
     return np.array(value, dtype=float) if isinstance(value, list) else value
 
 
 def plain(np: Any, value: Any) -> Any:
-    """Return a function's value as JSON has it: nested lists of numbers, NaN and infinity as null."""
+    """Return a function's value for JSON: nested lists of numbers, in which NaN and infinity are null."""
     array = np.asarray([] if value is None else value)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"returned {type(value).__name__} of {array.dtype}; expected real numbers")

@@ -1,9 +1,8 @@
-"""How a program compares with an arm."""
+"""The report of a program that was compared with an arm."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,18 +11,18 @@ from dhkit.display import html_block, html_lines, html_table, repr_line, value_l
 
 @dataclass(frozen=True)
 class Part:
-    """What one part of a function's score is.
+    """One part of a function's score.
 
     Attributes
     ----------
     name
-        Such as ``closes``.
+        Name of the part, such as ``closes``.
     points, most
-        What it got, and what it is worth.
+        Points that it got, and points that it is worth.
     text
-        What was found, in a sentence.
+        The result in a sentence.
     details
-        Where it fails.
+        Descriptions of failures.
     """
 
     name: str
@@ -38,18 +37,18 @@ class Part:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """How a program compares with an arm.
+    """The score of a program that was compared with an arm.
 
     Attributes
     ----------
     robot, program
-        Their names.
+        Names of the arm and of the program.
     functions
         The parts of each function's score.
     notes
-        What else was seen.
+        Further remarks.
     seed
-        Of the random states: the same seed gives the same states.
+        Seed of the random states: the same seed gives the same states.
     """
 
     robot: str
@@ -65,16 +64,16 @@ class CheckReport:
 
     @property
     def most(self) -> float:
-        """What they are worth."""
+        """Points that all functions are worth."""
         return round(float(sum(part.most for parts in self.functions.values() for part in parts)), 6)
 
     @property
     def full(self) -> bool:
-        """Whether nothing is missing."""
+        """Whether the program has all points."""
         return self.points >= self.most
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the report as JSON has it."""
+    def to_dict(self) -> dict[str, object]:
+        """Return the report as plain data for JSON."""
         return {"points": self.points, "most": self.most, **asdict(self)}
 
     def __str__(self) -> str:
@@ -88,8 +87,8 @@ class CheckReport:
         return "\n".join([*lines, f"random states: seed {self.seed}"])
 
     def __repr__(self) -> str:
-        said = f"{self.points:g} of {self.most:g} points, {', '.join(self.functions)}"
-        return repr_line("CheckReport", f"{self.program} against {self.robot}", said)
+        score = f"{self.points:g} of {self.most:g} points, {', '.join(self.functions)}"
+        return repr_line("CheckReport", f"{self.program} against {self.robot}", score)
 
     def _repr_html_(self) -> str:
         rows = [
@@ -102,5 +101,5 @@ class CheckReport:
 
 
 def share_within(value: float, bound: float) -> float:
-    """Return the share of points for a value that should not exceed a bound: none at ten times the bound."""
+    """Return the share of points of a value with an upper bound: 1 within the bound, 0 at ten times the bound."""
     return float(np.clip(1 - np.log10(max(value, 1e-12) / bound), 0.0, 1.0))

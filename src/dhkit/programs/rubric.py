@@ -1,4 +1,4 @@
-"""What a program's functions are worth, read strictly from a file."""
+"""The rubric of a program: the points of its functions, read from a file whose keys and values are all checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Positive = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 
 @dataclass(frozen=True, config=STRICT)
 class ForwardPoints:
-    """Of ``fk``: poses that agree."""
+    """Points of ``fk``: those of poses that agree."""
 
     agrees: Points = 100.0
 
@@ -31,20 +31,20 @@ class ForwardPoints:
 
 @dataclass(frozen=True, config=STRICT)
 class InversePoints:
-    """Of ``ik``.
+    """Points of ``ik``.
 
     Attributes
     ----------
     closes
-        Poses that every solution returned leads to, and poses out of reach for which none is.
+        Points of poses that every solution returned leads to, and of poses out of reach without solutions.
     branches
-        All solutions.
+        Points of returning all solutions.
     singular
-        Singular poses.
+        Points of singular poses.
     time
-        Of a call.
+        Points of the time of a call.
     seconds
-        Time of a call that is worth all its points; ten times as long is worth none.
+        Longest time of a call with all points of ``time``, s; a call that takes ten times as long has none.
     """
 
     closes: Points = 60.0
@@ -59,22 +59,22 @@ class InversePoints:
 
 @dataclass(frozen=True, config=STRICT)
 class ControllerTask:
-    """Of ``controller``: a quintic motion between two configurations of the arm.
+    """The task of ``controller``: a quintic motion between two configurations of the arm.
 
     Attributes
     ----------
     follows
-        Points where the peak error of every joint is within the bound; none at ten times the bound.
+        Points if the peak error of every joint is within the bound; none at ten times the bound.
     start, goal
-        Configurations by name; ``zero`` is known to every arm.
+        Names of the configurations; every arm has ``zero``.
     duration
-        s.
+        Duration of the motion, s.
     rate
-        Hz of the controller.
+        Calls of the controller per second, Hz.
     payload
-        kg at the tool, which the controller is not told of.
+        Mass at the tool, kg, that the controller does not know of.
     bound
-        rad and m.
+        Largest peak error with all points, rad and m.
     """
 
     follows: Points = 100.0
@@ -91,13 +91,13 @@ class ControllerTask:
 
 @dataclass(frozen=True, config=STRICT)
 class CheckRubric:
-    """What a program is worth: the functions that a file names, or those that the program has."""
+    """The points of a program: those of the functions that a file names, or of those that the program has."""
 
     fk: ForwardPoints = Field(default_factory=ForwardPoints)
     ik: InversePoints = Field(default_factory=InversePoints)
     controller: ControllerTask = Field(default_factory=ControllerTask)
     named: tuple[str, ...] = ()
-    """Functions that are asked for; empty for those that a program has."""
+    """Functions that must be defined; empty for those that the program has."""
 
     @classmethod
     def read(cls, path: str | Path) -> CheckRubric:
@@ -106,7 +106,7 @@ class CheckRubric:
         Raises
         ------
         AnswerError
-            It cannot be read, or says what no rubric says.
+            The file cannot be read, or is no rubric.
         """
         try:
             data = plain_numbers(toml_document(read_bounded(path, MAX_BYTES, "a rubric").decode()))
@@ -116,12 +116,12 @@ class CheckRubric:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "") -> CheckRubric:
-        """Build a rubric from a file's tables.
+        """Return a rubric of a file's tables; ``where`` begins the message of an error.
 
         Raises
         ------
         AnswerError
-            An unknown name, or a value that does not fit.
+            A name is unknown, or a value does not fit.
         """
         try:
             return TypeAdapter(cls).validate_python({**data, "named": tuple(data)})
@@ -130,12 +130,12 @@ class CheckRubric:
             place = ".".join(str(part)[:80] for part in first["loc"])
             raise AnswerError(f"{where}{place}: {first['msg'][:200]}") from None
 
-    def wanted(self, defined: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the functions that count, of those that a program defines."""
+    def scored_functions(self, defined: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the functions that are scored, for a program that defines these."""
         return self.named or defined
 
     def points(self, function: str) -> dict[str, float]:
-        """Return the parts of a function's score and their points."""
+        """Return the points of each part of a function's score."""
         parts: dict[str, float] = {
             "fk": {"agrees": self.fk.agrees},
             "ik": {name: getattr(self.ik, name) for name in ("closes", "branches", "singular", "time")},
@@ -144,6 +144,6 @@ class CheckRubric:
         return parts
 
     def __repr__(self) -> str:
-        functions = self.wanted(("fk", "ik", "controller"))
+        functions = self.scored_functions(("fk", "ik", "controller"))
         points = ", ".join(f"{function} {sum(self.points(function).values()):g}" for function in functions)
         return repr_line("CheckRubric", said=f"points of {points}")

@@ -1,11 +1,12 @@
-"""Run a program so that everything it starts can be ended; executed by its path, with Python's own library alone.
+"""Run a program such that all processes that it starts can be ended.
 
-It stands between dhkit and a program that dhkit did not write. Processes that lose their parent become children of this
-one (Linux: a subreaper), also those that made a session of their own, so that ending its descendants ends them all. It
-ends when the program and everything it started have ended, and ends them when it is terminated, or dhkit dies.
+This file is executed by its path, imports only the standard library, and is the parent process of a program that dhkit
+did not write. Processes that lose their parent become children of this one (Linux: a subreaper), also those with a
+session of their own, so that ending its descendants ends them all. It ends when the program and all its processes have
+ended, and ends them when it is terminated, or when dhkit dies.
 
-Arguments: the descriptors from which the program reads requests and to which it writes answers, which become its 3 and
-4; bytes of memory that each process may address; then the program and its arguments.
+Arguments: the descriptors from which the program reads requests and to which it writes answers, which become its
+descriptors 3 and 4; the bytes of memory that each process may address; then the program and its arguments.
 """
 
 from __future__ import annotations
@@ -19,17 +20,19 @@ from contextlib import suppress
 from typing import NoReturn
 
 DEATH_SIGNAL, SUBREAPER = 1, 36
-"""Of Linux's prctl(2)."""
-LARGEST_FILE = 64 << 20
-"""Bytes of a file that the program writes."""
-MOST_FILES = 256
-ROUNDS = 200
-"""Attempts to end all descendants, 10 ms apart: they may start others meanwhile."""
+"""Options of Linux's prctl(2)."""
+MAX_FILE_BYTES = 64 << 20
+"""Largest file that the program may write, bytes."""
+MAX_OPEN_FILES = 256
+END_ROUNDS = 200
+"""Rounds of ending all descendants, 10 ms apart: they may start others meanwhile."""
+END_SIGNALS = (signal.SIGSTOP, signal.SIGKILL)
+"""Signals that end a descendant: a stopped process starts no others."""
 REQUESTS, ANSWERS = 3, 4
 
 
 def main(arguments: list[str]) -> NoReturn:
-    """Run the program, and wait until nothing of it is left."""
+    """Run the program, and wait until all its processes have ended."""
     requests, answers, memory = map(int, arguments[:3])
     program = arguments[3:]
     if sys.platform == "linux":
@@ -54,7 +57,7 @@ def main(arguments: list[str]) -> NoReturn:
 
 
 def run(program: list[str], requests: int, answers: int, memory: int) -> NoReturn:
-    """Be the program, within limits."""
+    """Replace this process by the program, within limits."""
     import resource
 
     try:
@@ -65,8 +68,12 @@ def run(program: list[str], requests: int, answers: int, memory: int) -> NoRetur
         spare = [os.dup(os.dup(fd)) for fd in (requests, answers)]
         for fd, wanted in zip(spare, (REQUESTS, ANSWERS), strict=True):
             os.dup2(fd, wanted)
-        os.closerange(ANSWERS + 1, MOST_FILES)
-        limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_FSIZE: LARGEST_FILE, resource.RLIMIT_NOFILE: MOST_FILES}
+        os.closerange(ANSWERS + 1, MAX_OPEN_FILES)
+        limits = {
+            resource.RLIMIT_CORE: 0,
+            resource.RLIMIT_FSIZE: MAX_FILE_BYTES,
+            resource.RLIMIT_NOFILE: MAX_OPEN_FILES,
+        }
         for kind, bound in (limits | {resource.RLIMIT_AS: memory}).items():
             with suppress(OSError, ValueError):  # macOS knows no limit of addresses
                 resource.setrlimit(kind, (bound, bound))
@@ -79,11 +86,11 @@ def run(program: list[str], requests: int, answers: int, memory: int) -> NoRetur
 
 def end_all() -> NoReturn:
     """End every descendant, then this process."""
-    for _ in range(ROUNDS):
+    for _ in range(END_ROUNDS):
         left = descendants()
         if not left:
             break
-        for number in (signal.SIGSTOP, signal.SIGKILL):  # what stands still starts nothing
+        for number in END_SIGNALS:
             for pid in left:
                 with suppress(OSError):
                     os.kill(pid, number)
@@ -95,7 +102,7 @@ def end_all() -> NoReturn:
 
 
 def descendants() -> list[int]:
-    """Return the processes that this one started, and those that they did; none where there is no /proc."""
+    """Return the processes that this one and its descendants started; none on systems without /proc."""
     parents: dict[int, int] = {}
     with suppress(OSError):
         for entry in os.listdir("/proc"):  # noqa: PTH208 - names alone
@@ -106,10 +113,10 @@ def descendants() -> list[int]:
                     fields = file.read().rpartition(b")")[2].split()
                 if fields[0] != b"Z":
                     parents[int(entry)] = int(fields[1])
-    found = {os.getpid()}
-    while more := {pid for pid, parent in parents.items() if parent in found} - found:
-        found |= more
-    return sorted(found - {os.getpid()})
+    family = {os.getpid()}
+    while more := {pid for pid, parent in parents.items() if parent in family} - family:
+        family |= more
+    return sorted(family - {os.getpid()})
 
 
 if __name__ == "__main__":

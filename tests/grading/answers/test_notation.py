@@ -8,8 +8,7 @@ import math
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dhkit.description import from_dh, library_robot
 from dhkit.errors import AnswerError

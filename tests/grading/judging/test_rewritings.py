@@ -2,8 +2,7 @@
 
 import pytest
 import sympy
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from sympy.simplify.fu import TR8, TR10
 
 from dhkit.grading import Verdict, grade_answers

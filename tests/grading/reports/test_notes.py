@@ -1,8 +1,7 @@
 """Notes: every kind has a sentence, whatever a stranger's report puts into it."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.grading.report import GradeReport, Note, NoteKind
 from dhkit.grading.reports import report_of

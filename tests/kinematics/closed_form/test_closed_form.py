@@ -17,8 +17,7 @@ from dhkit.kinematics import (
     inverse_kinematics_in_chunks,
 )
 from dhkit.kinematics.closed_form.classify import FAMILIES
-from dhkit.kinematics.singularities import measures as singularity_measures
-from dhkit.kinematics.singularities import singular_configurations
+from dhkit.kinematics.singularities import measures as singularity_measures, singular_configurations
 from dhkit.verification import random_states
 from ik_checks import FAMILY_A, FAMILY_B, FEW_JOINTS, SIX_JOINTS, along_plane, closure, gaps, measures
 from random_arms import elbow_arms, few_joint_arms, slide_arms, states, three_parallel_arms

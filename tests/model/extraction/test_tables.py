@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import dhkit
 from dhkit.description import Base, Description, Placement, Tool, from_dh, library_robot, world_to_tool

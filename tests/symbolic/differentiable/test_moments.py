@@ -5,8 +5,7 @@ from fractions import Fraction
 
 import casadi
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from acceptance import sample_size
 from dhkit.description import library_robot

@@ -5,8 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from dhkit import Arm
 from dhkit.description import Body, Description, Inertia, Named, from_toml, library_robot, with_payload

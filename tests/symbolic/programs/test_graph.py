@@ -6,8 +6,7 @@ Modules: graph, printers.
 import casadi
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
 from dhkit.symbolic import Graph, SymbolicTable, jacobian, jacobian_dot, joint_symbols, table_pattern

@@ -10,8 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from dhkit.expressions import exact, parse
 from dhkit.symbolic.ring import Constant, Ring, RingError

@@ -1,4 +1,4 @@
-"""dhkit itself: one call for a batch, with and without an array to write into, and one call a state."""
+"""dhkit itself: one call for a batch, with and without an array to write into, and one call for each state."""
 
 from __future__ import annotations
 
@@ -18,10 +18,16 @@ SINGLE = "dhkit, one call"
 
 
 def contenders() -> tuple[Contender, ...]:
-    """Return dhkit's ways to compute each quantity."""
-    ways = ((BATCH, Mode.BATCH, _into_out), (NEW_ARRAYS, Mode.BATCH, _into_new_arrays), (SINGLE, Mode.SINGLE, _single))
+    """Return dhkit's contenders for each quantity."""
+    setups = (
+        (BATCH, Mode.BATCH, _into_out),
+        (NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
+        (SINGLE, Mode.SINGLE, _single),
+    )
     return tuple(
-        Contender(name, quantity, mode, way(quantity), own=True) for quantity in QUANTITIES for name, mode, way in ways
+        Contender(name, quantity, mode, setup(quantity), own=True)
+        for quantity in QUANTITIES
+        for name, mode, setup in setups
     )
 
 
@@ -31,7 +37,7 @@ def method(arm: Arm, quantity: str) -> Callable[..., Any]:
     Raises
     ------
     UnavailableError
-        This dhkit has none, or it refuses the arm.
+        This dhkit has no such method, or the method refuses the arm.
     """
     function: Callable[..., Any] | None = getattr(arm, quantity, None)
     if function is None:
@@ -45,7 +51,7 @@ def method(arm: Arm, quantity: str) -> Callable[..., Any]:
 
 
 def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
-    """Return an array to write a batch's results into, its pages touched."""
+    """Return an array to write a batch's results into, whose pages are already mapped."""
     result = function(*(x[:1] for x in inputs))
     one: Array = result if isinstance(result, np.ndarray) else result.q
     return np.full((len(inputs[0]), *one.shape[1:]), np.nan)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError, Workload, import_peer, one_by_one
+from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError, Workload, import_peer, single_task
 from dhkit.bench.geometry import JointAxes, joint_axes
 from dhkit.description import Array
 
@@ -25,27 +25,23 @@ def contenders() -> tuple[Contender, ...]:
 
 def _forward(workload: Workload) -> Task:
     robot, axes = _robot(workload)
-    return Task(
-        one_by_one(robot.fwdKin, list(workload.q)),
-        lambda k: [axes.with_tool_rotation(robot.fwdKin(q)) for q in workload.q[:k]],
-    )
+    return single_task(robot.fwdKin, workload.q, axes.with_tool_rotation)
 
 
 def _single(workload: Workload) -> Task:
     robot, axes = _solver(workload)
-    poses = list(axes.without_tool_rotation(workload.T))
-    return Task(one_by_one(robot.IK, poses), lambda k: [_solutions(robot.IK(T)) for T in poses[:k]])
+    return single_task(robot.IK, axes.without_tool_rotation(workload.T), _solutions)
 
 
 def _batch(workload: Workload) -> Task:
     robot, axes = _solver(workload)
-    poses = list(axes.without_tool_rotation(workload.T))  # an array would be taken apart into a list inside the call
+    poses = list(axes.without_tool_rotation(workload.T))  # the call would convert an array into a list
 
     def prepare(items: int) -> Call:
         chosen = poses[:items]
         return lambda: robot.IK_batched(chosen, num_worker_threads=workload.threads)
 
-    return Task(prepare, lambda k: [_solutions(found) for found in robot.IK_batched(poses[:k], workload.threads)])
+    return Task(prepare, lambda k: [_solutions(result) for result in robot.IK_batched(poses[:k], workload.threads)])
 
 
 def _robot(workload: Workload) -> tuple[Any, JointAxes]:
@@ -63,10 +59,10 @@ def _solver(workload: Workload) -> tuple[Any, JointAxes]:
     return robot, axes
 
 
-def _solutions(found: Any) -> Array:
-    """Return the solutions, shape (m, n), without those that EAIK marks as least-squares approximations."""
-    if not found.num_solutions():
+def _solutions(result: Any) -> Array:
+    """Return the solutions, shape (m, n), rad, without those that EAIK marks as least-squares approximations."""
+    if not result.num_solutions():
         return np.empty((0, 0))
-    solutions: Array = np.asarray(found.Q, dtype=float)
-    exact: Array = solutions[~np.asarray(found.is_LS, dtype=bool)]
+    solutions: Array = np.asarray(result.Q, dtype=float)
+    exact: Array = solutions[~np.asarray(result.is_LS, dtype=bool)]
     return exact

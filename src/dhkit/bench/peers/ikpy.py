@@ -11,13 +11,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.bench.contenders import Contender, Mode, Task, Workload, import_peer, one_by_one
+from dhkit.bench.contenders import Contender, Mode, Task, Workload, import_peer, single_task
 from dhkit.bench.geometry import bare
 from dhkit.description import Array
 
 
 def contenders() -> tuple[Contender, ...]:
-    """Return ikpy's contenders; it takes one state or pose a call."""
+    """Return ikpy's contenders; each call takes one state or pose."""
     return (
         Contender("ikpy forward_kinematics", "fk", Mode.SINGLE, _forward),
         Contender("ikpy inverse_kinematics_frame", "ik", Mode.SINGLE, _inverse),
@@ -26,26 +26,20 @@ def contenders() -> tuple[Contender, ...]:
 
 def _forward(workload: Workload) -> Task:
     chain, moving = _chain(workload.arm)
-    # The chain counts fixed joints too: a state has a place for each.
+    # A state of the chain has an entry for each joint, fixed ones too.
     states = np.zeros((min(len(workload.q), 10_000), len(moving)))
     states[:, moving] = workload.q[: len(states)]
-    return Task(
-        one_by_one(chain.forward_kinematics, list(states)),
-        lambda k: [chain.forward_kinematics(state) for state in states[:k]],
-    )
+    return single_task(chain.forward_kinematics, states)
 
 
 def _inverse(workload: Workload) -> Task:
     chain, moving = _chain(workload.arm)
     solve = partial(chain.inverse_kinematics_frame, orientation_mode="all")
-    return Task(
-        one_by_one(solve, list(workload.T)),
-        lambda k: [np.asarray(solve(T))[None, moving] for T in workload.T[:k]],
-    )
+    return single_task(solve, workload.T, lambda state: np.asarray(state)[None, moving])
 
 
 def _chain(arm: Arm) -> tuple[Any, Array]:
-    """Return its chain from the world to the tool, and which of its links move, shape (links,)."""
+    """Return ikpy's chain from the world to the tool, and which of its links move, shape (links,)."""
     package = import_peer("ikpy.chain")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "arm.urdf"
@@ -61,15 +55,15 @@ def _chain(arm: Arm) -> tuple[Any, Array]:
 
 
 def _path_to_tool(urdf: str) -> list[str]:
-    """Return the names of links and joints, in turns, from the world to the tool."""
+    """Return the names from the world to the tool: a link, a joint, a link and so on."""
     joints = ElementTree.fromstring(urdf).findall("joint")  # noqa: S314 - our own text
-    above = {_end(joint, "child"): (_end(joint, "parent"), joint.get("name", "")) for joint in joints}
+    parents = {_link_name(joint, "child"): (_link_name(joint, "parent"), joint.get("name", "")) for joint in joints}
     path = ["tool"]
-    while path[0] in above:
-        path[:0] = above[path[0]]
+    while path[0] in parents:
+        path[:0] = parents[path[0]]
     return path
 
 
-def _end(joint: ElementTree.Element, which: str) -> str:
-    element = joint.find(which)
+def _link_name(joint: ElementTree.Element, role: str) -> str:
+    element = joint.find(role)
     return "" if element is None else element.get("link", "")

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer, one_by_one
+from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer, single_task
 from dhkit.bench.geometry import OrthoParallel
 from dhkit.description import Array
 
 UNMET_LIMITS = [(10.0, 11.0)] * 6
-"""rad; joint limits that no branch is within: `reach` returns every branch all the same, and computes no singular
-values of branches outside them."""
+"""Joint limits, rad, that no branch is inside: `reach` returns every branch all the same, and computes no singular
+values of branches outside the limits."""
 
 
 def contenders() -> tuple[Contender, ...]:
@@ -28,10 +28,8 @@ def contenders() -> tuple[Contender, ...]:
 def _forward(workload: Workload) -> Task:
     robot, family, _ = _robot(workload)
     states = [tuple(angles) for angles in family.angles(workload.q).tolist()]
-    return Task(
-        one_by_one(robot.forward, [(state,) for state in states]),  # one argument, a tuple of six
-        lambda k: [family.tool_poses(robot.forward(state).as_matrix()) for state in states[:k]],
-    )
+    inputs = [(state,) for state in states]  # one argument, a tuple of six
+    return single_task(robot.forward, inputs, lambda pose: family.tool_poses(pose.as_matrix()))
 
 
 def _batch_forward(workload: Workload) -> Task:
@@ -48,10 +46,7 @@ def _batch_forward(workload: Workload) -> Task:
 def _inverse(workload: Workload) -> Task:
     robot, family, transform = _robot(workload)
     poses = [transform(T) for T in family.poses(workload.T[:10_000])]
-    return Task(
-        one_by_one(robot.inverse, poses),
-        lambda k: [family.ours(np.reshape(robot.inverse(pose), (-1, 6))) for pose in poses[:k]],
-    )
+    return single_task(robot.inverse, poses, lambda solutions: family.ours(np.reshape(solutions, (-1, 6))))
 
 
 def _reach(workload: Workload) -> Task:
@@ -70,7 +65,7 @@ def _reach(workload: Workload) -> Task:
 
 
 def _robot(workload: Workload) -> tuple[Any, OrthoParallel, Any]:
-    """Return its robot, what we know of the arm, and what makes its poses of ours."""
+    """Return the package's robot, the arm's parameters, and the function that converts poses."""
     package = import_peer("py_opw_kinematics")
     family = OrthoParallel.of(workload.arm.description)
     model = package.KinematicModel(a1=family.a1, a2=family.a2, b=family.b, c2=family.c2, c3=family.c3)

@@ -1,4 +1,4 @@
-"""Pinocchio's algorithms in a Python loop, as its users call them, and its batch calls, which dynamics alone have."""
+"""Pinocchio's algorithms in a Python loop, as its users call them, and its batch calls, which only dynamics have."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ABA_BATCH = "pin.abaInParallel"
 
 
 def contenders() -> tuple[Contender, ...]:
-    """Return Pinocchio's contenders: the bare algorithms, and with the tool's placement and Jacobian read."""
+    """Return Pinocchio's contenders: the algorithms alone, and those that also read the tool's Jacobian."""
     return (
         Contender(FORWARD, "fk", Mode.SINGLE, _forward),
         Contender(JACOBIANS, "jacobian", Mode.SINGLE, _joint_jacobians),
@@ -40,7 +40,7 @@ def _forward(workload: Workload) -> Task:
         pin.framesForwardKinematics(model, data, q)
         return np.array(data.oMf[tool].homogeneous)
 
-    return Task(_loop(pin.forwardKinematics, model, workload.q), _each(answer, workload))
+    return Task(_loop(pin.forwardKinematics, model, workload.q), _answers(answer, workload))
 
 
 def _joint_jacobians(workload: Workload) -> Task:
@@ -53,7 +53,7 @@ def _joint_jacobians(workload: Workload) -> Task:
         J = pin.getFrameJacobian(model, data, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         return np.reshape(J, (6, model.nv))
 
-    return Task(_loop(pin.computeJointJacobians, model, workload.q), _each(answer, workload))
+    return Task(_loop(pin.computeJointJacobians, model, workload.q), _answers(answer, workload))
 
 
 def _frame_jacobian(workload: Workload) -> Task:
@@ -70,11 +70,11 @@ def _frame_jacobian(workload: Workload) -> Task:
 
         return loop
 
-    return Task(prepare, _each(lambda q: np.reshape(compute(model, data, q, tool, axes), (6, model.nv)), workload))
+    return Task(prepare, _answers(lambda q: np.reshape(compute(model, data, q, tool, axes), (6, model.nv)), workload))
 
 
 def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
-    """Return the set-up of an algorithm of dynamics, called state by state."""
+    """Return the setup of an algorithm of dynamics that is called state by state."""
 
     def setup(workload: Workload) -> Task:
         pin, model, _ = _model(workload)
@@ -104,7 +104,7 @@ def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
 
 
 def _in_parallel(name: str, quantity: str) -> Callable[[Workload], Task]:
-    """Return the set-up of a batch call, which takes a column a state and writes into an array."""
+    """Return the setup of a batch call, which takes a column for each state and writes into an array."""
 
     def setup(workload: Workload) -> Task:
         pin, model, _ = _model(workload)
@@ -147,5 +147,5 @@ def _loop(algorithm: Callable[..., object], model: Any, states: Array) -> Callab
     return prepare
 
 
-def _each(answer: Callable[[Array], Array], workload: Workload) -> Callable[[int], Sequence[Array]]:
+def _answers(answer: Callable[[Array], Array], workload: Workload) -> Callable[[int], Sequence[Array]]:
     return lambda k: [answer(q).copy() for q in workload.q[:k]]

@@ -114,7 +114,7 @@ class Branch:
 
     @cached_property
     def agreement(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """For each pose, (S,): rank of the first joint that agrees with no solution (n: none), nearest solution."""
+        """Rank of the first joint that agrees with no solution (n: none), index of the nearest solution; shape (S,)."""
         truths = self.poses.truths
         first = np.full(len(truths), self.n)
         nearest = np.argmax(np.all(np.isfinite(truths), axis=-1), axis=1)
@@ -138,7 +138,7 @@ class Branch:
         return alive
 
     def agrees(self, joint: int, x: Array) -> Mask:
-        """Return where values of a joint, shape (S,), are those of a solution that agrees with the preceding joints."""
+        """Return whether x (S,), rad or m, are values of a joint in solutions that agree with the preceding joints."""
         gap = self.poses.gaps(x[:, None], self.poses.truths[..., joint], joint)
         near: Mask = np.any(self.alive[self.rank(joint)] & (gap < MATCHES), axis=1)
         return near

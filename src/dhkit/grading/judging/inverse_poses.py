@@ -88,7 +88,7 @@ class Poses:
         return cls(description, q, T, solutions, parts, whole, axis, lower, upper)
 
     def at(self, chosen: Sequence[int] | NDArray[np.intp]) -> Poses:
-        """Return some of the poses."""
+        """Return the poses of some indices, shape (k,)."""
         index = np.asarray(chosen, dtype=int)
         return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index])
 
@@ -147,7 +147,7 @@ class Poses:
         return np.stack([(self.residuals(q + unit, T) - at) / DIFFERENCE for unit in units], axis=-1)
 
     def residuals(self, q: Array, T: Array) -> Array:
-        """Return the errors of joint values (S, n) in what is asked of poses, (S, k), lengths relative to the reach."""
+        """Return the errors (S, k) of q (S, n), rad and m, in required parts of poses; lengths over the reach."""
         gap = world_to_tool(self.description, np.where(np.isfinite(q), q, np.nan)) - T
         columns = [gap[:, :3, 3] / self.scale]
         if self.asks_rotation:
@@ -162,14 +162,14 @@ class Poses:
         return near
 
     def gaps(self, a: Array, b: Array, joint: int | slice = slice(None)) -> Array:
-        """Return the distances of joint values: angles the short way round in rad, slides relative to the reach."""
+        """Return the distances of joint values (..., n): angles the short way in rad, slides relative to the reach."""
         prismatic = self.description.numbers.prismatic[joint]
         with np.errstate(invalid="ignore"):
             turned = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
             return np.where(prismatic, np.abs(a - b) / self.scale, turned)
 
     def matches(self, q: Array, solutions: Array) -> Mask:
-        """Return which solutions, of shape (S, B, n), joint values of shape (S, n) equal; shape (S, B)."""
+        """Return whether solutions (S, B, n), rad and m, equal joint values q (S, n), shape (S, B)."""
         near: Mask = np.all(self.gaps(q[:, None], solutions) < MATCHES, axis=-1)
         return near
 

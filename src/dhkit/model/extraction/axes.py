@@ -1,38 +1,41 @@
 """Joint axes of a chain at zero, and the tidiest Denavit-Hartenberg table through them.
 
 A table is a sequence of common normals: normal i goes from the axis of joint i to that of joint i + 1, has the length
-a_i and turns by alpha_i; along axis i the normals i - 1 and i are d_i apart and turn by theta_i. That holds in both
+a_i and rotates by alpha_i; along axis i the normals i - 1 and i are d_i apart and differ by theta_i. That holds in both
 conventions, which only write alpha and a into other rows and place frame i at the end (standard) or the beginning
 (modified) of normal i.
 
 Skew and intersecting axes have one common normal, up to its sign. Between parallel axes its height is free, between
-coincident axes its direction too, and the axis of a prismatic joint may lie anywhere parallel to itself. The free
-choices are taken from points and directions that the URDF itself names, and the table with the fewest nonzero entries
-is kept, right angles before other angles, positive before negative numbers, late offsets before early ones.
+coincident axes its direction too, and the axis of a prismatic joint may be any line parallel to itself. The free
+choices are taken from points and directions of the URDF itself. The table with the fewest nonzero entries is chosen,
+with right angles preferred to other angles, positive to negative numbers, late offsets to early ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.description import Array
 
-ENTRY = 1000.0
+ENTRY_COST = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
-OBLIQUE, STRAIGHT, NEGATIVE = 20.0, 2.0, 1.0
+OBLIQUE_COST, STRAIGHT_COST, NEGATIVE_COST = 20.0, 2.0, 1.0
 """Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
-EARLY = 0.1
-"""Extra cost of an offset d for each row that comes after it: parallel axes share one offset, the last takes it."""
-NEAR = 1e-9
-"""Distance from an axis at which a point counts as on it, of the arm's size."""
+EARLY_COST = 0.1
+"""Extra cost of an offset d for each row that comes after it: parallel axes share one offset, the last row has it."""
+ON_AXIS_DISTANCE = 1e-9
+"""Distance from an axis, relative to the arm's size, below which a point counts as on the axis."""
 ZERO = 1e-10
-"""Of the arm's size, or rad: what is smaller counts as zero when tables are compared."""
-KEPT = 336
-"""Partial tables that are followed up from axis to axis, over the number of joints: 48 of seven joints."""
+"""Lengths, relative to the arm's size, and angles, rad, below this number count as zero when tables are compared."""
+MIN_SINE = 1e-3
+"""Directions closer to an axis than this sine define no perpendicular direction."""
+MAX_PARTIAL_TABLES = 336
+"""Number of partial tables that are extended at each axis, times the number of joints: 48 for seven joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +49,11 @@ class Axes:
     prismatic
         Whether each joint is; shape (n,).
     T_base_tip
-        The tip's pose, shape (4, 4).
+        The tip's pose, shape (4, 4), m.
     frames
         Unit vectors of the joints' frames, shape (n, 3, 3), one a row.
     feet
-        Where skew neighbouring axes are nearest to each other, m, shape (k, 3).
+        Points where skew neighbouring axes are nearest to each other, m, shape (k, 3).
     normals
         Directions of their common normals, shape (k, 3).
     parallel_below
@@ -72,26 +75,39 @@ class Axes:
         return len(self.points)
 
     def heights(self, i: int, on_axis: Array) -> Array:
-        """Return points where a normal may begin on axis i (from 0), m, shape (k, 3): frames nearby, and feet."""
-        z = self.directions[i]
-        feet = (
-            self.feet[np.linalg.norm(np.cross(self.feet - on_axis, z), axis=1) < NEAR] if len(self.feet) else self.feet
-        )
+        """Return points at whose height a normal may begin on axis i (from 0), m, shape (k, 3).
+
+        They are ``on_axis``, a point on the axis, shape (3,), m, nearby frames, base, tip, and feet on the axis.
+        """
+        z, feet = self.directions[i], self.feet
+        if len(feet):
+            feet = feet[np.linalg.norm(np.cross(feet - on_axis, z), axis=1) < ON_AXIS_DISTANCE]
         return np.vstack(
             [on_axis[None], self.points[max(i - 1, 0) : i + 3], np.zeros((1, 3)), self.T_base_tip[None, :3, 3], feet]
         )
 
-    def lines(self, i: int, on_axis: Array | None) -> Array:
-        """Return points that the axis of a prismatic joint i (from 0) may go through, m, shape (k, 3)."""
-        own = self.points[i : i + 2]
-        before = own[:0] if on_axis is None else on_axis[None]
-        return _distinct(np.vstack([own, before, np.zeros((1, 3)), self.T_base_tip[None, :3, 3]]))
+    def lines(self, i: int, on_previous_axis: Array | None) -> Array:
+        """Return points through which the axis of a prismatic joint i (from 0) may go, m, shape (k, 3).
 
-    def crosswise(self, i: int, before: Array | None) -> Array:
-        """Return directions that a normal between coincident axes i and i + 1 may have, shape (k, 3)."""
+        ``on_previous_axis`` is a point on the axis before, shape (3,), m, if there is one.
+        """
+        own = self.points[i : i + 2]
+        previous = own[:0] if on_previous_axis is None else on_previous_axis[None]
+        return _distinct(np.vstack([own, previous, np.zeros((1, 3)), self.T_base_tip[None, :3, 3]]))
+
+    def perpendicular(self, i: int, previous: Array | None) -> Array:
+        """Return unit vectors that a normal between coincident axes i and i + 1 may have, shape (k, 3), without unit.
+
+        They are parts perpendicular to axis i of the ``previous`` normal's vector, shape (3,), and of directions of
+        base, tip, nearby frames and normals.
+        """
         nearby = self.frames[i : i + 3].reshape(-1, 3)
-        named = [np.eye(3), self.T_base_tip[:3, :3].T, nearby, self.normals]
-        return np.vstack(named if before is None else [before[None], *named])
+        known = [np.eye(3), self.T_base_tip[:3, :3].T, nearby, self.normals]
+        directions = np.vstack(known if previous is None else [previous[None], *known])
+        flat = directions - (directions @ self.directions[i])[:, None] * self.directions[i]
+        lengths = np.linalg.norm(flat, axis=1)
+        parts: Array = flat[lengths > MIN_SINE] / lengths[lengths > MIN_SINE, None]
+        return parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,145 +118,159 @@ class Normal:
     start: Array
     end: Array
 
+    @property
+    def length(self) -> float:
+        """The entry a, m, negative if the end lies against x."""
+        return float((self.end - self.start) @ self.x)
+
+
+class EndRow(NamedTuple):
+    """Entries of the first or last row that no inner normal determines, rad and m.
+
+    alpha and a are those of the first row of modified tables (alpha_0, a_0) and of the last row of standard ones.
+    """
+
+    theta: float
+    d: float
+    alpha: float = 0.0
+    a: float = 0.0
+
+
+Choice = tuple[float, EndRow]
+"""Entries of an end of the table, with the cost of the whole end."""
+
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Normals 1 to i, with what their entries cost so far."""
+    """Normals 1 to i, with the cost of their entries and of the ends that were chosen so far."""
 
     normals: tuple[Normal, ...]
     cost: float
-    start: Any = None
-    """What the caller's ``begin`` chose before the first normal."""
+    start: EndRow
+    end: EndRow | None = None
 
 
 def length_costs(lengths: Array) -> Array:
-    """Return what entries of these lengths, m, cost in a table."""
-    return np.where(np.abs(lengths) <= ZERO, 0.0, ENTRY + NEGATIVE * (lengths < 0))
+    """Return the costs of entries with these lengths, any shape, in units of about the arm's size; same shape."""
+    return np.where(np.abs(lengths) <= ZERO, 0.0, ENTRY_COST + NEGATIVE_COST * (lengths < 0))
 
 
 def angle_costs(angles: Array) -> Array:
-    """Return what entries of these angles, rad, cost in a table."""
+    """Return the costs of entries with these angles, rad, any shape; same shape."""
     quarter = np.round(angles / (np.pi / 2))
-    oblique = np.abs(angles - quarter * (np.pi / 2)) > ZERO
-    straight = ~oblique & (np.abs(quarter) == 2)
-    costs = ENTRY + OBLIQUE * oblique + STRAIGHT * straight + NEGATIVE * ((angles < 0) & ~straight)
+    is_oblique = np.abs(angles - quarter * (np.pi / 2)) > ZERO
+    is_straight = ~is_oblique & (np.abs(quarter) == 2)
+    is_negative = (angles < 0) & ~is_straight
+    costs = ENTRY_COST + OBLIQUE_COST * is_oblique + STRAIGHT_COST * is_straight + NEGATIVE_COST * is_negative
     return np.where(np.abs(angles) <= ZERO, 0.0, costs)
 
 
-def turn_about(axis: Array, start: Array, end: Array) -> Array:
-    """Return the angles from one vector to others about an axis that is perpendicular to all, rad, in (-pi, pi]."""
+def angle_about(axis: Array, start: Array, end: Array) -> Array:
+    """Return the angles from start to end about an axis perpendicular to both, rad, in (-pi, pi], shape (...).
+
+    All are vectors of shape (..., 3) that broadcast, of any length.
+    """
     cosines = np.sum(start * end, axis=-1)
     sines = np.sum(np.cross(start, end) * axis, axis=-1)
     angles = np.arctan2(sines, cosines)
     return np.where(angles <= -np.pi + 1e-15, np.pi, angles)
 
 
-def tidiest_normals(
-    axes: Axes,
-    begin: Callable[[Normal], tuple[float, Any]],
-    finish: Callable[[Normal], tuple[float, Any]],
-) -> tuple[Path, Any]:
-    """Return the normals of the table with the lowest cost, and what ``finish`` chose behind the last one.
+def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Callable[[Normal], Choice]) -> Path:
+    """Return the normals, and the ends, of the table with the lowest cost.
 
     Parameters
     ----------
     axes
         At least two.
     begin
-        From the first normal to the cost of the base and of theta_1 and d_1 (modified: of alpha_0 and a_0 too).
+        From the first normal to the choice of theta_1 and d_1 (modified: of alpha_0 and a_0 too), with its cost.
     finish
-        From the last normal to the cost of the tool and of the last row's theta and d (standard: of a and alpha too).
+        From the last normal to the choice of the last row's theta and d (standard: of a and alpha too), with its cost.
     """
-    first = _normals_after(axes, 0, axes.points[0], None)
-    if axes.prismatic[0]:  # the first axis may lie anywhere parallel to itself
-        first = [normal for point in axes.lines(0, None) for normal in _normals_after(axes, 0, point, None)]
+    # A prismatic first axis may be any line parallel to itself.
+    lines = axes.lines(0, None) if axes.prismatic[0] else axes.points[:1]
     paths = []
-    for normal in first:
+    for normal in (normal for point in lines for normal in _normals_after(axes, 0, point, None)):
         cost, start = begin(normal)
-        row = length_costs(np.array([_along(normal)]))[0] + angle_costs(np.array([_bend(axes, 0, normal)]))[0]
+        row = length_costs(np.array([normal.length]))[0] + angle_costs(np.array([_alpha(axes, 0, normal)]))[0]
         paths.append(Path((normal,), cost + float(row), start))
-    kept = max(6, KEPT // axes.n)
-    paths = _cheapest(paths, kept)
+    count = max(6, MAX_PARTIAL_TABLES // axes.n)
+    paths = _cheapest(paths, count)
     for i in range(1, axes.n - 1):
-        paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)], kept)
-    best: tuple[Path, Any] | None = None
-    for path in paths:
-        if best is not None and path.cost >= best[0].cost:
-            break
+        paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)], count)
+
+    def completed(path: Path) -> Path:
         cost, end = finish(path.normals[-1])
-        total = Path(path.normals, path.cost + cost, path.start)
-        if best is None or total.cost < best[0].cost:
-            best = total, end
-    if best is None:
-        raise AssertionError("no normals between two axes")
+        return replace(path, cost=path.cost + cost, end=end)
+
+    best = completed(paths[0])
+    for path in paths[1:]:  # the cheapest first
+        if path.cost >= best.cost:
+            break
+        best = min(best, completed(path), key=attrgetter("cost"))
     return best
 
 
 def _extended(axes: Axes, i: int, path: Path) -> list[Path]:
     """Return a path with each possible normal from axis i to axis i + 1 (from 0)."""
-    before, z = path.normals[-1], axes.directions[i]
-    normals = _normals_after(axes, i, before.end, before.x)
-    x, start = np.array([one.x for one in normals]), np.array([one.start for one in normals])
-    d = (start - before.end) @ z
-    theta = turn_about(z, before.x, x)
-    a, alpha = np.array([_along(one) for one in normals]), np.array([_bend(axes, i, one) for one in normals])
-    late = np.where(np.abs(d) > ZERO, EARLY * (axes.n - i), 0.0)
-    costs = length_costs(d) + late + angle_costs(theta) + length_costs(a) + angle_costs(alpha)
+    previous, z = path.normals[-1], axes.directions[i]
+    normals = _normals_after(axes, i, previous.end, previous.x)
+    x, start = np.array([normal.x for normal in normals]), np.array([normal.start for normal in normals])
+    d = (start - previous.end) @ z
+    theta = angle_about(z, previous.x, x)
+    a, alpha = np.array([[normal.length, _alpha(axes, i, normal)] for normal in normals]).T
+    early = np.where(np.abs(d) > ZERO, EARLY_COST * (axes.n - i), 0.0)
+    costs = length_costs(d) + early + angle_costs(theta) + length_costs(a) + angle_costs(alpha)
     return [
         Path((*path.normals, normal), path.cost + float(cost), path.start)
         for normal, cost in zip(normals, costs, strict=True)
     ]
 
 
-def _along(normal: Normal) -> float:
-    return float((normal.end - normal.start) @ normal.x)
+def _alpha(axes: Axes, i: int, normal: Normal) -> float:
+    """Return the angle from axis i to axis i + 1 about the normal, rad."""
+    return float(angle_about(normal.x, axes.directions[i], axes.directions[i + 1]))
 
 
-def _bend(axes: Axes, i: int, normal: Normal) -> float:
-    """Return alpha: the angle from axis i to axis i + 1 about the normal."""
-    return float(turn_about(normal.x, axes.directions[i], axes.directions[i + 1]))
-
-
-def _cheapest(paths: list[Path], kept: int) -> list[Path]:
-    """Return the best paths, one for each last normal, cheapest first."""
+def _cheapest(paths: list[Path], count: int) -> list[Path]:
+    """Return the cheapest paths, one for each last normal, the cheapest first."""
     best: dict[tuple[float, ...], Path] = {}
-    for path in sorted(paths, key=lambda one: one.cost):
+    for path in sorted(paths, key=attrgetter("cost")):
         last = path.normals[-1]
         best.setdefault(tuple(np.round([*last.x, *last.end], 7).tolist()), path)
-        if len(best) == kept:
+        if len(best) == count:
             break
     return list(best.values())
 
 
-def _normals_after(axes: Axes, i: int, on_axis: Array, before: Array | None) -> list[Normal]:
+def _normals_after(axes: Axes, i: int, on_axis: Array, previous: Array | None) -> list[Normal]:
     """Return the normals from axis i, through a point on it, to axis i + 1.
 
     Parameters
     ----------
     on_axis
-        A point on axis i: the end of the normal before.
-    before
-        The unit vector of the normal before, if there is one.
+        A point on axis i: the end of the previous normal.
+    previous
+        The unit vector of the previous normal, if there is one.
     """
     z, z_next = axes.directions[i], axes.directions[i + 1]
     lines = axes.lines(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
-    normals = []
-    for line in lines:
-        if sine > axes.parallel_below:
-            # a point that is hundreds of metres away, as normals of nearly parallel axes are, would cost digits
-            point = on_axis if axes.prismatic[i] else axes.points[i]
-            normals += _skew(z, z_next, cross / sine, point, line)
-        else:
-            normals += _parallel(axes, i, on_axis, line, before)
-    return normals
+    if sine <= axes.parallel_below:
+        return [normal for line in lines for normal in _parallel_normals(axes, i, on_axis, line, previous)]
+    # The normals of nearly parallel axes may be hundreds of metres away: a point that far would cost digits.
+    point = on_axis if axes.prismatic[i] else axes.points[i]
+    feet = [nearest_points(point, z, line, z_next) for line in lines]
+    return [Normal(sign * (cross / sine), *ends) for ends in feet for sign in (1.0, -1.0)]
 
 
 def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tuple[Array, Array]:
-    """Return where two lines that are not parallel are nearest to each other, m.
+    """Return the points where two lines that are not parallel are nearest to each other, m, shape (3,) each.
 
-    Cross products keep the digits that a difference of scalar products loses where the lines are nearly parallel.
+    A line has a point, shape (3,), m, and a unit vector. Cross products keep the digits that a difference of scalar
+    products loses for nearly parallel lines.
     """
     gap, cross = other - point, np.cross(z, z_other)
     square = float(cross @ cross)
@@ -249,39 +279,22 @@ def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tupl
     return point + along * z, other + along_other * z_other
 
 
-def _skew(z: Array, z_next: Array, x: Array, on_axis: Array, line: Array) -> list[Normal]:
-    """Return the one common normal, in both directions."""
-    start, end = nearest_points(on_axis, z, line, z_next)
-    return [Normal(sign * x, start, end) for sign in (1.0, -1.0)]
-
-
-def _parallel(axes: Axes, i: int, on_axis: Array, line: Array, before: Array | None) -> list[Normal]:
-    """Return normals between parallel axes, at named points' heights; of coincident ones in named directions."""
+def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous: Array | None) -> list[Normal]:
+    """Return normals between parallel axes, at known points' heights; of coincident ones in known directions."""
     z, gap = axes.directions[i], line - on_axis
     gap = gap - (gap @ z) * z
-    length = float(np.linalg.norm(gap))
-    if length > ZERO:
-        directions = np.array([gap / length, -gap / length])
+    distance = float(np.linalg.norm(gap))
+    if distance > ZERO:
+        directions = np.array([gap / distance, -gap / distance])
     else:
         gap = np.zeros(3)
-        directions = _perpendicular(axes.crosswise(i, before), z)
+        parts = axes.perpendicular(i, previous)
+        directions = _distinct(np.vstack([parts, -parts]))
     heights = (axes.heights(i, on_axis) - on_axis) @ z
     heights[0] = 0.0
     _, places = np.unique(np.round(heights, 10), return_index=True)
     starts = [on_axis + heights[place] * z for place in np.sort(places)]
     return [Normal(x, start, start + gap) for start in starts for x in directions]
-
-
-def _perpendicular(named: Array, z: Array) -> Array:
-    """Return directions' parts perpendicular to an axis, each with its opposite; shape (k, 3)."""
-    flat = named - (named @ z)[:, None] * z
-    lengths = np.linalg.norm(flat, axis=1)
-    flat = flat[lengths > 1e-3] / lengths[lengths > 1e-3, None]
-    if not len(flat):
-        least = np.eye(3)[np.argmin(np.abs(z))]
-        flat = np.cross(z, least)[None]
-        flat /= np.linalg.norm(flat)
-    return _distinct(np.vstack([flat, -flat]))
 
 
 def _distinct(rows: Array) -> Array:

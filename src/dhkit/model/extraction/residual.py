@@ -1,4 +1,4 @@
-"""How far an extracted table is from the URDF that it came from, both computed by Pinocchio."""
+"""Differences between an extracted table and its URDF, both computed by Pinocchio."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_mo
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
 
 STATES = 100
-"""Random states that a residual is taken over."""
-STROKE = 1.0
-"""m: range of a prismatic joint without limits."""
-SAME_READING = 1e-9
-"""Share of the arm's size that our reading of the file and Pinocchio's may differ by."""
-SMALL_GRAVITY = 1e-6
-"""Share of weight times reach that gravity torques are compared with at least: roundings are 1e-16 of that product."""
+"""Number of random states of a residual."""
+DEFAULT_STROKE = 1.0
+"""m: a prismatic joint without limits moves this far in both directions."""
+MAX_READING_DIFFERENCE = 1e-9
+"""Largest difference of our reading of the file from Pinocchio's, as a share of the arm's size."""
+MIN_GRAVITY_SHARE = 1e-6
+"""Errors of gravity torques are relative to this share of weight times reach at least: rounding is 1e-16 of it."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Residual:
     tool
         Largest difference of an entry of the tool's pose; m, and entries of the rotation.
     mass_matrix, gravity
-        Of M and g, relative to their largest entry in all states; None where they were not compared.
+        Of M and g, relative to their largest entry in all states; None if they were not compared.
     states
-        How many random states.
+        Number of random states.
     """
 
     tool: float
@@ -60,18 +60,19 @@ class Residual:
 class Original:
     """A chain of a URDF at random states: tool, mass matrix and gravity torque.
 
-    Without Pinocchio (there is no wheel of it for Windows) the tool alone, by a product of the URDF's own transforms.
+    Without Pinocchio (there is no wheel of it for Windows) only the tool, by a product of the URDF's own transforms.
     """
 
     def __init__(self, chain: Chain, states: int = STATES, seed: int = 0) -> None:
         self.chain = chain
-        self.q = _states(chain, states, seed)
+        self.q = _random_states(chain, states, seed)
         try:
             self.model: PinocchioModel | None = chain_model(chain)
         except NoPinocchioError:
             self.model = None
         self.tool = np.array(list(self._tools()))
-        self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *_lengths(chain)) or 1.0
+        steps = [float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in chain.joints]
+        self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *steps) or 1.0
         self.M, self.g = _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
 
     def check_reading(self) -> None:
@@ -80,18 +81,15 @@ class Original:
         Raises
         ------
         ModelError
-            The tool is elsewhere: the file has something that one of both does not know.
+            The tool's poses differ: one of the readers does not know an element of the file.
         """
-        own = np.array([self._product(q) for q in self.q])
-        apart = np.abs(own - self.tool)
-        apart[:, :3, 3] /= max(self.size, 1.0)
-        if apart.max() > SAME_READING:
-            raise ModelError(
-                f"{self.chain.path}: Pinocchio puts the tool {apart.max():.2g} away from where dhkit reads it"
-            )
+        difference = np.abs(np.array([self._product(q) for q in self.q]) - self.tool)
+        difference[:, :3, 3] /= max(self.size, 1.0)
+        if (largest := difference.max()) > MAX_READING_DIFFERENCE:
+            raise ModelError(f"{self.chain.path}: Pinocchio puts the tool {largest:.2g} away from where dhkit reads it")
 
     def residual(self, description: Description) -> Residual:
-        """Return how far a description's tool, M and g are from the URDF's."""
+        """Return the differences of a description's tool, M and g from the URDF's."""
         tool = float(np.abs(world_to_tool(description, self.q) - self.tool).max())
         if self.model is None or not all(joint.bodies for joint in description.joints):
             return Residual(tool, None, None, len(self.q))
@@ -101,12 +99,9 @@ class Original:
         numbers = description.numbers
         weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))
         reach = max(description.reach, float(np.abs(self.tool[:, :3, 3]).max()))
-        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), SMALL_GRAVITY * weight * reach)
-        errors = [
-            float(np.abs(difference).max()) / scale if scale else float(np.abs(difference).max())
-            for difference, scale in zip((M - self.M, g - self.g), scales, strict=True)
-        ]
-        return Residual(tool, errors[0], errors[1], len(self.q))
+        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), MIN_GRAVITY_SHARE * weight * reach)
+        M_error, g_error = float(np.abs(M - self.M).max()), float(np.abs(g - self.g).max())
+        return Residual(tool, M_error / (scales[0] or 1.0), g_error / (scales[1] or 1.0), len(self.q))
 
     def _tools(self) -> Iterator[Array]:
         if self.model is None:
@@ -127,26 +122,22 @@ class Original:
         values = dict(zip(self.chain.names, q, strict=True))
         T = np.eye(4)
         for joint in self.chain.tree.joints_to(self.chain.tip, self.chain.base) or ():
-            moved = np.eye(4)
+            motion = np.eye(4)
             if (value := values.get(joint.name)) is not None:
-                if joint.kind == "prismatic":
-                    moved[:3, 3] = value * joint.axis
+                if joint.is_prismatic:
+                    motion[:3, 3] = value * joint.axis
                 else:
-                    moved[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
-            T = T @ joint.T_parent_joint @ moved
+                    motion[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
+            T = T @ joint.T_parent_joint @ motion
         return T
 
 
-def _lengths(chain: Chain) -> list[float]:
-    """Return the lengths of the chain's steps from joint to joint, m."""
-    return [float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in chain.joints]
-
-
-def _states(chain: Chain, count: int, seed: int) -> Array:
-    """Return the zero state and random ones, shape (count, n), rad and m: whole turns, strokes inside the limits."""
+def _random_states(chain: Chain, count: int, seed: int) -> Array:
+    """Return the zero state and random ones, shape (count, n), rad and m: angles of a whole turn, strokes in limits."""
     rng = np.random.default_rng(seed)
     ends = [
-        (-np.pi, np.pi) if joint.kind != "prismatic" else joint.limits or (-STROKE, STROKE) for joint in chain.joints
+        (joint.limits or (-DEFAULT_STROKE, DEFAULT_STROKE)) if joint.is_prismatic else (-np.pi, np.pi)
+        for joint in chain.joints
     ]
     low, high = np.array(ends).T
     q = rng.uniform(low, high, (count, len(ends)))
