@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from rich.console import Console
 from rich.table import Table
@@ -21,8 +21,6 @@ from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from dhkit.arm import Arm
     from dhkit.control import SimulationResult
     from dhkit.planning.obstacles import Scene
@@ -34,6 +32,13 @@ FIGURES = (".png", ".svg", ".pdf")
 PAGES = (".html", ".htm")
 RESOLUTION = 120
 """Resolution of a figure, dots per inch."""
+
+
+class Figure(Protocol):
+    """A figure of matplotlib, which only the viewer imports."""
+
+    def savefig(self, fname: io.BytesIO, *, format: str, dpi: int) -> object:
+        """Write the figure."""
 
 
 class ReaderGone(Exception):  # noqa: N818 - no error: the reader had enough
