@@ -51,7 +51,7 @@ class ThreadScaling:
         return self.dhkit / self.control
 
     @property
-    def derived(self) -> dict[str, Any]:
+    def derived(self) -> dict[str, object]:
         """Entries in JSON besides the fields."""
         return {"share": self.share}
 
@@ -98,7 +98,7 @@ class PeakMemory:
         return self.peak / (self.inputs + self.outputs)
 
     @property
-    def derived(self) -> dict[str, Any]:
+    def derived(self) -> dict[str, object]:
         """Entries in JSON besides the fields."""
         return {"peak": self.peak, "share": self.share}
 

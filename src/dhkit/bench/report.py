@@ -124,7 +124,7 @@ class Outcome:
         return self.ending in (Ending.COMPLETE, Ending.PEERS_FAILED)
 
     @property
-    def derived(self) -> dict[str, Any]:
+    def derived(self) -> dict[str, object]:
         """Entries in JSON besides the quantity and the causes."""
         return {"ending": self.ending.name.lower(), "ok": self.ok}
 
@@ -174,7 +174,7 @@ class Requirement:
         return self.measured <= self.required if self.at_most else self.measured >= self.required
 
     @property
-    def derived(self) -> dict[str, Any]:
+    def derived(self) -> dict[str, object]:
         """Entries in JSON besides the fields."""
         return {"met": self.met}
 

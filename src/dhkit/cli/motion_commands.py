@@ -208,10 +208,7 @@ def simulate(
         compensate=compensate,
         options={
             "rate": None if continuous else rate,
-            "plant_rate": plant_rate,
-            "friction": given.friction_of(friction),
-            "restitution": None if no_stops else restitution,
-            "pushes": given.pushes(push or ()),
+            **given.plant_options(plant_rate, friction, restitution, no_stops, push or ()),
             "sensors": sensors,
         },
     )
@@ -259,10 +256,7 @@ def compare(
         damping=damping,
         options={
             "rate": rate,
-            "plant_rate": plant_rate,
-            "friction": given.friction_of(friction),
-            "restitution": None if no_stops else restitution,
-            "pushes": given.pushes(push or ()),
+            **given.plant_options(plant_rate, friction, restitution, no_stops, push or ()),
         },
     )
     return compare_command.run_comparison(settings, figure, degrees=degrees, json=json)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +111,7 @@ def _units(prismatic: NDArray[np.bool_], degrees: bool) -> list[tuple[str, float
     return [("m", 1.0) if slides else angle_unit for slides in prismatic.tolist()]
 
 
-def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, Any]:
+def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, object]:
     """Return the numbers of a run that `--json` prints."""
     tool = result.tool_norms
     return {

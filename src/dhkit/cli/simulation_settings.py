@@ -184,3 +184,15 @@ def pushes(texts: Sequence[str]) -> list[Push]:
         begin, end = numbers([times], "--push", [2])
         parsed.append(Push(numbers([force], "--push", [3]), begin=float(begin), end=float(end)))
     return parsed
+
+
+def plant_options(
+    plant_rate: float | None, friction: str, restitution: float, no_stops: bool, push: Sequence[str]
+) -> dict[str, Any]:
+    """Return the options of :meth:`dhkit.Arm.simulate` about the plant: its steps, friction, stops and pushes."""
+    return {
+        "plant_rate": plant_rate,
+        "friction": friction_of(friction),
+        "restitution": None if no_stops else restitution,
+        "pushes": pushes(push),
+    }

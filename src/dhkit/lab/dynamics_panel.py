@@ -30,7 +30,7 @@ class DynamicsPanel(Panel):
 
     def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
         super().__init__(desk)
-        self._jobs = Jobs(self._publish_failure, lock)
+        self.jobs: Jobs = Jobs(self._publish_failure, lock)
         self._shows_ellipsoid = False
         desk.on_replace.append(self._forget)
         desk.on_show.append(self._draw_ellipsoid)
@@ -72,15 +72,11 @@ class DynamicsPanel(Panel):
         if not has_bodies(arm):
             raise ValueError("dynamics.entry: the arm has no masses; expected uniform links to be assumed (Control)")
         view.panel("entry", {"name": name, "deriving": True})
-        self._jobs.start(name, lambda job: _formula(arm, name, job), lambda formula: view.panel("entry", formula))
+        self.jobs.start(name, lambda job: _formula(arm, name, job), lambda formula: view.panel("entry", formula))
 
     def publish(self) -> None:
         """Tell the pages whether the ellipsoid is drawn."""
         self.desk.view.panel("dynamics", {"ellipsoid": self._shows_ellipsoid})
-
-    def close(self) -> None:
-        """End the job."""
-        self._jobs.close()
 
     def _draw_ellipsoid(self, q: Array) -> None:
         if self._shows_ellipsoid:
@@ -91,7 +87,7 @@ class DynamicsPanel(Panel):
             self.desk.view.panel("entry", {"name": state["title"], "deriving": False, "error": state["error"]})
 
     def _forget(self) -> None:
-        self._jobs.cancel()
+        self.jobs.cancel()
         self.desk.view.panel("entry", None)
 
 

@@ -58,7 +58,7 @@ class MotionPanel(Panel):
 
     def __init__(self, desk: Desk, jobs: Jobs) -> None:
         super().__init__(desk)
-        self.jobs = jobs
+        self.jobs: Jobs = jobs
         self.motion: Trajectory | None = None
         self.excess: str | None = None
         """The limit that the motion exceeds most, in words; None if it keeps all limits."""
@@ -190,7 +190,7 @@ class MotionPanel(Panel):
 
     def close(self) -> None:
         """End the jobs."""
-        self.jobs.close()
+        super().close()
         self._contacts.close()
 
     def _waypoint_index(self, fields: Fields) -> int:

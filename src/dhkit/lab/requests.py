@@ -12,6 +12,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.lab.desk import Desk
+from dhkit.lab.jobs import Jobs
 
 JsonObject: TypeAlias = Mapping[str, object]
 """An object of JSON, as Python reads or writes it."""
@@ -166,6 +167,9 @@ class Panel:
         The arm, its state, and the view that shows them.
     """
 
+    jobs: Jobs | None = None
+    """Work of the panel that takes long, if it has any."""
+
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
 
@@ -183,3 +187,5 @@ class Panel:
 
     def close(self) -> None:
         """End what the panel runs in the background."""
+        if self.jobs is not None:
+            self.jobs.close()

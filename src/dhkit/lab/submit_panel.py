@@ -49,7 +49,7 @@ class SubmitPanel(Panel):
 
     def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
         super().__init__(desk)
-        self._jobs = Jobs(self._publish_failure, lock)
+        self.jobs: Jobs = Jobs(self._publish_failure, lock)
         desk.on_replace.append(self._clear)
 
     @answers("submit.grade", "kind", "text")
@@ -65,7 +65,7 @@ class SubmitPanel(Panel):
         if kind == "sheet":
             _require_robot(content, description.name)
         self.desk.view.panel("verdict", {"running": True})
-        self._jobs.start(
+        self.jobs.start(
             "submit",
             lambda job: _judge(description, content, SUFFIXES[kind], job),
             lambda state: self.desk.view.panel("verdict", state),
@@ -76,17 +76,13 @@ class SubmitPanel(Panel):
         """Stop judging."""
         self._clear()
 
-    def close(self) -> None:
-        """End the job."""
-        self._jobs.close()
-
     def _publish_failure(self, state: JobState | None) -> None:
         if state is not None and state["error"]:
             self.desk.view.panel("verdict", {"running": False, "error": state["error"]})
 
     def _clear(self) -> None:
         """Stop judging, and take the verdict away."""
-        self._jobs.cancel()
+        self.jobs.cancel()
         self.desk.view.panel("verdict", None)
 
 

@@ -35,14 +35,14 @@ class WorkspacePanel(Panel):
     def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
         super().__init__(desk)
         self._state: dict[str, object] = {"kind": "none"}
-        self._jobs = Jobs(self._publish_failure, lock)
+        self.jobs: Jobs = Jobs(self._publish_failure, lock)
         desk.on_replace.append(self._forget)
 
     @answers("workspace.show", "kind")
     def show(self, fields: Fields) -> None:
         """Draw points that the tool reaches, or those in the vertical plane that it is in now."""
         kind = fields.choice("kind", ("none", "points", "slice"))
-        self._jobs.cancel()
+        self.jobs.cancel()
         if kind == "none":
             self.desk.view.points(None)
             self._publish(kind="none", count=0, progress=None)
@@ -55,7 +55,7 @@ class WorkspacePanel(Panel):
             self.desk.view.points(positions, colors)
             self._publish(kind=kind, count=len(positions), progress=None, about=about)
 
-        self._jobs.start("workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take)
+        self.jobs.start("workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take)
 
     @answers("workspace.read", "q")
     def read(self, fields: Fields) -> JsonObject:
@@ -68,10 +68,6 @@ class WorkspacePanel(Panel):
         """Send what is drawn to the pages."""
         self.desk.view.panel("workspace", self._state)
 
-    def close(self) -> None:
-        """End the job."""
-        self._jobs.close()
-
     def _publish(self, **state: object) -> None:
         self._state = state
         self.publish()
@@ -82,7 +78,7 @@ class WorkspacePanel(Panel):
 
     def _forget(self) -> None:
         """Forget the points of an arm that another has replaced; the view has taken them away."""
-        self._jobs.cancel()
+        self.jobs.cancel()
         self._publish(kind="none", count=0, progress=None)
 
 

@@ -44,7 +44,7 @@ def limits_state(description: Description) -> dict[str, Any]:
     return {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")}
 
 
-def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, Any]:
+def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, object]:
     """Return what panels show of an arm: joints with limits, configurations by name, family, reach (m)."""
     limits, numbers = limits_state(description), description.numbers
     fit = classify(description)

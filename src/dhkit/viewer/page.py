@@ -134,7 +134,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     return files
 
 
-def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str, Any] | None = None) -> str:
+def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str, object] | None = None) -> str:
     """Return one HTML file that shows messages without a server; it makes no requests.
 
     Parameters

@@ -38,14 +38,18 @@ export class DynamicsPanel extends FollowingPanel {
 
   // Joints that a run has locked have no torque of a controller.
   samples({ columns, rows }) {
-    if (!this.visible || !rows.length) return;
+    if (!this.visible || !this.running || !rows.length) return;
     const last = rows.subarray(rows.length - columns.length), tau = new Array(this.arm.n).fill(0);
     columns.forEach((name, k) => name.startsWith("tau") && (tau[Number(name.slice(3)) - 1] = last[k]));
-    this.torques = { title: "Torques of the controller", tau };
+    this.torques = { title: "Torques of the controller", tau, controlled: true };
   }
 
+  // Rows may arrive after the state that says the run has ended, and an arm that stays where it is asks for no new numbers.
   take_control({ running }) {
-    if (!running) this.torques = null;
+    this.running = running;
+    if (running || !this.torques?.controlled) return;
+    this.torques = null;
+    this.read();
   }
 
   show({ M, g, effort, lengths, manipulability, condition }) {
