@@ -1,6 +1,7 @@
 """The front door: a value, shared freely; every method leads somewhere."""
 
 import copy
+import inspect
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 
@@ -152,6 +153,14 @@ def test_new_arms_leave_the_old_one_alone():
     assert "<table>" in arm._repr_html_()
     assert arm.urdf().startswith("<?xml")
     assert arm.jacobian_dot(np.zeros(3), np.ones(3), frame="tool").shape == (6, 3)
+
+
+def test_a_star_import_gives_names_and_no_packages():
+    names = {}
+    exec("from dhkit import *", names)
+    assert {"Arm", "plot", "PlanningError", "__version__"} <= set(names)
+    assert not [name for name, one in names.items() if inspect.ismodule(one)]
+    assert dhkit.control.__name__ == "dhkit.control"
 
 
 def test_the_public_names_are_there():

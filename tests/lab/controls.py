@@ -20,3 +20,10 @@ def button(text, within="#lab"):
         f"[...document.querySelectorAll({json.dumps(within + ' button')})]"
         f".find(b => b.offsetWidth && b.textContent.trim() === {json.dumps(text)})"
     )
+
+
+def set_joints(lab, page, q):
+    """Set the joint values in Python; wait until the page has the pose of the tool, which the next click may read."""
+    lab.answer("joints.set", {"q": list(q)})
+    T = json.dumps(lab.desk.arm.fk(lab.desk.q).ravel().tolist())
+    page.until(f"dhkit.lab.state.tool?.T.every((x, k) => x === {T}[k])")

@@ -19,7 +19,7 @@ from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import pose
 from dhkit.viewer.scene import first_configuration
-from lab.controls import button, labelled, panel
+from lab.controls import button, labelled, panel, set_joints
 
 pytestmark = pytest.mark.slow
 
@@ -226,7 +226,7 @@ def count_states(page, name):
 @pytest.mark.parametrize("turns", [False, True], ids=["arrow", "ring"])
 def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, slack, turns):
     lab, page = visit("puma560", width=860, height=720)
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     take_target(page, lab)
     first = lab._tool.T.copy()
     place, axis, way = handle(page, lab, turns)
@@ -262,7 +262,7 @@ def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, slack, t
 
 def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
     lab, page = visit("puma560")
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     take_target(page, lab)
     rows = "[...document.querySelectorAll('.branches button')].filter(b => b.getBoundingClientRect().height > 0)"
     page.until(f"{rows}.length === 8")
@@ -280,7 +280,7 @@ def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
 
 def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
     lab, page = visit("puma560")
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "tool")
     before = page.evaluate("[...document.querySelectorAll('.pose .number')].map(i => i.value)")
     write(page, "z [m]", f"{float(before[2]) - 0.05:.5f}")
@@ -301,7 +301,7 @@ def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
 
 def test_the_tool_is_jogged_in_the_axes_of_world_and_tool(visit):
     lab, page = visit("puma560")
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "tool")
     T = lab.desk.arm.fk(lab.desk.q)
     for frame in ("world", "tool"):
@@ -328,7 +328,7 @@ def numbers(page):
 def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(visit):
     lab, page = visit("puma560")
     first = lab.desk.arm
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "table")
     write(page, "a of row 2", "17*inch + 0.001")
     joints = list(first.description.joints)
@@ -468,7 +468,7 @@ def test_a_least_time_motion_is_planned_in_the_background(visit):
         page.click(button("Assume uniform links"))
         page.until("dhkit.lab.state.arm.bodies")
         panel(page, "motion")
-    lab.answer("joints.set", {"q": [0.4, 0.6]})
+    set_joints(lab, page, [0.4, 0.6])
     page.choose(labelled("Kind of motion"), "least-time")
     page.click(button("Plan from here"))
     page.until("dhkit.lab.state.job?.running")
@@ -726,7 +726,7 @@ def folder(tmp_path):
 @pytest.mark.parametrize(("width", "height", "dark"), LAYOUTS)
 def test_nothing_is_clipped_or_covered(visit, tmp_path, width, height, dark):
     lab, page = visit("puma560", width=width, height=height, dark=dark)
-    lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     pictures = []
     for name in PANELS:
         act(page, lab, name)

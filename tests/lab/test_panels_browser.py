@@ -9,7 +9,7 @@ import pytest
 
 from dhkit import Arm
 from dhkit.description import pose
-from lab.controls import button, labelled, panel
+from lab.controls import button, labelled, panel, set_joints
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +31,7 @@ def test_dynamics_shows_the_numbers_of_the_state_and_formulas(open_page, name):
     panel(page, "dynamics")
     arm = lab.desk.arm
     for q in (lab.desk.q, lab.desk.q + 0.1):
-        lab.answer("joints.set", {"q": q.tolist()})
+        set_joints(lab, page, q.tolist())
         M, g = arm.mass_matrix(q), arm.gravity_torque(q)
         page.until(
             f"Math.abs(Number(document.querySelector('#panel-dynamics td button')?.textContent) - {M[0, 0]}) < {PRINTED}"
@@ -83,7 +83,7 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(open_page):
     page.until("document.querySelector('#panel-workspace .note').textContent.startsWith('10000 points')")
     l1, l2 = lab.desk.arm.description.numbers.a
     for q in ([0.3, 0.4], [1.0, 2.0]):
-        lab.answer("joints.set", {"q": q})
+        set_joints(lab, page, q)
         radius = float(np.linalg.norm(lab.desk.arm.fk(q)[:3, 3]))
         distance = 1000 * min(l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf)
         page.until(
@@ -181,7 +181,7 @@ def test_every_panel_fits_and_names_its_controls(open_page, size):
 
 def test_a_target_out_of_reach_stays_in_the_fields_until_it_is_in_reach(open_page):
     lab, page = open_page("planar2r")
-    lab.answer("joints.set", {"q": [np.pi / 2, 0.0]})
+    set_joints(lab, page, [np.pi / 2, 0.0])
     panel(page, "tool")
     page.click(button("Move the tool by a target"))
     page.until("dhkit.lab.state.target?.reached")
