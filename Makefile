@@ -68,7 +68,7 @@ $(BENCH_READY): $(READY)
 	@touch $@
 
 assets: $(READY)  ## generate urdf/, meshes/, the tables of docs/control.md and the pictures of docs/lab.md anew
-	$(BIN)/python -m dhkit.model.assets
+	$(BIN)/python -m tools.assets
 	$(BIN)/python -m benchmarks.controllers
 	$(BIN)/python docs/screenshots.py
 

@@ -67,6 +67,22 @@ def test_the_lab_is_imported_when_it_is_first_used():
     assert done.stdout.split() == ["False", "serve", "False"], done
 
 
+@pytest.mark.parametrize(
+    ("package", "function", "module"),
+    [
+        ("dhkit.symbolic", "equations_latex", "dhkit.symbolic.equations.latex"),
+        ("dhkit.symbolic", "readable", "dhkit.symbolic.equations.quantities"),
+        ("dhkit.control", "load_result", "dhkit.control.result_files"),
+    ],
+)
+def test_values_are_printed_and_saved_by_modules_imported_on_first_use(package, function, module):
+    done = run(
+        f"import sys, {package}; from dhkit.formats import format_function;"
+        f"print({module!r} in sys.modules, format_function({function!r}).__module__)"
+    )
+    assert done.stdout.split() == ["False", module], done
+
+
 def test_importing_dhkit_takes_no_time(law):
     seconds = []
     for _ in range(max(3, law.samples(20))):

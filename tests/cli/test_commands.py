@@ -1,36 +1,35 @@
 """Commands and their modules, exit statuses, and files that commands write."""
 
 import importlib
-import pkgutil
-import re
+import json
 
 import numpy as np
 import pytest
 import typer
 
-import dhkit.cli
 from dhkit import Arm
-from dhkit.cli import analysis_commands, motion_commands, robot_commands
-from dhkit.cli.app import app
+from dhkit.cli.app import COMMANDS, app, load_command
+from dhkit.cli.bench import write
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import load_arm
 from dhkit.cli.output import MotionFiles, finite, output_folder
 from dhkit.cli.units import joint_entry
 from dhkit.errors import DescriptionError
 
-OWN = {"build", "schema"}
-"""Commands without a module of their own."""
+
+def test_the_commands_are_those_of_the_modules():
+    assert list(typer.main.get_command(app).commands) == list(COMMANDS)
+    modules = [
+        importlib.import_module(f"dhkit.cli.{module}") for module in {entry.module for entry in COMMANDS.values()}
+    ]
+    assert {name for module in modules for name in typer.main.get_group(module.app).commands} == set(COMMANDS)
 
 
-def test_each_command_is_named_by_the_module_that_carries_it_out():
-    commands = set(typer.main.get_command(app).commands)
-    groups = (robot_commands, motion_commands, analysis_commands)
-    assert commands == {name for group in groups for name in typer.main.get_command(group.app).commands}
-    named = set()
-    for module in pkgutil.iter_modules(dhkit.cli.__path__):
-        text = importlib.import_module(f"dhkit.cli.{module.name}").__doc__
-        named |= set(re.findall(r"`dhkit ([a-z-]+)`", text))
-    assert commands - OWN == named
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_is_named_by_its_module_and_its_options_have_help(name):
+    command = load_command(name)
+    assert f"`dhkit {name}`" in importlib.import_module(f"dhkit.cli.{COMMANDS[name].module}").__doc__
+    assert all(getattr(parameter, "help", None) for parameter in command.params if parameter.name != "help")
 
 
 def test_statuses_are_those_of_shells():
@@ -61,3 +60,16 @@ def test_json_has_units_in_its_keys_and_null_for_what_is_not_finite():
     entry = joint_entry(arm, "q", q, degrees=True)
     assert list(entry) == ["q_deg"] and entry["q_deg"][0] == pytest.approx(180) and entry["q_deg"][2] == np.pi
     assert finite({"a": (1.0, float("inf")), "b": float("nan")}) == {"a": [1.0, None], "b": None}
+
+
+def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_path):
+    class Report:
+        def markdown(self):
+            return "# Times\n"
+
+        def json(self):
+            return {"unit": "µs"}
+
+    written = write(Report(), tmp_path / "times.txt")
+    assert written == (tmp_path / "times.md", tmp_path / "times.json")
+    assert written[0].read_text() == "# Times\n" and json.loads(written[1].read_text("utf-8")) == {"unit": "µs"}

@@ -8,8 +8,11 @@ import sys
 
 import pytest
 
+from dhkit import Arm
 from dhkit.cli import main
 from dhkit.cli.equations import FORMATS
+from dhkit.cli.equations_page import equations_page
+from dhkit.symbolic.equations import readable
 
 
 @pytest.fixture
@@ -148,3 +151,12 @@ def test_base_parameters_on_every_kind_of_paper(dhkit, tmp_path):
         2,
         "dhkit: --symbols none: base parameters are made of symbols; leave one of the two out\n",
     )
+
+
+def test_a_page_has_an_equation_for_each_entry_and_the_symbols_that_occur():
+    lag = Arm.load("planar2r").lagrangian
+    page = equations_page(lag, readable(lag, "M,g"))
+    assert page.count("<math") > 5
+    symbols = re.findall(r"<td>(\w+)</td>", page)
+    assert {"m1", "m2", "l1", "l2"} <= set(symbols)
+    assert "qd1" not in equations_page(lag, readable(lag, "g"))

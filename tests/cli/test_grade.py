@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 from dhkit.cli import grade
+from dhkit.cli.grade_output import check_output
 from dhkit.errors import AnswerError
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
@@ -124,7 +125,7 @@ def test_an_output_folder(dhkit, folder, tmp_path):
 def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
     dhkit(folder, output=tmp_path / "out", feedback="verdict")
     kinder = Rubric(points=10, credit=Credit(mistakes={"gravity_sign": 1}, follow_on=1))
-    assert grade.remark([tmp_path / "out"], kinder, json=True) == 2
+    assert grade.mark_again([tmp_path / "out"], kinder, json=True) == 2
     ada, bob, cleo = map(json.loads, capsys.readouterr().out.splitlines())
     assert (ada["points"], bob["points"], cleo["points"]) == (10, 10, 0)
     assert ada["verdict"] == "wrong"
@@ -132,7 +133,7 @@ def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
 
 def test_marking_again_needs_reports(tmp_path):
     with pytest.raises(AnswerError, match="no reports"):
-        grade.remark([tmp_path], Rubric())
+        grade.mark_again([tmp_path], Rubric())
 
 
 def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
@@ -191,3 +192,13 @@ def test_a_sheet_alone_may_bring_its_rubric(tmp_path, capsys):
     path.rename(tmp_path / "class" / "ada.toml")
     assert grade.grade_files([tmp_path / "class"], None, None) == 0
     assert "100 of 100" in capsys.readouterr().out
+
+
+def test_an_output_that_cannot_be_meant_is_refused_before_anything_is_judged(tmp_path):
+    (tmp_path / "report").write_text("")
+    check_output(tmp_path, "text", several=True)
+    check_output(tmp_path / "report.html", "html", several=True)
+    check_output(tmp_path / "report.txt", "text", several=False)
+    for name, form, several in (("report", "text", True), ("a.txt", "text", True), ("ada.tex", "html", False)):
+        with pytest.raises(AnswerError, match="expected"):
+            check_output(tmp_path / name, form, several)

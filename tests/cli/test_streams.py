@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from dhkit import Arm, Limits
-from dhkit.cli.app import app
+from dhkit.cli import app as app_module
+from dhkit.cli.app import load_command
 from dhkit.cli.streams import _plain
 from dhkit.description.files import write_atomically
 
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = {name: load_command(name) for name in app_module.COMMANDS}
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])

@@ -1,4 +1,7 @@
-"""What cannot be simulated is refused in one clear line; a wrong controller names the time, and keeps the run."""
+"""What cannot be simulated is refused in one clear line; a wrong controller names the time, and keeps the run.
+
+Modules: controller, simulation.
+"""
 
 import numpy as np
 import pytest

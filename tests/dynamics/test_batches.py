@@ -1,4 +1,7 @@
-"""Batches of dynamics: one rule of shapes, NaN rows, out=, threads=, and errors that say what was expected."""
+"""Batches of dynamics: one rule of shapes, NaN rows, out=, threads=, and errors that say what was expected.
+
+Modules: programs.
+"""
 
 import numpy as np
 import pytest

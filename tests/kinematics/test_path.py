@@ -1,4 +1,7 @@
-"""A path of poses is followed on one branch, through whole turns, and what stands in the way is reported."""
+"""A path of poses is followed on one branch, through whole turns, and what stands in the way is reported.
+
+Modules: path.
+"""
 
 import numpy as np
 import pytest

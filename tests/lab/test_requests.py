@@ -1,4 +1,7 @@
-"""What a page can ask for: each panel's requests do what the API does, on several arms."""
+"""What a page can ask for: each panel's requests do what the API does, on several arms.
+
+Modules: desk, requests.
+"""
 
 import base64
 import json

@@ -7,11 +7,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from tools.assets import library_urdf
 
 from dhkit.description import Convention, asset, from_dh, library_robot, lock, robots
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model import pinocchio_model, urdf_text, write_urdf
-from dhkit.model.assets import library_urdf
 from dhkit.model.urdf import UNLIMITED
 
 SAME = 1e-12

@@ -1,4 +1,7 @@
-"""A certificate for any motion: limits of one's own, jumps between pieces, payloads and friction."""
+"""A certificate for any motion: limits of one's own, jumps between pieces, payloads and friction.
+
+Modules: certificate.
+"""
 
 from __future__ import annotations
 

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from dhkit.planning import Effort, Planner, Time
-from dhkit.trajectories import Limits
+from dhkit.planning import Effort, Energy, Jerk, Planner, Time
+from dhkit.planning.costs import cost_of, size_of
+from dhkit.planning.objectives import Objective
+from dhkit.trajectories import Limits, cubic, quintic, trapezoidal
 from planning_reference import luus, pendulum, slide
 
 ODD = 161
 """Intervals whose knots are nowhere near the switches."""
+ROUNDING = 1e-13
+"""Of integrals: the quadrature is exact for these polynomials."""
 
 
 def relative(seen, known):
@@ -51,6 +55,24 @@ def test_minimum_jerk(law):
     law.holds("jerk: 720 d^2 / T^5", relative(motion.report.cost, 720 * 0.7**2 / 1.3**5), 1e-6)
     x = np.linspace(0, 1, 50)
     assert np.allclose(motion.q(1.3 * x)[:, 0], 0.7 * (10 * x**3 - 15 * x**4 + 6 * x**5), atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [cubic, quintic])
+def test_costs_of_the_classical_motions(shape):
+    """Of 1 kg over d in T: the cubic is the motion of least effort, 12 d^2 / T^3, the quintic that of least jerk."""
+    d, T, w = 0.7, 1.3, 0.2
+    motion = shape(slide(), [0], [d], T)
+    term, known = {cubic: (Effort(), 12 * d**2 / T**3), quintic: (Jerk(), 720 * d**2 / T**5)}[shape]
+    assert relative(cost_of(Time() + w * term, motion, slide()), T + w * known) < ROUNDING
+
+
+def test_braking_gives_back_the_work_of_speeding_up():
+    """Of 1 kg: half of the way speeds it up to 2 d / T, the other half brakes it."""
+    d, T = 0.7, 1.3
+    motion, power = trapezoidal(slide(), [0], [d], T, blend=0.5), Objective.of(Energy(regenerates=True))
+    twice_the_kinetic_energy = (2 * d / T) ** 2
+    assert relative(size_of(power, motion, slide()), twice_the_kinetic_energy) < ROUNDING
+    assert abs(cost_of(power, motion, slide())) < ROUNDING * twice_the_kinetic_energy
 
 
 @pytest.mark.parametrize("most", [1 / 9, 0.1, 1 / 16])

@@ -1,6 +1,6 @@
 """What a planner is asked for: ways, loads, constraints, time, interruption.
 
-Modules: assembly, guess, integration, mesh, planner, point, problem, request, search, solver, task.
+Modules: assembly, guess, integration, mesh, planner, point, problem, report, request, search, solver, task.
 """
 
 import pickle

@@ -1,4 +1,7 @@
-"""Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind."""
+"""Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind.
+
+Modules: process, program, python_runner, supervisor.
+"""
 
 # ruff: noqa: E501 - programs in one line
 

@@ -1,4 +1,7 @@
-"""Classical motions against their textbooks, and the best blend against all others."""
+"""Classical motions against their textbooks, and the best blend against all others.
+
+Modules: point_to_point, timing.
+"""
 
 import numpy as np
 import pytest

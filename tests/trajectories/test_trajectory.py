@@ -1,4 +1,7 @@
-"""Laws of trajectories: exact derivatives, what holds at breaks and ends, and motions made from motions."""
+"""Laws of trajectories: exact derivatives, what holds at breaks and ends, and motions made from motions.
+
+Modules: interpolation, pieces, samples, trajectory.
+"""
 
 import pickle
 

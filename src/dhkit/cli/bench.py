@@ -6,14 +6,45 @@ import json as json_format
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Annotated, Protocol
+
+import typer
 
 from dhkit.arm import Arm
-from dhkit.bench import BenchReport, Ending, Requirement, run as run_bench
+from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Json
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def bench(
+    quantities: Annotated[list[str] | None, typer.Argument(help="What to time; all unless given.")] = None,
+    robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
+    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Items of a batch.")] = 100_000,
+    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that batch calls may use.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Interleaved rounds.")] = 9,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    probes: Annotated[bool, typer.Option(help="Measure threads, memory and new processes too.")] = True,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
+    json: Json = False,
+) -> ExitStatus:
+    """Time quantities, print the report, and name the quantities that failed on stderr."""
+    return run(
+        Arm.load(robot),
+        quantities or QUANTITIES,
+        batch=batch,
+        threads=threads,
+        repeats=repeats,
+        seed=seed,
+        probes=probes,
+        output=output,
+        json=json,
+    )
 
 
 def run(

@@ -6,15 +6,21 @@ import signal
 import threading
 import time
 import webbrowser
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Robot
 from dhkit.cli.output import PAGES, check_outputs, say
+from dhkit.errors import DescriptionError
 from dhkit.lab import Assignment, serve
 from dhkit.lab.assignment import is_assignment
 from dhkit.programs import protect_from_children
+
+app = typer.Typer(rich_markup_mode=None)
 
 
 def until_interrupted(url: str, what: str, *, open_browser: bool) -> ExitStatus:
@@ -35,16 +41,25 @@ def _raise_interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def run_lab(
-    robot: str,
-    port: int | None,
-    *,
-    open_browser: bool,
-    own: Path | Sequence[str] | None = None,
-    sandbox: str | None = None,
-    solid: Path | None = None,
+@app.command()
+def lab(
+    robot: Annotated[str, typer.Argument(help="A library name, a robot file or an assignment (.toml).")],
+    port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,
+    mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
+    run: Annotated[
+        str | None, typer.Option(help="Your program in place of a file; ARGUMENTS follow the robot.")
+    ] = None,
+    arguments: Annotated[list[str] | None, typer.Argument(help="Of the program of --run.")] = None,
+    sandbox: Annotated[str | None, typer.Option(help="bwrap: your program in bubblewrap.")] = None,
+    solid: Annotated[Path | None, typer.Option(help="An STL file for the panel of transforms.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> ExitStatus:
     """Serve a lab of a robot, or of an assignment, until it is interrupted."""
+    if mine is not None and run is not None:
+        raise DescriptionError("--mine and --run; expected one of them")
+    if arguments and run is None:
+        raise DescriptionError(f"{arguments[0]!r} behind the robot; expected --run PROGRAM for arguments")
+    own = mine if run is None else [run, *(arguments or [])]
     assignment = Assignment.read(robot) if is_assignment(robot) else None
     arm = Arm.load(robot) if assignment is None else assignment.arm
     what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
@@ -59,15 +74,21 @@ def run_lab(
         sandbox=sandbox,
         solid=solid,
         assignment=assignment,
-    ) as lab:
-        return until_interrupted(lab.url, what, open_browser=open_browser)
+    ) as served:
+        return until_interrupted(served.url, what, open_browser=not no_browser)
 
 
-def run_view(arm: Arm, page: Path | None, *, open_browser: bool) -> ExitStatus:
+@app.command()
+def view(
+    robot: Robot,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write a page in place of it.")] = None,
+) -> ExitStatus:
     """Show an arm until it is interrupted, or write a page of it."""
-    check_outputs(((page, PAGES),))
-    with arm.view() as view:
-        if page is not None:
-            say(f"wrote {view.save_html(page, interactive=True)}")
+    arm = Arm.load(robot)
+    check_outputs(((html, PAGES),))
+    with arm.view() as shown:
+        if html is not None:
+            say(f"wrote {shown.save_html(html, interactive=True)}")
             return ExitStatus.FINE
-        return until_interrupted(view.url, arm.name, open_browser=open_browser)
+        return until_interrupted(shown.url, arm.name, open_browser=not no_browser)

@@ -7,15 +7,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
 from dhkit.cli.demo_motions import race, there_and_back, tour
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Json
 from dhkit.cli.output import output_folder, print_json, say, write_figure
 from dhkit.cli.simulation_settings import chosen_motion
 from dhkit.cli.straight import Branches, Line, branches, straight_line
@@ -43,6 +45,8 @@ PAGES = {
 SAME_LOOK = 1e-6
 """Largest distance of frames, as a share of the arm's reach, of two states that look the same."""
 
+app = typer.Typer(rich_markup_mode=None)
+
 
 @dataclass(frozen=True, eq=False)
 class InverseKinematics:
@@ -52,8 +56,15 @@ class InverseKinematics:
     line: Line | None
 
 
-def run(arm: Arm, output: Path | None, *, quick: bool, json: bool) -> ExitStatus:
+@app.command()
+def demo(
+    robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer samples.")] = False,
+    json: Json = False,
+) -> ExitStatus:
     """Run the demo into a folder; the status is NO if our numbers and Pinocchio's disagree."""
+    arm = Arm.load(robot)
     folder = output_folder(output, arm.name)
     folder.mkdir(parents=True, exist_ok=True)
     stages: list[dict[str, Any]] = []

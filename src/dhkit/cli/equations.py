@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from dhkit.arm import Arm
+import typer
+
 from dhkit.cli.equations_page import equations_page
+from dhkit.cli.options import Json, Robot, Uniform, load_arm
 from dhkit.cli.output import print_json, say_written
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
@@ -40,6 +42,8 @@ MAX_TITLE_LENGTH = 200
 Source: TypeAlias = Lagrangian | SymbolicKinematics
 """Where quantities come from."""
 
+app = typer.Typer(rich_markup_mode=None)
+
 
 def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
     """Return the equations of motion, with these symbols, or in base parameters.
@@ -65,8 +69,23 @@ def _kinematics_of(description: Description, symbols: str, base: bool) -> Symbol
     return symbolic_kinematics(description, "none" if symbols == "none" else "file")
 
 
-def run(arm: Arm, *, what: str, form: str, symbols: str, base: bool, output: Path | None, json: bool) -> None:
+@app.command()
+def equations(
+    robot: Robot,
+    what: Annotated[str, typer.Option(help="Any of M, C, h, g, tau, K, V; or of A (A1 ... An), T, J.")] = "M,C,g",
+    form: Annotated[str, typer.Option("--format", help="text, latex, python, c, matlab or html.")] = "text",
+    symbols: Annotated[
+        str, typer.Option(help="none: numbers; file: the file's parameters; inertial: every inertial parameter.")
+    ] = "file",
+    base: Annotated[
+        bool, typer.Option("--base-parameters", help="The fewest inertial parameters, and what they stand for.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
+    uniform: Uniform = False,
+    json: Json = False,
+) -> None:
     """Print equations, or write them to a file."""
+    arm = load_arm(robot, uniform)
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
     if is_kinematic(what):

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Json
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.description import Array, Description, pose_parts
 from dhkit.errors import DescriptionError
@@ -19,18 +20,26 @@ from dhkit.model.robot_folder import write_robot_with_meshes
 TOLERANCE = 1e-9
 """Largest difference from the file, as a share of the reach, of a table that is the same robot."""
 
+app = typer.Typer(rich_markup_mode=None)
 
-def run(
-    name: str,
-    *,
-    base: str | None,
-    tip: str | None,
-    modified: bool,
-    as_designed: bool,
-    drop: bool,
-    package_dirs: Sequence[Path],
-    output: Path | None,
-    json: bool,
+
+@app.command()
+def extract(
+    urdf: Annotated[str, typer.Argument(metavar="FILE", help="A URDF, or example:NAME of example-robot-data.")],
+    base: Annotated[str | None, typer.Option(help="The chain's first link, which becomes the world; the root.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Its last link; may be left out where there is one chain.")] = None,
+    modified: Annotated[bool, typer.Option("--modified", help="Craig's table instead of the standard one.")] = False,
+    as_designed: Annotated[
+        bool, typer.Option("--as-designed", help="Read 1.5708 as a right angle, and say what that changes.")
+    ] = False,
+    drop: Annotated[
+        bool, typer.Option("--drop-side", help="Leave out links behind joints beside the chain; else they are frozen.")
+    ] = False,
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Folder with packages that package:// names; may be given again.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The robot file to write (.toml).")] = None,
+    json: Json = False,
 ) -> ExitStatus:
     """Extract a table, print it and perhaps write it; the status is NO if it is not within 1e-9 of the file.
 
@@ -41,7 +50,7 @@ def run(
     """
     if output is not None and output.suffix.lower() != ".toml":
         raise DescriptionError(f"{output}: expected a robot file that ends in .toml")
-    path, base, tip = chain_of(name, base, tip)
+    path, base, tip = chain_of(urdf, base, tip)
     extraction = extract_dh(
         path,
         base,
@@ -49,7 +58,7 @@ def run(
         convention="modified" if modified else "standard",
         side="drop" if drop else "freeze",
         as_designed=as_designed,
-        package_dirs=package_dirs,
+        package_dirs=package_dir or (),
     )
     files = [] if output is None else write_robot_with_meshes(extraction.description, output)
     if json:

@@ -7,15 +7,18 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Annotated, Any, cast, get_args
+
+import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
+from dhkit.cli.options import Json
 from dhkit.cli.output import say
 from dhkit.description import write_atomically
-from dhkit.errors import AnswerError
-from dhkit.grading import LIBRARY, grade
+from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading import LIBRARY, grade as judge_sheet
 from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.batch import GIGABYTE, Judge, grade_all
 from dhkit.grading.entry_points import prepare, robot_of
@@ -24,8 +27,53 @@ from dhkit.grading.marks import marks
 from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Feedback, Rubric
-from dhkit.grading.schema import template
+from dhkit.grading.schema import template as empty_sheet
 from dhkit.grading.sheets import find_sheets
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def grade(
+    sheets: Annotated[
+        list[Path] | None, typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them.")
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="A library name or a robot file, in place of the sheets' own.")
+    ] = None,
+    task: Annotated[
+        Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
+    ] = None,
+    rubric: Annotated[Path | None, typer.Option(help="What answers are worth (.toml).")] = None,
+    read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
+    form: Annotated[str, typer.Option("--format", help="text, json, gradescope, junit or html.")] = "text",
+    feedback: Annotated[
+        str | None, typer.Option(help="full, hint or verdict: how much is told; the rubric's unless given.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, max=1024, help="Sheets at once; one for each core.")] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="The longest that a sheet may take.")] = 60.0,
+    remark: Annotated[
+        bool, typer.Option("--remark", help="The files are reports written before (JSON): mark them again.")
+    ] = False,
+    template: Annotated[str | None, typer.Option(help="Print an empty sheet for this robot.")] = None,
+    explain: Annotated[str | None, typer.Option(help="Print this robot's worked solution, step by step.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; a folder for several sheets.")
+    ] = None,
+    json: Json = False,
+) -> ExitStatus:
+    """Judge sheets, or mark reports again; or print an empty sheet, or a worked solution."""
+    if template is not None:
+        return write_template(template, output)
+    if explain is not None:
+        return write_explanation(Arm.load(explain), form, output)
+    if not sheets:
+        raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
+    options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
+    if remark:
+        return mark_again(sheets, rubric_of(rubric), **options)
+    return grade_files(sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **options)
 
 
 def rubric_of(path: Path | None) -> Rubric:
@@ -97,7 +145,7 @@ def grade_files(
     own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
     return run(
         sheets,
-        judge=lambda path: grade(path, about, chosen, task=read, seed=seed),
+        judge=lambda path: judge_sheet(path, about, chosen, task=read, seed=seed),
         rubric=chosen,
         exclude=own_files,
         prepare=lambda report: prepare(about, report),
@@ -177,7 +225,7 @@ def run(
     return _status(reports)
 
 
-def remark(
+def mark_again(
     files: Sequence[Path],
     rubric: Rubric,
     *,
@@ -270,7 +318,7 @@ def write_template(robot: str, output: Path | None) -> ExitStatus:
     description = Arm.load(robot).description
     # A sheet finds robot files only in its own folder.
     name = Path(robot).name if robot.endswith(".toml") else description.name
-    return _deliver(template(description, name), output)
+    return _deliver(empty_sheet(description, name), output)
 
 
 def write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:

@@ -3,24 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.arguments import joint_values
+from dhkit.cli.extract import list_examples
+from dhkit.cli.options import Degrees, Json, Robot
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
-from dhkit.description import Description, Joint, pose_parts, robots
+from dhkit.description import Description, Joint, pose_parts, robots as library_names
 from dhkit.description.parameters import resolved
 from dhkit.expressions import substitute
 from dhkit.kinematics import classify, tool_reach
 
+app = typer.Typer(rich_markup_mode=None)
 
-def list_robots(json: bool) -> None:
-    """Print the robots of the library."""
-    arms = [Arm.load(name).description for name in robots()]
+
+@app.command()
+def robots(
+    examples: Annotated[
+        bool, typer.Option("--examples", help="Those of the package example-robot-data instead.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Print the robots of the library, or the chains of example-robot-data."""
+    if examples:
+        list_examples(json)
+        return
+    arms = [Arm.load(name).description for name in library_names()]
     if json:
         keys = ("name", "n", "source", "kinds")
         print_json([{key: getattr(arm, key) for key in keys} | {"reach_m": tool_reach(arm)} for arm in arms])
@@ -31,8 +45,10 @@ def list_robots(json: bool) -> None:
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
 
 
-def show(arm: Arm, json: bool) -> None:
+@app.command()
+def info(robot: Robot, json: Json = False) -> None:
     """Print a robot."""
+    arm = Arm.load(robot)
     if json:
         print_json(_facts(arm))
         return
@@ -66,17 +82,25 @@ def show(arm: Arm, json: bool) -> None:
         say(f"\n{description.notes}")
 
 
-def forward(arm: Arm, q: Sequence[str], *, degrees: bool, with_frames: bool, json: bool) -> None:
-    """Print the tool's pose."""
+@app.command(context_settings={"ignore_unknown_options": True})
+def fk(
+    robot: Robot,
+    q: Annotated[list[str], typer.Argument(help="Joint values, or the name of a configuration such as ready.")],
+    degrees: Degrees = False,
+    frames: Annotated[bool, typer.Option("--frames", help="All DH frames too.")] = False,
+    json: Json = False,
+) -> None:
+    """Print the tool's pose at joint values."""
+    arm = Arm.load(robot)
     values = joint_values(arm, q, degrees)
-    T, frames = arm.fk(values), arm.frames(values)
+    T, link_frames = arm.fk(values), arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
         pose = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
         given = joint_entry(arm, "q", values, degrees=degrees)
-        print_json(given | pose | ({"frames": frames.tolist()} if with_frames else {}))
+        print_json(given | pose | ({"frames": link_frames.tolist()} if frames else {}))
         return
-    named = [(f"frame {i}", frame) for i, frame in enumerate(frames)] if with_frames else []
+    named = [(f"frame {i}", frame) for i, frame in enumerate(link_frames)] if frames else []
     unit = "°" if degrees else "rad"
     rows = []
     for name, frame in [*named, ("tool", T)]:

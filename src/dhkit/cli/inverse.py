@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from dhkit.arm import Arm
+from dhkit.cli.arguments import OutsideLimits, option_values, target, with_long_options
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Degrees, Json, Robot
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
@@ -25,6 +28,8 @@ FLAG_DESCRIPTIONS = {
     IKFlag.clamped: "on the boundary",
 }
 NEAREST_MARK = "→"
+
+app = typer.Typer(rich_markup_mode=None)
 
 
 class Method(StrEnum):
@@ -99,19 +104,27 @@ class ReachedPose:
         return f"out of reach by {distance:.4g} m"
 
 
-def run(
-    arm: Arm,
-    T: Array,
-    *,
-    near: Array | None,
-    order: str,
-    degrees: bool,
-    limits: bool,
-    numeric: bool,
-    json: bool,
+@app.command(cls=with_long_options({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
+def ik(
+    robot: Robot,
+    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
+    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    matrix: Annotated[
+        str | None, typer.Option(metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them.")
+    ] = None,
+    like: Annotated[str | None, typer.Option(metavar="Q ...", help="Where these joint values put the tool.")] = None,
+    near: Annotated[str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these values.")] = None,
+    degrees: Degrees = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Only branches inside the joint limits.")] = False,
+    numeric: Annotated[bool, typer.Option("--numeric", help="One solution, by iteration, for any arm.")] = False,
+    json: Json = False,
 ) -> ExitStatus:
     """Print all solutions of fk(q) = T; the status is NO if there is none."""
-    solutions, method, note = _solve(arm, T, near, limits=limits, numeric=numeric)
+    arm = Arm.load(robot)
+    T = target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees)
+    near_q = None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)
+    solutions, method, note = _solve(arm, T, near_q, limits=limits, numeric=numeric)
     shown = solutions.allowed if limits else solutions.valid
     reached = ReachedPose(
         arm=arm,
@@ -119,9 +132,9 @@ def run(
         solutions=solutions,
         method=method,
         note=note,
-        q=_with_whole_turns(solutions, near),
+        q=_with_whole_turns(solutions, near_q),
         shown=tuple(int(k) for k in np.flatnonzero(shown)),
-        near=near,
+        near=near_q,
         order=order,
         degrees=degrees,
     )

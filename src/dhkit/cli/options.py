@@ -29,6 +29,9 @@ Degrees = Annotated[bool, degrees_option("Angles in and out are in degrees.")]
 Uniform = Annotated[
     bool, typer.Option("--uniform-links", help="Thin uniform rods of 1 kg each for links, in place of their bodies.")
 ]
+Columns = Annotated[
+    str | None, typer.Option("--columns", metavar="OURS=THEIRS ...", help='Of such a file: "t=tout q=yout".')
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 

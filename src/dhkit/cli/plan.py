@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from dhkit.arm import Arm
+from dhkit.cli.arguments import (
+    joint_limits,
+    objective as parse_objective,
+    obstacles,
+    option_values,
+    payload as parse_payload,
+    target,
+    with_long_options,
+)
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Degrees, Json, Robot, Uniform, load_arm
 from dhkit.cli.output import MotionFiles, print_json, print_table, say, say_written
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
-from dhkit.planning import Floor, Objective, Obstacle, Payload, PlanReport, Progress, ToolSpeed
+from dhkit.planning import PlanReport, Progress, ToolSpeed
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES
@@ -27,52 +38,100 @@ SAMPLES = 801
 MIN_ACTIVE_SHARE = 0.005
 """Smallest share of the time for which an active limit is printed."""
 SUFFIXES = (*ARCHIVES, *TABLES)
+LONG_OPTIONS: dict[str, int | None] = {
+    **dict.fromkeys(("--from", "--to", "--via", "--matrix", "--like", "--objective", "--payload", "--box", "--sphere")),
+    **dict.fromkeys(("--velocity", "--acceleration", "--jerk", "--torque")),
+    "--xyz": 3,
+    "--euler": 3,
+    "--floor": 1,
+}
+"""Options that take several words; the count of values where it is fixed."""
+
+app = typer.Typer(rich_markup_mode=None)
 
 
-@dataclass(frozen=True, eq=False)
-class PlanSettings:
-    """The motion that is asked for, as :meth:`dhkit.Arm.plan` takes it."""
-
-    arm: Arm
-    start: Array
-    """Joint values, shape (n,), rad and m."""
-    goal: Array
-    """Joint values, shape (n,), rad and m, or a pose of the tool, shape (4, 4), m, world."""
-    via: Sequence[Array]
-    objective: Objective
-    duration: float | None
-    limits: Limits
-    payload: Payload | None
-    tool_speed: float | None
-    """Largest speed of the tool, m/s."""
-    obstacles: Sequence[Obstacle | Floor]
-    clearance: float
-    """Smallest distance from obstacles, m."""
-    self_collision: bool
-    intervals: int | None
-    time_limit: float
-    """Longest search, s."""
-    line: bool
-    """Whether the tool moves along a straight line."""
-
-    @property
-    def common_options(self) -> dict[str, Any]:
-        """The options of both kinds of motions, between configurations and along a path."""
-        options = {
-            "objective": self.objective,
-            "constraints": () if self.tool_speed is None else (ToolSpeed(self.tool_speed),),
-            "duration": self.duration,
-            "limits": self.limits,
-            "time_limit": self.time_limit,
-        }
-        return options if self.intervals is None else {**options, "intervals": self.intervals}
-
-
-def run(settings: PlanSettings, files: MotionFiles, *, degrees: bool, json: bool) -> ExitStatus:
-    """Plan a motion, print its report and write its files; the status is NO if there is no such motion.
-
-    Angles are printed in degrees if ``degrees``, else in rad.
-    """
+@app.command(cls=with_long_options(LONG_OPTIONS))
+def plan(
+    robot: Robot,
+    start: Annotated[
+        str, typer.Option("--from", metavar="Q ...", help="Joint values, or the name of a configuration.")
+    ] = "ready",
+    to: Annotated[str | None, typer.Option(metavar="Q ...", help="The same at the goal.")] = None,
+    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Or the tool's position there, m.")] = None,
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
+    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    matrix: Annotated[
+        str | None, typer.Option(metavar="M11 ... M44", help="Or the pose by row, 16 or 12 numbers; or a file of them.")
+    ] = None,
+    like: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Or where these joint values put the tool, by any branch.")
+    ] = None,
+    via: Annotated[
+        list[str] | None, typer.Option(metavar="Q ...", help="Pass here on the way; may be given again.")
+    ] = None,
+    wanted: Annotated[
+        str, typer.Option("--objective", help='time, effort, energy, jerk, or a sum: "time + 1e-4 effort".')
+    ] = "time",
+    duration: Annotated[float | None, typer.Option(help="s; for objectives without time.")] = None,
+    speed: Annotated[float, typer.Option(min=0.001, max=1, help="Share of the joints' speeds that may be used.")] = 1.0,
+    velocity: Annotated[
+        str | None, typer.Option(metavar="V ...", help="Limit in place of the robot's, for all joints or each; rad/s.")
+    ] = None,
+    acceleration: Annotated[str | None, typer.Option(metavar="A ...", help="Likewise; rad/s^2.")] = None,
+    jerk: Annotated[str | None, typer.Option(metavar="J ...", help="Likewise; rad/s^3.")] = None,
+    torque: Annotated[str | None, typer.Option(metavar="T ...", help="Likewise; N m.")] = None,
+    load: Annotated[
+        str | None,
+        typer.Option("--payload", metavar="KG [@ X Y Z]", help="Load, its centre of mass in the tool's frame, m."),
+    ] = None,
+    tool_speed: Annotated[float | None, typer.Option(help="Limit of the tool's speed, m/s.")] = None,
+    box: Annotated[
+        list[str] | None, typer.Option(metavar="SX SY SZ @ X Y Z", help="Keep away from it; edges and centre, m.")
+    ] = None,
+    sphere: Annotated[
+        list[str] | None, typer.Option(metavar="R @ X Y Z", help="Keep away from it; radius and centre, m.")
+    ] = None,
+    floor: Annotated[str | None, typer.Option(metavar="Z", help="Stay above this height, m.")] = None,
+    clearance: Annotated[float, typer.Option(min=0, help="How far to keep away, m.")] = 0.01,
+    self_collision: Annotated[bool, typer.Option("--self-collision", help="Keep links from each other too.")] = False,
+    line: Annotated[bool, typer.Option("--line", help="The tool goes straight.")] = False,
+    intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Of the mesh.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0.01, help="To search, s.")] = 30.0,
+    degrees: Degrees = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
+    json: Json = False,
+) -> ExitStatus:
+    """Plan a motion, print its report and write its files; the status is NO if there is no such motion."""
+    arm = load_arm(robot, uniform)
+    pose = {"xyz": xyz, "matrix": matrix, "like": like}
+    if sum(given is not None for given in (to, *pose.values())) != 1:
+        raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
+    begin_q = option_values(arm, start, "--from", degrees)
+    if to is None:
+        goal = target(arm, **pose, euler=euler, order=order, degrees=degrees)
+    else:
+        goal = option_values(arm, to, "--to", degrees)
+    between: dict[str, Any] = {"via": [option_values(arm, place, "--via", degrees) for place in via or ()]}
+    given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "torque": torque}
+    limits, sought = joint_limits(arm, given, degrees, speed), parse_objective(wanted)
+    options: dict[str, Any] = {
+        "objective": sought,
+        "constraints": () if tool_speed is None else (ToolSpeed(tool_speed),),
+        "duration": duration,
+        "limits": limits,
+        "payload": parse_payload(load),
+        "time_limit": time_limit,
+    }
+    if intervals is not None:
+        options["intervals"] = intervals
+    scene = obstacles(box or (), sphere or (), floor)
+    between |= {"obstacles": scene, "clearance": clearance, "self_collision": self_collision}
+    files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
     try:
         with ProgressBar("making the program") as bar:
@@ -80,44 +139,48 @@ def run(settings: PlanSettings, files: MotionFiles, *, degrees: bool, json: bool
 
             def report(now: Progress) -> None:
                 state = f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
-                limit = settings.time_limit
-                bar.show(time.monotonic() - begin, limit, f"{state}, of {limit:g} s to search")
+                bar.show(time.monotonic() - begin, time_limit, f"{state}, of {time_limit:g} s to search")
 
-            motion = _plan_along_line(settings, report) if settings.line else _plan(settings, report)
+            if line:
+                motion = _plan_along_line(arm, begin_q, goal, between, progress=report, **options)
+            else:
+                motion = arm.plan(begin_q, goal, progress=report, **between, **options)
     except PlanningError as error:
         if json:
-            print_json({"robot": settings.arm.name, "found": False, "reason": str(error), "files": []})
+            print_json({"robot": arm.name, "found": False, "reason": str(error), "files": []})
         else:
             sys.stderr.write(f"dhkit: {' '.join(str(error).split())}\n")
         return ExitStatus.NO
     if not json:
-        _print(settings, motion, degrees=degrees)
+        _print(arm, motion, limits, line=line, only_time=sought.only_time, degrees=degrees)
     caption = f"A planned motion of {motion.duration:.4g} s; its curves are under Motions, with the limits."
-    written = files.write(settings.arm, motion, "planned", caption, settings.obstacles)
+    written = files.write(arm, motion, "planned", caption, scene)
     if json:
-        print_json(_facts(settings, motion, degrees=degrees) | {"files": written})
+        ends = joint_entry(arm, "start", motion.q(0.0), degrees=degrees)
+        ends |= joint_entry(arm, "goal", motion.q(motion.duration), degrees=degrees)
+        facts = {"robot": arm.name, "found": True, "line": line, **ends, **motion.report.as_dict()}
+        print_json(facts | {"files": written})
     elif written:
         say("")
         say_written(written)
     return ExitStatus.FINE
 
 
-def _plan(settings: PlanSettings, report: Callable[[Progress], None]) -> Trajectory:
-    return settings.arm.plan(
-        settings.start,
-        settings.goal,
-        via=settings.via,
-        payload=settings.payload,
-        obstacles=settings.obstacles,
-        clearance=settings.clearance,
-        self_collision=settings.self_collision,
-        progress=report,
-        **settings.common_options,
-    )
-
-
-def _plan_along_line(settings: PlanSettings, report: Callable[[Progress], None]) -> Trajectory:
+def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, Any], **options: Any) -> Trajectory:
     """Return the best motion with the tool on a straight line.
+
+    Parameters
+    ----------
+    arm
+        The arm.
+    start
+        Joint values, shape (n,), rad and m.
+    goal
+        Joint values, shape (n,), rad and m, or a pose of the tool, shape (4, 4), m, world.
+    between
+        Options of motions between configurations, which must not be given.
+    **options
+        Options of :meth:`dhkit.Arm.plan_path`.
 
     Raises
     ------
@@ -126,23 +189,22 @@ def _plan_along_line(settings: PlanSettings, report: Callable[[Progress], None])
     PlanningError
         There is no such motion.
     """
-    refused = {"--via": settings.via, "obstacles": settings.obstacles, "--self-collision": settings.self_collision}
-    if found := next((name for name, given in refused.items() if given), None):
+    refused = {"via": "--via", "obstacles": "obstacles", "self_collision": "--self-collision"}
+    if found := next((name for key, name in refused.items() if between[key]), None):
         raise DescriptionError(f"--line: found {found} too; expected a motion straight from start to goal, without")
-    arm = settings.arm
-    T_goal = settings.goal if settings.goal.shape == (4, 4) else arm.fk(settings.goal)
-    path = joint_path(arm.description, tool_line(arm.fk(settings.start), T_goal), settings.start, settings.limits)
-    return arm.plan_path(path, progress=report, payload=settings.payload, **settings.common_options)
+    T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
+    path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])
+    return arm.plan_path(path, **options)
 
 
-def _print(settings: PlanSettings, motion: Trajectory, *, degrees: bool) -> None:
+def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_time: bool, degrees: bool) -> None:
     report: PlanReport = motion.report
     certificate = report.certificate
-    along = ", the tool along a straight line" if settings.line else ""
-    say(f"{settings.arm.name}: least {report.objective}{along}", "bold")
-    cost = "" if settings.objective.only_time else f", {report.objective} = {report.cost:.6g}"
+    along = ", the tool along a straight line" if line else ""
+    say(f"{arm.name}: least {report.objective}{along}", "bold")
+    cost = "" if only_time else f", {report.objective} = {report.cost:.6g}"
     say(f"{report.duration:.4f} s{cost}\n")
-    _print_joints(settings, motion, degrees)
+    _print_joints(arm, motion, limits, degrees)
     worst = certificate.worst
     verdict = "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
     active = [(name, share) for name, share in report.active_limits() if share >= MIN_ACTIVE_SHARE]
@@ -182,16 +244,16 @@ def _print(settings: PlanSettings, motion: Trajectory, *, degrees: bool) -> None
         print_table(("", "branch of the goal", "[s]", ""), branches)
 
 
-def _print_joints(settings: PlanSettings, motion: Trajectory, degrees: bool) -> None:
+def _print_joints(arm: Arm, motion: Trajectory, limits: Limits, degrees: bool) -> None:
     """Print the values of each joint at both ends, and its largest rate and torque as shares of their limits."""
-    numbers = settings.arm.description.numbers
+    numbers = arm.description.numbers
     samples = motion.sample(n=SAMPLES)
-    shares = [_shares(samples.qd, settings.limits.velocity)]
+    shares = [_shares(samples.qd, limits.velocity)]
     if np.isfinite(numbers.mass).all():
-        shares.append(_shares(samples.tau, settings.limits.torque))
+        shares.append(_shares(samples.tau, limits.torque))
     scale = np.where(numbers.prismatic | (not degrees), 1.0, 180 / np.pi)
     rows = []
-    for i, joint in enumerate(settings.arm.description.joints):
+    for i, joint in enumerate(arm.description.joints):
         unit = "m" if numbers.prismatic[i] else "°" if degrees else "rad"
         ends = [f"{round(float(scale[i] * q[i]), 4) + 0.0:.4f}" for q in (samples.q[0], samples.q[-1])]
         rows.append((joint.name, *ends, unit, *(column[i] for column in shares)))
@@ -202,9 +264,3 @@ def _print_joints(settings: PlanSettings, motion: Trajectory, degrees: bool) -> 
 def _shares(values: Array, limits: Array) -> list[str]:
     shares = np.abs(values).max(axis=0) / limits
     return [f"{100 * x:.0f}" if limit < np.inf else "no limit" for x, limit in zip(shares, limits, strict=True)]
-
-
-def _facts(settings: PlanSettings, motion: Trajectory, *, degrees: bool) -> dict[str, Any]:
-    ends = joint_entry(settings.arm, "start", motion.q(0.0), degrees=degrees)
-    ends |= joint_entry(settings.arm, "goal", motion.q(motion.duration), degrees=degrees)
-    return {"robot": settings.arm.name, "found": True, "line": settings.line, **ends, **motion.report.as_dict()}

@@ -5,12 +5,16 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
+from dhkit.cli.arguments import payload, with_long_options
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import Columns, Degrees, Json, Robot, Uniform, load_arm
 from dhkit.cli.output import (
     FIGURES,
     MotionFiles,
@@ -22,28 +26,113 @@ from dhkit.cli.output import (
     write_figure,
 )
 from dhkit.cli.progress import ProgressBar
-from dhkit.cli.simulation_settings import SimulationSettings
+from dhkit.cli.simulation_settings import chosen_motion, known_and_moving_arm, plant_options, tuned_controller
 from dhkit.cli.units import joint_entry
-from dhkit.control import Comparison, Plant, SimulationResult, compare
+from dhkit.control import CONTROLLERS, Plant, Sensors, SimulationResult, compare as compare_controllers
 from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
+from dhkit.trajectories import Trajectory
 
 MAX_ENERGY_ERROR = 1e-6
 """Largest share of the energy that is turned over which may be without account; above it the steps are too long."""
 SUFFIXES = (".npz", ".mat", ".csv")
 
+app = typer.Typer(rich_markup_mode=None)
 
-def run(settings: SimulationSettings, files: MotionFiles, *, degrees: bool, json: bool) -> ExitStatus:
+LONG_OPTIONS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
+Motion = Annotated[
+    Path | None, typer.Option("--motion", help="Follow it: .npz, .mat, .csv or .yaml of dhkit or from elsewhere.")
+]
+Start = Annotated[
+    str | None, typer.Option("--from", metavar="Q ...", help="Or go from here, joint values or a configuration's name,")
+]
+Goal = Annotated[str | None, typer.Option("--to", metavar="Q ...", help="to here.")]
+Duration = Annotated[float | None, typer.Option(help="s, of a motion between configurations.")]
+Bandwidth = Annotated[float, typer.Option(help="Of the controller, rad/s.")]
+Damping = Annotated[float, typer.Option(help="Of the controller.")]
+Rate = Annotated[float, typer.Option(help="Calls of the controller, Hz.")]
+PlantRate = Annotated[float | None, typer.Option(help="Steps of the integration, Hz; those of the controller.")]
+Load = Annotated[
+    str | None,
+    typer.Option(
+        "--payload",
+        metavar="KG [@ X Y Z]",
+        help="What it carries, centre of mass in the tool's frame, m; what the motion was planned with unless given.",
+    ),
+]
+Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller does not know of the payload.")]
+FrictionOption = Annotated[
+    str,
+    typer.Option("--friction", metavar="none|stiction|WIDTH", help="Of the joints; WIDTH of smooth one, rad/s."),
+]
+Restitution = Annotated[float, typer.Option(help="Of the joint stops, 0 to 1.")]
+NoStops = Annotated[bool, typer.Option("--no-stops", help="Joints pass their limits.")]
+PushOption = Annotated[
+    list[str] | None,
+    typer.Option("--push", metavar="FX FY FZ @ BEGIN END", help="A force on the tool, N, world axes, over a time, s."),
+]
+
+
+@app.command(cls=with_long_options(LONG_OPTIONS))
+def simulate(
+    robot: Robot,
+    controller: Annotated[
+        str,
+        typer.Option(
+            help="pd, pid, pd-gravity, feed-forward, computed-torque, operational-space, adaptive, lqr, none."
+        ),
+    ] = "computed-torque",
+    motion: Motion = None,
+    columns: Columns = None,
+    start: Start = None,
+    to: Goal = None,
+    duration: Duration = None,
+    bandwidth: Bandwidth = 20.0,
+    damping: Damping = 1.0,
+    rate: Rate = 1000.0,
+    plant_rate: PlantRate = None,
+    continuous: Annotated[bool, typer.Option("--continuous", help="A controller in continuous time.")] = False,
+    load: Load = None,
+    unmodelled: Unmodelled = False,
+    friction: FrictionOption = "none",
+    compensate: Annotated[bool, typer.Option("--compensate", help="The controller compensates friction.")] = False,
+    restitution: Restitution = 0.0,
+    no_stops: NoStops = False,
+    push: PushOption = None,
+    noise: Annotated[
+        float, typer.Option(min=0, help="Standard deviation of measured joint values; rad, with --degrees too, and m.")
+    ] = 0.0,
+    resolution: Annotated[
+        float, typer.Option(min=0, help="Of the encoders, on the joints' side; rad, with --degrees too, and m.")
+    ] = 0.0,
+    degrees: Degrees = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
+    json: Json = False,
+) -> ExitStatus:
     """Simulate, print the errors and write files; the status is NO if the run did not get to its end."""
+    bare = load_arm(robot, uniform)
+    sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
+    trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
+    options = plant_options(plant_rate, friction, restitution, no_stops, push or ())
+    files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
-    name = settings.controllers[0]
-    controller = settings.controller(name)
+    tuned = tuned_controller(controller, arm, trajectory, bandwidth, damping, compensate)
     begin = time.perf_counter()
     failure, result = "", None
     try:
         with ProgressBar("simulating") as bar:
-            result = settings.arm.simulate(
-                controller, settings.motion, plant=settings.plant, progress=bar.show, **settings.options
+            result = arm.simulate(
+                tuned,
+                trajectory,
+                plant=plant,
+                rate=None if continuous else rate,
+                sensors=sensors,
+                progress=bar.show,
+                **options,
             )
     except SimulationError as error:
         failure, result = str(error), error.result
@@ -54,15 +143,16 @@ def run(settings: SimulationSettings, files: MotionFiles, *, degrees: bool, json
             f"A simulation of {result.t[-1]:.3g} s; the grey arm is what was asked for, and the tool is "
             f"{1000 * result.tool_norms.peak:.3g} mm away from it at most."
         )
-        written = files.write(settings.arm, result, "simulation", caption)
+        written = files.write(arm, result, "simulation", caption)
     if json:
-        facts = {} if result is None else facts_of(settings.arm, result, degrees=degrees)
-        print_json(
-            {"robot": settings.arm.name, "controller": name, "failure": failure or None, **facts, "files": written}
-        )
+        facts = {} if result is None else _facts(arm, result, degrees=degrees)
+        head = {"robot": arm.name, "controller": controller, "failure": failure or None}
+        print_json({**head, **facts, "files": written})
     else:
         if result is not None:
-            _print(settings, name, result, seconds, degrees=degrees)
+            say(f"{arm.name}: {controller}, {'continuous' if continuous else f'{rate:g} Hz'}", "bold")
+            say(f"{_about(text, trajectory, arm, plant)}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
+            _print(result, degrees=degrees)
         if written:
             say("")
             say_written(written)
@@ -71,10 +161,14 @@ def run(settings: SimulationSettings, files: MotionFiles, *, degrees: bool, json
     return ExitStatus.NO if failure else ExitStatus.FINE
 
 
-def _print(settings: SimulationSettings, name: str, result: SimulationResult, seconds: float, *, degrees: bool) -> None:
+def _about(text: str, motion: Trajectory, arm: Arm, plant: Arm) -> str:
+    """Return the description of a motion with its duration, and of a payload of the plant that the arm lacks."""
+    load = "" if plant is arm else ", with a payload that the controller does not know of"
+    return f"{text}, {motion.duration:.4g} s{load}"
+
+
+def _print(result: SimulationResult, *, degrees: bool) -> None:
     description = result.description
-    say(f"{settings.arm.name}: {name}, {settings.rate}", "bold")
-    say(f"{settings.about}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
     unit = _units(description.numbers.prismatic, degrees)
     torque = np.abs(result.tau).max(axis=0)
     norms = (result.peak_error, result.rms_error, result.final_error)
@@ -111,7 +205,7 @@ def _units(prismatic: NDArray[np.bool_], degrees: bool) -> list[tuple[str, float
     return [("m", 1.0) if slides else angle_unit for slides in prismatic.tolist()]
 
 
-def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, object]:
+def _facts(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, object]:
     """Return the numbers of a run that `--json` prints."""
     tool = result.tool_norms
     return {
@@ -126,48 +220,68 @@ def facts_of(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, 
     }
 
 
-def run_comparison(settings: SimulationSettings, figure: Path | None, *, degrees: bool, json: bool) -> ExitStatus:
+@app.command(cls=with_long_options(LONG_OPTIONS))
+def compare(
+    robot: Robot,
+    controllers: Annotated[str, typer.Option(help="Which, separated by commas; all unless given.")] = "",
+    motion: Motion = None,
+    columns: Columns = None,
+    start: Start = None,
+    to: Goal = None,
+    duration: Duration = None,
+    bandwidth: Bandwidth = 20.0,
+    damping: Damping = 1.0,
+    rate: Rate = 1000.0,
+    plant_rate: PlantRate = None,
+    load: Load = None,
+    unmodelled: Unmodelled = False,
+    friction: FrictionOption = "none",
+    restitution: Restitution = 0.0,
+    no_stops: NoStops = False,
+    push: PushOption = None,
+    degrees: Degrees = False,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure: .png, .svg or .pdf.")] = None,
+    uniform: Uniform = False,
+    json: Json = False,
+) -> ExitStatus:
     """Compare controllers on one motion, print a table and write a figure; the status is NO if one failed."""
+    bare = load_arm(robot, uniform)
+    trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
+    arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
+    options = plant_options(plant_rate, friction, restitution, no_stops, push or ())
+    about = f"{_about(text, trajectory, arm, plant)}, {rate:g} Hz"
     check_outputs(((figure, FIGURES),))
-    options = dict(settings.options)
-    plant = Plant(
-        settings.plant.description,
-        Friction.chosen(options.pop("friction")),
-        options.pop("restitution"),
-        tuple(options.pop("pushes")),
-    )
-    names = list(settings.controllers)
+    names = [name.strip() for name in controllers.split(",")] if controllers else list(CONTROLLERS)
     with ProgressBar(f"simulating {names[0]}") as bar:
-        comparison = compare(
-            settings.arm.description,
-            settings.motion,
+        comparison = compare_controllers(
+            arm.description,
+            trajectory,
             names,
-            settings.bandwidth,
-            settings.damping,
+            bandwidth,
+            damping,
             lambda name: bar.show(names.index(name) + 1, len(names), f"simulated {name}"),
-            plant=plant,
-            **options,
+            plant=Plant(
+                plant.description,
+                Friction.chosen(options["friction"]),
+                options["restitution"],
+                tuple(options["pushes"]),
+            ),
+            rate=rate,
+            plant_rate=plant_rate,
         )
     if figure is not None and comparison.results:
         from dhkit.viewer import plot_comparison
 
-        write_figure(
-            plot_comparison(comparison.results, f"{settings.arm.name}: {settings.about}, {settings.rate}"), figure
-        )
+        write_figure(plot_comparison(comparison.results, f"{arm.name}: {about}"), figure)
     if json:
-        facts = {name: facts_of(settings.arm, result, degrees=degrees) for name, result in comparison.results.items()}
-        print_json({"robot": settings.arm.name, "controllers": facts, "failures": dict(comparison.failures)})
+        facts = {name: _facts(arm, result, degrees=degrees) for name, result in comparison.results.items()}
+        print_json({"robot": arm.name, "controllers": facts, "failures": dict(comparison.failures)})
     else:
-        _print_comparison(settings, comparison, degrees=degrees)
+        say(f"{arm.name}: {about}, {bandwidth:g} rad/s\n", "bold")
+        headings, rows = comparison.rows(degrees=degrees)
+        print_table(headings, rows)
+        for name, reason in comparison.failures.items():
+            say(f"\n{name}: {reason}")
         if figure is not None and comparison.results:
             say(f"\nwrote {figure}")
     return ExitStatus.NO if comparison.failures else ExitStatus.FINE
-
-
-def _print_comparison(settings: SimulationSettings, comparison: Comparison, *, degrees: bool) -> None:
-    say(f"{settings.arm.name}: {settings.about}, {settings.rate}, {settings.bandwidth:g} rad/s", "bold")
-    say("")
-    headings, rows = comparison.rows(degrees=degrees)
-    print_table(headings, rows)
-    for name, reason in comparison.failures.items():
-        say(f"\n{name}: {reason}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,63 +24,24 @@ MIN_DURATION = 2.0
 """Shortest default duration of a motion, s; longer motions take twice their least time."""
 
 
-@dataclass(frozen=True, eq=False)
-class SimulationSettings:
-    """A simulation that is asked for.
+def tuned_controller(
+    name: str, arm: Arm, motion: Trajectory, bandwidth: float, damping: float, compensate: bool
+) -> Controller | None:
+    """Return a controller by name, tuned for a bandwidth, rad/s, and a damping ratio; None for no controller.
 
-    Attributes
-    ----------
-    arm, plant
-        The arm that the controller knows, and the arm that is simulated.
-    motion, motion_text
-        The motion that is followed, and its description.
-    controllers
-        Names of the controllers.
-    bandwidth, damping
-        Bandwidth, rad/s, and damping ratio that the controllers' gains are tuned for.
-    options
-        Options of :meth:`dhkit.Arm.simulate`.
-    compensate
-        Whether the controller compensates friction.
+    With ``compensate`` it compensates friction.
+
+    Raises
+    ------
+    ValueError
+        There is no such controller.
     """
-
-    arm: Arm
-    plant: Arm
-    motion: Trajectory
-    motion_text: str
-    controllers: Sequence[str]
-    bandwidth: float
-    damping: float
-    options: dict[str, Any]
-    compensate: bool = False
-
-    def controller(self, name: str) -> Controller | None:
-        """Return a tuned controller by name; None for no controller.
-
-        Raises
-        ------
-        ValueError
-            There is no such controller.
-        """
-        if name == NO_CONTROLLER:
-            return None
-        if name not in CONTROLLERS:
-            raise ValueError(f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NO_CONTROLLER}")
-        q = self.motion.q(self.motion.duration / 2)
-        controller = make_controller(name, self.arm.description, self.bandwidth, self.damping, q)
-        return FrictionCompensation(controller, self.arm) if self.compensate else controller
-
-    @property
-    def about(self) -> str:
-        """Description of the motion and of the plant's payload."""
-        load = "" if self.plant is self.arm else ", with a payload that the controller does not know of"
-        return f"{self.motion_text}, {self.motion.duration:.4g} s{load}"
-
-    @property
-    def rate(self) -> str:
-        """Description of the rate of the controller's calls."""
-        rate = self.options["rate"]
-        return "continuous" if rate is None else f"{rate:g} Hz"
+    if name == NO_CONTROLLER:
+        return None
+    if name not in CONTROLLERS:
+        raise ValueError(f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NO_CONTROLLER}")
+    controller = make_controller(name, arm.description, bandwidth, damping, motion.q(motion.duration / 2))
+    return FrictionCompensation(controller, arm) if compensate else controller
 
 
 def chosen_motion(

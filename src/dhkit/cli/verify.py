@@ -5,30 +5,36 @@ from __future__ import annotations
 import json as jsons
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
+from dhkit.cli.options import Json, Robot, Uniform, load_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
-from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check, protect_from_children
+from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check as score, protect_from_children
 from dhkit.verification import VerificationReport, verify_urdf
 
+app = typer.Typer(rich_markup_mode=None)
 
-def run(
-    arm: Arm,
-    samples: int,
-    seed: int,
-    *,
-    urdf: str | None,
-    base: str | None,
-    tip: str | None,
-    tolerance: float,
-    output: Path | None,
-    json: bool,
+
+@app.command()
+def verify(
+    robot: Robot,
+    samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    urdf: Annotated[str | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
+    base: Annotated[str | None, typer.Option(help="Its link that is the world; the root.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the end of the only chain.")] = None,
+    tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
+    uniform: Uniform = False,
+    json: Json = False,
 ) -> ExitStatus:
     """Verify, print the report and perhaps write it; the status is NO if something disagrees.
 
@@ -39,6 +45,7 @@ def run(
     """
     if output is not None and output.suffix not in (".md", ".tex", ".json"):
         raise DescriptionError(f"{output}: expected a report that ends in .md, .tex or .json")
+    arm = load_arm(robot, uniform)
     if urdf is None:
         report = arm.verify(samples, seed)
     else:
@@ -61,28 +68,38 @@ def _report_text(report: VerificationReport, suffix: str) -> str:
     return report.markdown() if suffix == ".md" else report.latex()
 
 
-def check_program(
-    arm: Arm,
-    source: Path | Sequence[str],
-    rubric: Path | None = None,
-    seed: int | None = None,
-    samples: int = 200,
-    sandbox: str | None = None,
-    seconds: float = 5.0,
-    json: bool = False,
+@app.command()
+def check(
+    robot: Robot,
+    program: Annotated[
+        list[str],
+        typer.Argument(help="A file (.py, .m) that defines fk, ik or controller; with --run a program, its arguments."),
+    ],
+    run: Annotated[
+        bool, typer.Option("--run", help="Execute PROGRAM, which speaks the protocol of docs/own-code.md.")
+    ] = False,
+    rubric: Annotated[Path | None, typer.Option(help="What each part is worth (.toml).")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
+    samples: Annotated[int, typer.Option(min=1, max=100_000, help="Random states.")] = 200,
+    seconds: Annotated[float, typer.Option(min=0.01, max=3600, help="The longest that a call may take.")] = 5.0,
+    sandbox: Annotated[str | None, typer.Option(help="bwrap: in bubblewrap, for strangers' files.")] = None,
+    json: Json = False,
 ) -> ExitStatus:
     """Check a program and print its score; the status is NO below full marks, UNUSABLE if it cannot be loaded."""
+    if not run and len(program) != 1:
+        raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
+    arm, source = Arm.load(robot), program if run else Path(program[0])
     protect_from_children()
     points = None if rubric is None else CheckRubric.read(rubric)
-    with Program(source, Limits(seconds=seconds), sandbox) as program:
+    with Program(source, Limits(seconds=seconds), sandbox) as loaded:
         try:
-            report = check(arm, program, points, seed, samples)
+            report = score(arm, loaded, points, seed, samples)
         except ProgramError as error:
-            output = program.output.strip()
+            output = loaded.output.strip()
             if json:
                 print_json({"error": str(error), "line": error.line, "output": output[-2000:]})
             else:
-                line = str(error) if str(error).startswith(f"{source}") else f"{program.name}: {error}"
+                line = str(error) if str(error).startswith(f"{source}") else f"{loaded.name}: {error}"
                 sys.stderr.write(f"dhkit: {line}{os.linesep}")
             return ExitStatus.UNUSABLE
     if json:

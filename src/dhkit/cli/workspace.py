@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
+from dhkit.cli.options import Json, Robot
 from dhkit.cli.output import output_folder, print_json, print_table, say, say_written, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
@@ -21,11 +23,21 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 MAX_POINTS = 12_000
 """Most points on the page: more are slow without a graphics processor."""
 
+app = typer.Typer(rich_markup_mode=None)
 
-def run(arm: Arm, samples: int, seed: int, output: Path | None, *, json: bool) -> None:
+
+@app.command()
+def workspace(
+    robot: Robot,
+    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many random states.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
+    json: Json = False,
+) -> None:
     """Sample an arm's workspace, print its numbers, and write a figure and a page into a folder."""
     from dhkit.viewer import plot
 
+    arm = Arm.load(robot)
     folder = output_folder(output, arm.name)
     with ProgressBar("sampling") as bar:
         space = sample(arm.description, samples, seed, progress=bar.show)

@@ -3,6 +3,7 @@
 import ast
 
 import pytest
+import sympy
 
 from dhkit import Arm
 from dhkit.errors import AnswerError
@@ -12,6 +13,8 @@ from dhkit.grading.answers.computer_algebra import from_mathematica, is_mathemat
 from dhkit.grading.answers.derivatives import node_count, time_derivative
 from dhkit.grading.answers.documents.latex_rows import matrix_rows, rows_of
 from dhkit.grading.answers.documents.latex_source import document_statements
+from dhkit.grading.answers.given import given_quantity, vocabulary_of, with_entries_gathered
+from dhkit.grading.answers.pretty import in_one_line, is_pretty
 from dhkit.grading.answers.programs.bindings import Formula, Read, join_formulas
 from dhkit.grading.answers.programs.matlab_formulas import MatlabFormulas
 from dhkit.grading.answers.programs.matlab_statements import matlab_statements
@@ -20,6 +23,7 @@ from dhkit.grading.answers.programs.python_effects import bound_names, part_name
 from dhkit.grading.answers.programs.python_formulas import PythonFormulas
 from dhkit.grading.answers.programs.python_text import PythonText, ascii_name
 from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.sheet import AnswerSheet
 from dhkit.grading.answers.tokens import replace_runs, split_tokens
 
 
@@ -124,6 +128,59 @@ def test_mathematica_becomes_plain_text():
     assert is_mathematica(text)
     plain = from_mathematica(split_tokens(text, list(range(len(text))), text), text)
     assert "".join(t.text for t in plain) == "ddt(q1)+atan2(y,x)"
+
+
+M1, L1, Q1 = sympy.symbols("m1 l1 q1")
+PRINTED = [
+    M1 * L1**2 / 3 + Q1,
+    (M1 + L1) ** 3 / (1 + Q1**2),
+    sympy.sin(Q1 + 1 / L1) * M1 / (L1 + 1 / Q1),
+    ((M1 + 1 / L1) ** 2 + Q1) / M1**10,
+]
+
+
+@pytest.mark.parametrize("formula", PRINTED, ids=str)
+def test_several_lines_that_sympy_prints_say_in_one_what_was_printed(formula):
+    printed = sympy.pretty(formula, use_unicode=True, wrap_line=False)
+    assert is_pretty(printed)
+    line = in_one_line(printed).translate({ord("₁"): "1", ord("⋅"): "*", ord("^"): "**"})
+    assert sympy.simplify(sympy.sympify(line) - formula) == 0
+
+
+def test_a_fraction_that_slipped_from_its_bar_is_refused():
+    with pytest.raises(AnswerError, match="a bar without a numerator or a denominator"):
+        in_one_line("m₁    \n   ───\n    2 ")
+
+
+PLANAR = Arm.load("planar2r").description
+
+
+def given_texts(name, shape, answers):
+    """Return the texts of a quantity's entries by their indices; None where one was not handed in."""
+    names = QuantityNames(PLANAR)
+    gathered = with_entries_gathered(answers, names)
+    given = given_quantity(name, gathered[name], shape, vocabulary_of(PLANAR, AnswerSheet(answers=answers)), names)
+    return {entry.index: None if entry.is_missing else entry.text for entry in given}
+
+
+def test_half_of_a_symmetric_matrix_is_enough_and_half_of_another_is_not():
+    texts = {"11": "m1*l1^2", "12": "m2*l1*l2", "22": "m2*l2^2"}
+    M = given_texts("M", (2, 2), {f"M{place}": text for place, text in texts.items()})
+    C = given_texts("C", (2, 2), {f"C{place}": text for place, text in texts.items()})
+    assert M == {(0, 0): "m1*l1^2", (0, 1): "m2*l1*l2", (1, 0): "m2*l1*l2", (1, 1): "m2*l2^2"}
+    assert C == M | {(1, 0): None}
+
+
+@pytest.mark.parametrize(
+    ("answers", "complaint"),
+    [
+        ({"g": ["0", "0"], "g1": "0"}, "g: given whole and entry by entry; expected one of them"),
+        ({"g1": "0", "g_1": "0"}, r"g_1: g\(1\) is given twice; expected each entry once"),
+    ],
+)
+def test_an_entry_that_is_given_twice_is_refused(answers, complaint):
+    with pytest.raises(AnswerError, match=complaint):
+        with_entries_gathered(answers, QuantityNames(PLANAR))
 
 
 def test_time_derivatives_count_their_nodes():

@@ -1,6 +1,6 @@
 """Every notation means what a person means by it; what is no mathematics is refused with its place.
 
-Modules: indices, objects, rewriting, tokens.
+Modules: indices, latex, objects, rewriting, tokens.
 """
 
 import contextlib

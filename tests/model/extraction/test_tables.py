@@ -1,4 +1,7 @@
-"""Tables found in URDFs: random tables come back, published ones are found, degenerate axes have tidy ones."""
+"""Tables found in URDFs: random tables come back, published ones are found, degenerate axes have tidy ones.
+
+Modules: axes, draft, ends, extraction, table.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from conftest import require
 from dhkit.description import library_robot, read_robot
@@ -13,6 +14,7 @@ from dhkit.symbolic.equations import equations_c, equations_matlab, equations_py
 from dhkit.symbolic.equations.programs import INPUTS, harmless, identifier
 from dhkit.symbolic.equations.python_code import FUNCTION_NAMES
 from dhkit.symbolic.exact.lagrangian import lagrangian
+from dhkit.symbolic.syntax import PYTHON
 
 TOLERANCE = 1e-12
 """Of the largest entry: code rounds in another order than the exact terms' sum."""
@@ -164,6 +166,11 @@ def test_parameters_can_be_changed(equations):
     heavier = dataclasses.replace(module["PARAMETERS"], m2=3.0)
     change = module["mass_matrix"](states["q"], heavier) - module["mass_matrix"](states["q"])
     assert np.allclose(change[:, 1, 1], 1.5 * 0.4**2 / 3)
+
+
+@given(st.floats())
+def test_a_number_in_python_is_read_as_the_same_double(value):
+    assert np.array_equal(eval(PYTHON.number(value)), value, equal_nan=True)
 
 
 def test_names_cannot_break_out():

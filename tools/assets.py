@@ -1,13 +1,11 @@
 """`make assets`: the library's URDFs in urdf/ and the PUMA's meshes in meshes/, generated and checked in."""
 
-from __future__ import annotations
-
 import logging
 from pathlib import Path
 
 from dhkit.description import library_robot, robots, write_atomically
-from dhkit.model.puma560_meshes import write_puma560_meshes
 from dhkit.model.urdf import urdf_text
+from tools.puma560_meshes import write_puma560_meshes
 
 log = logging.getLogger(__name__)
 

@@ -9,8 +9,6 @@ Solids are lofts of rounded outlines joined by manifold3d. Coordinates are round
 vertices and faces are sorted, so that every run gives the same bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -53,14 +51,6 @@ def puma560_meshes() -> dict[str, trimesh.Trimesh]:
     dict
         Watertight meshes, m, from link 0 to link 6: base, shoulder, upper_arm, forearm, wrist_roll, wrist_pitch,
         flange; each in the standard DH frame of its link. Vertices are sorted, the same on every run.
-
-    Examples
-    --------
-    >>> meshes = puma560_meshes()
-    >>> list(meshes)
-    ['base', 'shoulder', 'upper_arm', 'forearm', 'wrist_roll', 'wrist_pitch', 'flange']
-    >>> all(mesh.is_watertight for mesh in meshes.values())
-    True
     """
     links = (_base, _shoulder, _upper_arm, _forearm, _wrist_roll, _wrist_pitch, _flange)
     return {link.__name__.removeprefix("_"): _canonical(link()) for link in links}

@@ -1,12 +1,11 @@
-"""Laws of the PUMA 560's link meshes."""
+"""Laws of the PUMA 560's link meshes, which tools/puma560_meshes.py draws."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-
-from dhkit.model.puma560_meshes import puma560_meshes, write_puma560_meshes
+from tools.puma560_meshes import puma560_meshes, write_puma560_meshes
 
 CHECKED_IN = Path(__file__).parents[2] / "meshes" / "puma560"
 MAX_BYTES = 50_000  # a browser loads seven such files at once

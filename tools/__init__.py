@@ -1,0 +1,1 @@
+"""Work on the repository itself: its shape, and the files of urdf/ and meshes/."""
