@@ -19,16 +19,14 @@ from dhkit.errors import DescriptionError
 
 def test_the_commands_are_those_of_the_modules():
     assert list(typer.main.get_command(app).commands) == list(COMMANDS)
-    modules = [
-        importlib.import_module(f"dhkit.cli.{module}") for module in {entry.module for entry in COMMANDS.values()}
-    ]
+    modules = [importlib.import_module(f"dhkit.cli.{module}") for module in set(COMMANDS.values())]
     assert {name for module in modules for name in typer.main.get_group(module.app).commands} == set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_is_named_by_its_module_and_its_options_have_help(name):
     command = load_command(name)
-    assert f"`dhkit {name}`" in importlib.import_module(f"dhkit.cli.{COMMANDS[name].module}").__doc__
+    assert f"`dhkit {name}`" in importlib.import_module(f"dhkit.cli.{COMMANDS[name]}").__doc__
     assert all(getattr(parameter, "help", None) for parameter in command.params if parameter.name != "help")
 
 

@@ -144,7 +144,7 @@ def test_narrow_friction_takes_shorter_steps_and_ends_no_run_in_a_limit_cycle(la
 def test_dry_friction_brings_an_arm_to_rest_and_keeps_it_there(name, law):
     arm = library_robot(name)
     plant = Plant(arm, Friction())
-    assert plant.dry.all()
+    assert plant.has_stiction.all()
     rng = np.random.default_rng(3)
     law.samples(4)
     for _ in range(4 if ACCEPTING else 1):

@@ -5,7 +5,9 @@ Modules: assembly, guess, integration, mesh, planner, point, problem, report, re
 
 import pickle
 import threading
+from dataclasses import dataclass
 
+import casadi
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -30,6 +32,7 @@ from dhkit.planning import (
     ToolSpeed,
     TorqueSpeedLine,
 )
+from dhkit.planning.constraints import Constraint
 from dhkit.trajectories import Limits
 from planning_reference import grids, slide, worst_excess
 
@@ -179,6 +182,40 @@ def test_the_tools_acceleration():
     a = np.linalg.norm(tool_motion(PUMA, motion)[1], axis=1)
     assert a.max() <= 3.0 * (1 + 1e-5)
     assert a.max() > 2.9
+
+
+@dataclass(frozen=True)
+class Wall(Constraint):
+    """A plane that the tool of planar2r stays behind, as a user writes a constraint of their own."""
+
+    x: float
+    moving = False
+    what = "wall"
+
+    def rows(self, point, parameters):
+        first, second = point.description.numbers.a
+        return (first * casadi.cos(point.q[0]) + second * casadi.cos(point.q[0] + point.q[1])) / self.x
+
+    def measured(self, states, parameters):
+        return states.T_world_tool[:, :1, 3] / self.x
+
+
+@pytest.mark.slow
+def test_a_constraint_of_ones_own_is_kept_and_certified():
+    arm = dhkit.Arm.load("planar2r")
+    start, goal, wall = [-1.0, 1.2], [1.0, -1.2], Wall(0.88)
+    for constraints in ((), (wall,)):
+        motion = arm.plan(start, goal, constraints=constraints, intervals=20, compare=False, time_limit=120)
+        x = arm.fk(motion.q(np.linspace(0, motion.duration, 2001)))[:, 0, 3].max()
+        assert bool(constraints) == (x <= wall.x * (1 + ALLOWED))
+        assert bool(constraints) == ("wall of the tool" in dict(motion.report.active_limits()))
+
+
+def test_a_constraint_with_bounds_that_no_certificate_checks_is_refused():
+    with pytest.raises(TypeError, match=r"Band: bounds are 0\.2 and 1; expected -inf or -1, and 1"):
+
+        class Band(Wall):
+            low = 0.2
 
 
 @pytest.mark.slow

@@ -3,11 +3,14 @@
 import base64
 import json
 import re
+from importlib import resources
 
 import pytest
 
 from dhkit.errors import ModelError
 from dhkit.viewer import page
+from dhkit.viewer.diagrams import CURVE_COLORS
+from dhkit.viewer.overlays import AXIS_COLORS, TINTS
 
 
 def test_every_module_is_known_and_imports_known_ones():
@@ -52,3 +55,10 @@ def test_a_missing_viewer_is_named(monkeypatch, tmp_path, spec, content, complai
         (tmp_path / "viewer/dist/main.min.js").write_bytes(content)
     with pytest.raises(ModelError, match=complaint):
         page.meshcat_bundle()
+
+
+def test_the_page_draws_in_the_colors_of_python():
+    script = (resources.files("dhkit.viewer") / "static" / "colors.js").read_text("utf-8")
+    axes, ghosts, grey = (re.findall(r'"(#[0-9a-f]{6})"', line) for line in script.splitlines() if "export" in line)
+    assert (tuple(axes), tuple(ghosts)) == (AXIS_COLORS, TINTS)
+    assert (*TINTS[:6], *grey) == CURVE_COLORS

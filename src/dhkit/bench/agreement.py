@@ -45,8 +45,7 @@ class Verdict:
         error = "no answer" if self.error is None else f"{self.error:.0e}"
         return error if self.ok else f"DISAGREES: {error}"
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def judge(workload: Workload, quantity: str, task: Task) -> Verdict:

@@ -45,8 +45,7 @@ class Derivation:
         time = f"{self.seconds:.3g} s" if self.seconds is not None else f"not within {self.limit:g} s"
         return self.robot, self.what, time
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ class Operations:
         counts = (self.additions, self.multiplications, self.total, self.trigonometric)
         return self.program, *map(str, counts)
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def operations(arm: Arm) -> list[Operations]:

@@ -60,8 +60,7 @@ class ThreadScaling:
         """The cells of a row under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.dhkit:.2f}", f"{self.control:.2f}", f"{self.share:.2f}")
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -108,8 +107,7 @@ class PeakMemory:
         arrays, peak = (f"{count / 1e6:.1f}" for count in (self.inputs + self.outputs, self.peak))
         return (self.quantity, self.called, arrays, peak, f"{self.share:.2f}")
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -134,8 +132,7 @@ class FirstCall:
         """The cells of a row under :attr:`COLUMNS`."""
         return (self.quantity, f"{self.first:.2f}", f"{self.second:.2f}")
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadScaling:

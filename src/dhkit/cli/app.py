@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import logging
 import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Annotated, Any, NamedTuple, cast
+from pathlib import Path
+from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -28,81 +30,31 @@ UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 another one."""
 
 
-class Entry(NamedTuple):
-    """A command: the module in ``dhkit.cli`` whose ``app`` has it, and its help text."""
-
-    module: str
-    help: str
-
-
 COMMANDS = {
-    "robots": Entry("info", "List the robots of the library."),
-    "info": Entry("info", "Show a robot: its DH table, limits, masses, configurations and what is odd about it."),
-    "build": Entry("files", "Write a robot's URDF, with its meshes beside it."),
-    "import-cad": Entry(
-        "files",
-        "Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF.",
-    ),
-    "fk": Entry("info", "Print where the tool is for given joint values (rad and m)."),
-    "ik": Entry(
-        "inverse",
-        "Print every way to put the tool at a pose, given by --xyz, --matrix or --like; exit status 1 where there is "
-        "none.\n\n"
-        "Numbers may be expressions such as 17*inch or pi/2; joint values may be the name of a configuration.",
-    ),
-    "plan": Entry(
-        "plan",
-        "Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.\n\n"
-        "Sliding joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.",
-    ),
-    "simulate": Entry(
-        "simulate", "Simulate an arm under a controller; exit status 1 where the run does not get to its end."
-    ),
-    "compare": Entry("simulate", "Compare controllers on one motion; exit status 1 where one does not get to its end."),
-    "play": Entry("picture", "Play a motion or a simulation in the browser, or write a page of it."),
-    "picture": Entry("picture", "Write a picture of an arm, or of a motion: PNG files or a GIF; no browser is needed."),
-    "lab": Entry("browser", "Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."),
-    "view": Entry("browser", "Show an arm in the browser, to look at; Ctrl-C ends it."),
-    "verify": Entry(
-        "verify",
-        "Hold our kinematics and dynamics against Pinocchio's; exit status 1 where they disagree.\n\n"
-        "With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.",
-    ),
-    "extract": Entry(
-        "extract",
-        "Find the Denavit-Hartenberg table of a URDF's chain, with its bodies, limits and meshes.\n\n"
-        "Prints how far the table is from the file; exit status 1 where that is more than 1e-9.",
-    ),
-    "workspace": Entry(
-        "workspace",
-        "Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page.",
-    ),
-    "equations": Entry(
-        "equations", "Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."
-    ),
-    "grade": Entry(
-        "grade",
-        "Judge students' answers exactly, entry by entry.\n\n"
-        "Exit status 0: all pass; 1: one is wrong or incomplete, or lacks the proof that is asked for; 2: one is "
-        "unreadable.",
-    ),
-    "check": Entry(
-        "verify",
-        "Score a program's forward and inverse kinematics and its controller, and say where it fails first.\n\n"
-        "Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.",
-    ),
-    "bench": Entry(
-        "bench",
-        "Time our kinematics and dynamics beside every installed peer: median, spread and ratios.\n\n"
-        "Exit status 1: dhkit itself, or every contender of a quantity, failed or could not be timed.\n\n"
-        "Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.",
-    ),
-    "schema": Entry("files", "Print the JSON Schema of a file format."),
-    "demo": Entry(
-        "demo", "Build a robot from its table, verify it, and write its URDF, a figure and an animated page."
-    ),
+    "robots": "info",
+    "info": "info",
+    "build": "files",
+    "import-cad": "files",
+    "fk": "info",
+    "ik": "inverse",
+    "plan": "plan",
+    "simulate": "simulate",
+    "compare": "simulate",
+    "play": "picture",
+    "picture": "picture",
+    "lab": "browser",
+    "view": "browser",
+    "verify": "verify",
+    "extract": "extract",
+    "workspace": "workspace",
+    "equations": "equations",
+    "grade": "grade",
+    "check": "verify",
+    "bench": "bench",
+    "schema": "files",
+    "demo": "demo",
 }
-"""The commands by name, in the order of the help. Their modules are imported when they run, since that takes long."""
+"""Modules of the commands, in the order of the help; they are imported when a command runs, since that takes long."""
 
 
 class LazyCommand(TyperCommand):
@@ -110,15 +62,20 @@ class LazyCommand(TyperCommand):
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
         """Parse arguments by the command itself."""
-        return load_command(cast(str, self.name)).make_context(*arguments, **options)
+        return load_command(str(self.name)).make_context(*arguments, **options)
+
+    def get_short_help_str(self, limit: int = 0) -> str:
+        """Return the first paragraph of the command's docstring, of whatever length, without importing its module."""
+        tree = ast.parse((Path(__file__).parent / f"{COMMANDS[str(self.name)]}.py").read_text("utf-8"))
+        name = str(self.name).replace("-", "_")
+        function = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name)
+        return " ".join((ast.get_docstring(function) or "").split("\n\n")[0].split())
 
 
 def load_command(name: str) -> TyperCommand:
     """Import the module of a command, and return the command."""
-    module = import_module(f"dhkit.cli.{COMMANDS[name].module}")
-    command = cast(TyperCommand, typer.main.get_group(module.app).commands[name])
-    command.help = COMMANDS[name].help
-    return command
+    module = import_module(f"dhkit.cli.{COMMANDS[name]}")
+    return cast(TyperCommand, typer.main.get_group(module.app).commands[name])
 
 
 class Commands(TyperGroup):
@@ -126,13 +83,13 @@ class Commands(TyperGroup):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        for name, entry in COMMANDS.items():
-            self.add_command(LazyCommand(name, help=entry.help))
+        for name in COMMANDS:
+            self.add_command(LazyCommand(name))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the list into the help."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, entry.help.split("\n\n")[0]) for name, entry in COMMANDS.items()])
+            formatter.write_dl([(name, command.get_short_help_str()) for name, command in self.commands.items()])
 
 
 app = typer.Typer(

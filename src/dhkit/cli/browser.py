@@ -54,7 +54,7 @@ def lab(
     solid: Annotated[Path | None, typer.Option(help="An STL file for the panel of transforms.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
 ) -> ExitStatus:
-    """Serve a lab of a robot, or of an assignment, until it is interrupted."""
+    """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
     if mine is not None and run is not None:
         raise DescriptionError("--mine and --run; expected one of them")
     if arguments and run is None:
@@ -84,7 +84,7 @@ def view(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
     html: Annotated[Path | None, typer.Option(help="Write a page in place of it.")] = None,
 ) -> ExitStatus:
-    """Show an arm until it is interrupted, or write a page of it."""
+    """Show an arm in the browser, to look at; Ctrl-C ends it."""
     arm = Arm.load(robot)
     check_outputs(((html, PAGES),))
     with arm.view() as shown:

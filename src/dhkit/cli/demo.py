@@ -63,7 +63,7 @@ def demo(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer samples.")] = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Run the demo into a folder; the status is NO if our numbers and Pinocchio's disagree."""
+    """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""
     arm = Arm.load(robot)
     folder = output_folder(output, arm.name)
     folder.mkdir(parents=True, exist_ok=True)

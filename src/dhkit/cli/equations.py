@@ -84,7 +84,7 @@ def equations(
     uniform: Uniform = False,
     json: Json = False,
 ) -> None:
-    """Print equations, or write them to a file."""
+    """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."""
     arm = load_arm(robot, uniform)
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")

@@ -41,12 +41,9 @@ def extract(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The robot file to write (.toml).")] = None,
     json: Json = False,
 ) -> ExitStatus:
-    """Extract a table, print it and perhaps write it; the status is NO if it is not within 1e-9 of the file.
+    """Find the Denavit-Hartenberg table of a URDF's chain, with its bodies, limits and meshes.
 
-    Raises
-    ------
-    DescriptionError
-        The output is no robot file.
+    Prints how far the table is from the file; exit status 1 where that is more than 1e-9.
     """
     if output is not None and output.suffix.lower() != ".toml":
         raise DescriptionError(f"{output}: expected a robot file that ends in .toml")

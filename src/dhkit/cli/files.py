@@ -83,13 +83,7 @@ def import_cad(
     degrees: Annotated[bool, degrees_option("Angles of --at are in degrees.")] = False,
     json: Json = False,
 ) -> None:
-    """Import an assembly, write it, and print the notes of the import.
-
-    Raises
-    ------
-    DhkitError
-        A part, a unit, a mass or an option is not clear.
-    """
+    """Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF."""
     arm = Arm.load(table)
     imported = import_assembly(
         folder,

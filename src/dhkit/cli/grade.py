@@ -63,7 +63,11 @@ def grade(
     ] = None,
     json: Json = False,
 ) -> ExitStatus:
-    """Judge sheets, or mark reports again; or print an empty sheet, or a worked solution."""
+    """Judge students' answers exactly, entry by entry.
+
+    Exit status 0: all pass; 1: one is wrong or incomplete, or lacks the proof that is asked for; 2: one is
+    unreadable.
+    """
     if template is not None:
         return write_template(template, output)
     if explain is not None:

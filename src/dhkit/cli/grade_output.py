@@ -16,6 +16,7 @@ from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.answers.sources import SHEET_SUFFIXES
 from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import (
@@ -31,7 +32,6 @@ from dhkit.grading.reports import (
 )
 from dhkit.grading.reports.sentences import fault_of
 from dhkit.grading.rubric import Feedback
-from dhkit.grading.sheets import SUFFIXES
 
 FORMS = ("text", "json", "gradescope", "junit", "html")
 FILE_WIDTH = 120
@@ -64,7 +64,7 @@ def check_output(output: Path | None, form: str, several: bool) -> None:
     """
     if output is None or output.is_dir():
         return
-    if output.suffix.lower() in SUFFIXES:
+    if output.suffix.lower() in SHEET_SUFFIXES:
         raise AnswerError(f"{output}: a report would overwrite an answer sheet; expected another name")
     if _is_folder(output, form, several):
         if output.exists() or output.suffix:

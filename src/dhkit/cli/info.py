@@ -30,7 +30,7 @@ def robots(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Print the robots of the library, or the chains of example-robot-data."""
+    """List the robots of the library."""
     if examples:
         list_examples(json)
         return
@@ -47,7 +47,7 @@ def robots(
 
 @app.command()
 def info(robot: Robot, json: Json = False) -> None:
-    """Print a robot."""
+    """Show a robot: its DH table, limits, masses, configurations and what is odd about it."""
     arm = Arm.load(robot)
     if json:
         print_json(_facts(arm))
@@ -90,7 +90,7 @@ def fk(
     frames: Annotated[bool, typer.Option("--frames", help="All DH frames too.")] = False,
     json: Json = False,
 ) -> None:
-    """Print the tool's pose at joint values."""
+    """Print where the tool is for given joint values (rad and m)."""
     arm = Arm.load(robot)
     values = joint_values(arm, q, degrees)
     T, link_frames = arm.fk(values), arm.frames(values)

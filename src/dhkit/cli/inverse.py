@@ -120,7 +120,10 @@ def ik(
     numeric: Annotated[bool, typer.Option("--numeric", help="One solution, by iteration, for any arm.")] = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Print all solutions of fk(q) = T; the status is NO if there is none."""
+    """Print every way to put the tool at a pose, given by --xyz, --matrix or --like; exit status 1 where there is none.
+
+    Numbers may be expressions such as 17*inch or pi/2; joint values may be the name of a configuration.
+    """
     arm = Arm.load(robot)
     T = target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees)
     near_q = None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)

@@ -41,7 +41,7 @@ def picture(
     degrees: Annotated[bool, degrees_option("Angles are in degrees.")] = False,
     uniform: Uniform = False,
 ) -> None:
-    """Write a picture of an arm, or pictures of a motion."""
+    """Write a picture of an arm, or of a motion: PNG files or a GIF; no browser is needed."""
     arm = load_arm(robot, uniform)
     check_outputs(((output, (".png",) if motion is None else (".png", ".gif")),))
     if motion is not None and at is not None:
@@ -74,7 +74,7 @@ def play(
     degrees: Annotated[bool, degrees_option("Samples from elsewhere have degrees.")] = False,
     uniform: Uniform = False,
 ) -> ExitStatus:
-    """Play a motion or a simulation of a file in the browser until it is interrupted, or write a page of it."""
+    """Play a motion or a simulation in the browser, or write a page of it."""
     arm = load_arm(robot, uniform)
     check_outputs(((html, PAGES),))
     played = _read(arm, file, degrees=degrees, names=columns)

@@ -106,7 +106,10 @@ def plan(
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Plan a motion, print its report and write its files; the status is NO if there is no such motion."""
+    """Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.
+
+    Sliding joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.
+    """
     arm = load_arm(robot, uniform)
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
     if sum(given is not None for given in (to, *pose.values())) != 1:

@@ -112,7 +112,7 @@ def simulate(
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Simulate, print the errors and write files; the status is NO if the run did not get to its end."""
+    """Simulate an arm under a controller; exit status 1 where the run does not get to its end."""
     bare = load_arm(robot, uniform)
     sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
@@ -244,7 +244,7 @@ def compare(
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Compare controllers on one motion, print a table and write a figure; the status is NO if one failed."""
+    """Compare controllers on one motion; exit status 1 where one does not get to its end."""
     bare = load_arm(robot, uniform)
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
     arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)

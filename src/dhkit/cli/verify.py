@@ -36,12 +36,9 @@ def verify(
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Verify, print the report and perhaps write it; the status is NO if something disagrees.
+    """Hold our kinematics and dynamics against Pinocchio's; exit status 1 where they disagree.
 
-    Raises
-    ------
-    DescriptionError
-        The output has another suffix.
+    With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.
     """
     if output is not None and output.suffix not in (".md", ".tex", ".json"):
         raise DescriptionError(f"{output}: expected a report that ends in .md, .tex or .json")
@@ -85,7 +82,10 @@ def check(
     sandbox: Annotated[str | None, typer.Option(help="bwrap: in bubblewrap, for strangers' files.")] = None,
     json: Json = False,
 ) -> ExitStatus:
-    """Check a program and print its score; the status is NO below full marks, UNUSABLE if it cannot be loaded."""
+    """Score a program's forward and inverse kinematics and its controller, and say where it fails first.
+
+    Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.
+    """
     if not run and len(program) != 1:
         raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
     arm, source = Arm.load(robot), program if run else Path(program[0])

@@ -34,7 +34,7 @@ def workspace(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
     json: Json = False,
 ) -> None:
-    """Sample an arm's workspace, print its numbers, and write a figure and a page into a folder."""
+    """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
     from dhkit.viewer import plot
 
     arm = Arm.load(robot)

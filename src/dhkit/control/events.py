@@ -48,13 +48,13 @@ def advance(plant: Plant, integrator: Integrator, state: State, end: float, phas
         if phase is None:
             phase = plant.phase(state.q, state.qd, integrator.torque(state), plant.active_pushes(state.t))
         later = _checked_step(integrator, state, phase, end)
-        event = None if plant.undisturbed else _first_event(plant, integrator, state, later, phase)
+        event = None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
         while event is None:
             if later.t >= end:
                 return later
             # An integrator with steps of its own goes on under the same contact.
             state, later = later, _checked_step(integrator, later, phase, end)
-            event = None if plant.undisturbed else _first_event(plant, integrator, state, later, phase)
+            event = None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
         state, phase = event, None
         if state.t >= end:
             return state
@@ -114,7 +114,7 @@ def _first_event(plant: Plant, integrator: Integrator, state: State, later: Stat
 def _may_have_event(plant: Plant, later: State, contact: Contact) -> bool:
     """Return whether a joint has reversed its direction or passed its stop."""
     lower, upper = plant.limits
-    turned = plant.dry & (contact.directions * later.qd < 0)
+    turned = plant.has_stiction & (contact.directions * later.qd < 0)
     return bool((turned | (later.q < lower) | (later.q > upper)).any())
 
 
@@ -155,7 +155,7 @@ def _measures(
     for i in range(plant.n):
         if contact.holds[i]:
             continue
-        if plant.dry[i] and contact.directions[i]:
+        if plant.has_stiction[i] and contact.directions[i]:
             found.append((_rate(i, int(contact.directions[i])), partial(_with_joint_at_rest, i)))
         for limit, side in ((lower[i], 1.0), (upper[i], -1.0)):
             if np.isfinite(limit):

@@ -77,11 +77,11 @@ class RungeKutta:
         plant, tau, h = self.plant, self.tau, end - state.t
         q, qd, a1 = state.q, state.qd, phase.qdd
         q2, v2 = q + h / 2 * qd, qd + h / 2 * a1
-        a2 = plant.moving(q2, v2, tau, phase.contact, phase.pushes)
+        a2 = plant.constrained_accelerations(q2, v2, tau, phase.contact, phase.pushes)
         q3, v3 = q + h / 2 * v2, qd + h / 2 * a2
-        a3 = plant.moving(q3, v3, tau, phase.contact, phase.pushes)
+        a3 = plant.constrained_accelerations(q3, v3, tau, phase.contact, phase.pushes)
         q4, v4 = q + h * v3, qd + h * a3
-        a4 = plant.moving(q4, v4, tau, phase.contact, phase.pushes)
+        a4 = plant.constrained_accelerations(q4, v4, tau, phase.contact, phase.pushes)
         stages = ((q, qd), (q2, v2), (q3, v3), (q4, v4))
         friction, push = state.friction_work, state.push_work
         if plant.friction is not None:
@@ -143,7 +143,7 @@ class DormandPrince:
         """
         if end != self._end:
             self._end, self._steps = end, 0
-        if self.plant.undisturbed:
+        if self.plant.has_no_events:
             return self._passing(state, phase, end)
         solver = self._started(state, phase, end)
         self._advance(solver)
@@ -172,7 +172,7 @@ class DormandPrince:
             tau, memory = self.torques(min(t, latest), q, qd, y[2 * n : -3])
             friction = 0.0 if plant.friction is None else float(qd @ plant.resistance(qd, contact.directions))
             push = float(qd @ plant.push_torques(pushes, q)) if pushes else 0.0
-            qdd = plant.moving(q, qd, tau, contact, pushes)
+            qdd = plant.constrained_accelerations(q, qd, tau, contact, pushes)
             if not np.isfinite(qdd).all():
                 # Without this, DOP853 would reduce its step length without end.
                 raise SimulationError(f"the arm has no finite accelerations at {t:g} s")

@@ -82,13 +82,13 @@ class Plant:
         return self.description.n
 
     @cached_property
-    def dry(self) -> NDArray[np.bool_]:
+    def has_stiction(self) -> NDArray[np.bool_]:
         """Whether a joint's dry friction is a step with stiction, shape (n,)."""
         none = np.zeros(self.n, dtype=bool)
         if self.friction is None or self.friction.width:
             return none
-        dry: NDArray[np.bool_] = np.any(self.description.numbers.coulomb != 0, axis=1)
-        return dry
+        joints: NDArray[np.bool_] = np.any(self.description.numbers.coulomb != 0, axis=1)
+        return joints
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
@@ -98,14 +98,9 @@ class Plant:
         return (-free, free) if self.restitution is None else (numbers.lower, numbers.upper)
 
     @cached_property
-    def smooth(self) -> bool:
-        """Whether no joint has stiction."""
-        return not self.dry.any()
-
-    @cached_property
-    def undisturbed(self) -> bool:
+    def has_no_events(self) -> bool:
         """Whether no joint has stiction or a stop, so that no event can happen."""
-        return self.smooth and not np.isfinite(self.limits).any()
+        return not self.has_stiction.any() and not np.isfinite(self.limits).any()
 
     @cached_property
     def stiffness(self) -> float:
@@ -143,11 +138,14 @@ class Plant:
     def holding_bounds(self, q: Array) -> tuple[Array, Array]:
         """Return the bounds of the torques that hold joints at rest, shape (n,) each, N m and N; infinite at stops."""
         lower, upper = self.limits
-        coulomb = np.where(self.dry[:, None], self.description.numbers.coulomb, 0.0)
+        coulomb = np.where(self.has_stiction[:, None], self.description.numbers.coulomb, 0.0)
         return np.where(q <= lower, -np.inf, coulomb[:, 1]), np.where(q >= upper, np.inf, coulomb[:, 0])
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """Return the accelerations of a state, shape (n,), rad/s^2 and m/s^2; ``tau`` includes friction and pushes."""
+        """Return the accelerations of a state under net torques, shape (n,), rad/s^2 and m/s^2.
+
+        Net torques are those of the drives and pushes, minus friction.
+        """
         qdd: Array = np.empty((1, self.n))
         run, parameters = self._single
         run(parameters, [q[None], qd[None], tau[None]], [qdd])
@@ -165,7 +163,7 @@ class Plant:
         """
         if self.friction is None:
             return np.zeros(self.n)
-        if self.smooth:
+        if not self.has_stiction.any():
             return friction_torque(self.description, qd, self.friction)
         numbers = self.description.numbers
         dry = np.where(directions > 0, numbers.coulomb[:, 0], np.where(directions < 0, numbers.coulomb[:, 1], 0.0))
@@ -187,11 +185,11 @@ class Plant:
         Joints whose rate is exactly 0 hold if the holding torques are within the bounds of their friction; a stop bears
         any torque towards it. All joints are decided together, since each loads the others through the mass matrix.
         """
-        if self.undisturbed:
+        if self.has_no_events:
             return self.nothing_holds
         lower, upper = self.limits
         directions = np.sign(qd).astype(np.int8)
-        at_rest = (qd == 0) & (self.dry | (q <= lower) | (q >= upper))
+        at_rest = (qd == 0) & (self.has_stiction | (q <= lower) | (q >= upper))
         if not at_rest.any():
             return Contact(directions, at_rest)
         least, most = (bound[at_rest] for bound in self.holding_bounds(q))
@@ -203,7 +201,9 @@ class Plant:
         directions[at_rest] = side
         return Contact(directions, holds)
 
-    def moving(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
+    def constrained_accelerations(
+        self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()
+    ) -> Array:
         """Return the accelerations under a contact, shape (n,), rad/s^2 and m/s^2: exactly 0 for holding joints."""
         net = tau - self.resistance(qd, contact.directions)
         if pushes:
@@ -220,11 +220,11 @@ class Plant:
     def phase(self, q: Array, qd: Array, tau: Array, pushes: tuple[Push, ...] = ()) -> Phase:
         """Return the phase from a state (q, qd and tau of shape (n,), SI units) to the next event."""
         contact = self.contact(q, qd, tau, pushes)
-        return Phase(contact, pushes, self.moving(q, qd, tau, contact, pushes))
+        return Phase(contact, pushes, self.constrained_accelerations(q, qd, tau, contact, pushes))
 
     def holding_torques(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
         """Return the resisting torques of holding joints, shape (n,), N m and N; 0 for the others."""
-        qdd = self.moving(q, qd, tau, contact, pushes)
+        qdd = self.constrained_accelerations(q, qd, tau, contact, pushes)
         net = tau + self.push_torques(pushes, q) - self.resistance(qd, contact.directions)
         needed = net - mass_matrix(self.description, q) @ qdd - bias(self.description, q, qd)
         return np.where(contact.holds, needed, 0.0)

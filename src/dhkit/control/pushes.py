@@ -67,5 +67,4 @@ class Push:
             tau[i] = axes[:3, 2] @ turned
         return tau
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line

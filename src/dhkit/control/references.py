@@ -76,8 +76,7 @@ class Held:
         still = np.zeros((len(t), len(self.q)))
         return still + self.q, still, still.copy()
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +102,7 @@ class Step:
         q = np.where((t >= self.time)[:, None], np.asarray(self.after), np.asarray(self.before))
         return q, np.zeros_like(q), np.zeros_like(q)
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +129,7 @@ class Sine:
         swing = amplitude * np.sin(angle)
         return centre + swing, amplitude * rate * np.cos(angle), -(rate**2) * swing
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def _make_finite(reference: object, *names: str) -> None:

@@ -184,7 +184,7 @@ class ContinuousRun(Run):
         edges = [*self.edges(), *(edge for push in self.plant.pushes for edge in (push.begin, push.end))]
         end = float(self.t[-1])
         inside = sorted(edge for edge in edges if 0 < edge < end)
-        free = self.plant.undisturbed and self.controller is None
+        free = self.plant.has_no_events and self.controller is None
         longest = np.inf if free else LONGEST_STEP
         self._integrator = DormandPrince(self.plant, self._torques, tolerance, [*inside, end], longest)
 

@@ -71,8 +71,7 @@ class Sensors:
                 raise ValueError(f"{name} has shape {shape}; expected a number, or ({n},)")
         return Measuring(self, period)
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 class Measuring:

@@ -15,18 +15,18 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.symbolic import (
     Graph,
     InertialTable,
+    friction_parameters,
     friction_torque,
     inertial_pattern,
     joint_symbols,
     recursive_forward_dynamics,
-    smooth_direction,
 )
 
 if TYPE_CHECKING:
     import casadi
 
 WORKS = ("drives", "turnover", "friction")
-"""Works that a step adds up, J: by the drives' torques, the integral of their absolute power, and lost to friction."""
+"""Energies integrated in a step, J: work of the drive torques, integral of their absolute power, friction loss."""
 NO_LIMIT = 1e300
 """Torque (N m or N) that stands for no limit: with infinity, the programs would return NaN."""
 
@@ -159,7 +159,7 @@ def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> 
     numbers = {"step": np.array([h]), "arm": values}
     if friction is None:
         return pattern, numbers
-    losses = np.array([[friction.width, *arm.numbers.viscous, *arm.numbers.coulomb.ravel()] for arm in arms])
+    losses = np.array([friction_parameters(arm.numbers, friction.width) for arm in arms])
     return f"{pattern} friction", numbers | {"friction": losses[0] if len(arms) == 1 else losses}
 
 
@@ -200,17 +200,8 @@ def _runge_kutta_step(
     """Return joint values and rates after a step under constant torques, and the works of ``WORKS`` in it."""
     import casadi
 
-    n = table.n
-
-    def resistance(v: casadi.SX) -> casadi.SX:
-        if friction is None:
-            return casadi.SX.zeros(n)
-        viscous = [friction[1 + i] for i in range(n)]
-        coulomb = [(friction[1 + n + 2 * i], friction[2 + n + 2 * i]) for i in range(n)]
-        return friction_torque(v, viscous, coulomb, [smooth_direction(v[i], friction[0]) for i in range(n)])
-
     def rate(x: casadi.SX, v: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
-        lost = resistance(v)
+        lost = casadi.SX.zeros(table.n) if friction is None else friction_torque(v, friction, smooth=True)
         return recursive_forward_dynamics(table, x, v, tau - lost), casadi.dot(v, lost)
 
     a1, p1 = rate(q, qd)

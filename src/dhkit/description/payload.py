@@ -81,5 +81,4 @@ class Payload:
         x, y, z = numbers[1:4].tolist()
         return cls(float(numbers[0]), (x, y, z), tuple(map(tuple, tensor.tolist())))
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line

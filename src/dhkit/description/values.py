@@ -105,8 +105,7 @@ class Mesh:
 class _Solid:
     """A geometry that prints in one line, as its constructor is written."""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, repr=False)

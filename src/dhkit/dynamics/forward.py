@@ -77,7 +77,8 @@ def require_inertia(description: Description) -> None:
     DescriptionError
         A link without a body; joints that carry no inertia at any state: names them, and what would help.
     """
-    everywhere = _failing(mass_matrix(description, _random_states(description)))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SINGULAR_SAMPLES, description.n))
+    everywhere = _failing(mass_matrix(description, q))
     if np.all(everywhere >= 0):
         names = _named(description, np.unique(everywhere))
         raise DescriptionError(
@@ -113,10 +114,6 @@ def _failing(M: Array) -> Array:
         with np.errstate(all="ignore"):  # results after a singular pivot are not used
             A -= A[:, :, k, None] * A[:, None, k, :] / pivot[:, None, None]
     return failing
-
-
-def _random_states(description: Description) -> Array:
-    return np.random.default_rng(0).uniform(-np.pi, np.pi, (SINGULAR_SAMPLES, description.n))
 
 
 def _named(description: Description, joints: Array) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
@@ -14,10 +13,10 @@ from dhkit.symbolic import (
     Friction,
     Graph,
     SymbolicTable,
+    friction_parameters,
     friction_torque as friction_expression,
     jacobian,
     joint_symbols,
-    smooth_direction,
     table_pattern,
 )
 
@@ -56,9 +55,7 @@ def friction_torque(
     state = joint_array(description, qd, "qd")
     width = Friction().width if friction is None else friction.width
     run = friction_kernel(description.n, width > 0)
-    numbers = description.numbers
-    parameters = np.concatenate([numbers.viscous, numbers.coulomb.ravel(), [width]])
-    return fill(run, parameters, [state], (description.n,), out, threads)
+    return fill(run, friction_parameters(description.numbers, width), [state], (description.n,), out, threads)
 
 
 @takes_robot
@@ -125,14 +122,8 @@ def wrench_kernel(description: Description) -> tuple[Kernel, Array]:
 
 
 def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
-    import casadi
-
     parameters, qd = joint_symbols("parameters", 3 * n + 1), joint_symbols("qd", n)
-    viscous = [parameters[i] for i in range(n)]
-    coulomb = [(parameters[n + 2 * i], parameters[n + 2 * i + 1]) for i in range(n)]
-    width = parameters[3 * n]
-    directions = [smooth_direction(qd[i], width) if smooth else casadi.sign(qd[i]) for i in range(n)]
-    torque = friction_expression(qd, viscous, coulomb, directions)
+    torque = friction_expression(qd, parameters, smooth=smooth)
     return Graph.of(name, {"parameters": parameters, "qd": qd}, {"tau": torque})
 
 

@@ -11,7 +11,7 @@ from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
-from dhkit.grading.answers.sources import LANGUAGES, read_source
+from dhkit.grading.answers.sources import SHEET_SUFFIXES, read_source
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.report import GradeReport
@@ -64,14 +64,15 @@ def grade(
     """
     path, digits = Path(path), (rubric or Rubric()).digits
     given = None if robot is None else description_of(robot)
-    if path.suffix.lower() == ".ipynb" or path.suffix.lower() in LANGUAGES:
+    suffix = path.suffix.lower()
+    if suffix not in SHEET_SUFFIXES:
+        raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected {', '.join(SHEET_SUFFIXES)}")
+    if suffix == ".toml":
+        sheet = read_sheet(path)
+    else:
         if given is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
         sheet = read_source(path, given)
-    elif path.suffix.lower() == ".toml":
-        sheet = read_sheet(path)
-    else:
-        raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected .toml, .py, .m, .tex or .ipynb")
     description = given or robot_of(sheet, path.parent)
     if task is not None:
         sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))

@@ -20,8 +20,7 @@ class Mark:
     most: float
     rule: str = ""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)

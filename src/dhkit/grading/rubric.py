@@ -52,8 +52,7 @@ class Credit:
     mistakes: dict[str, Share] = Field(default_factory=dict, max_length=200)
     """Wrong by these mistakes, by name; goes before diagnosed."""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, config=STRICT)

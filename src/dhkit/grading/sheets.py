@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.sources import SHEET_SUFFIXES
 
-SUFFIXES = frozenset((".toml", ".py", ".m", ".tex", ".ipynb"))
 MAX_DEPTH = 8
 MAX_LISTED = 20
 """Largest number of unread files that are listed by name."""
@@ -104,14 +104,14 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
         else:
             sheets.setdefault(sheet.student, []).append(sheet)
     if not sheets:
-        raise AnswerError(f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SUFFIXES))}")
+        raise AnswerError(f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SHEET_SUFFIXES))}")
     for student, paths in unread.items():
         if student in sheets:
             first, *others = sheets[student]
             sheets[student] = [replace(first, beside=_shorten([path.name for path in paths])), *others]
         else:
             kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
-            error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SUFFIXES))}"
+            error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SHEET_SUFFIXES))}"
             sheets[student] = [Sheet(paths[0], student, error)]
     return sorted((sheet for own in sheets.values() for sheet in own), key=lambda sheet: sheet.path.parts)
 
@@ -137,8 +137,8 @@ def _visit(root: Path) -> Iterator[Sheet]:
         elif path.is_dir():
             if fault := _fault_of_folder(path, len(parts)):
                 yield Sheet(path, student, fault)
-        elif path.suffix.lower() not in SUFFIXES or _is_robot(path):
-            if len(parts) > 1 or path.suffix.lower() not in SUFFIXES:
+        elif path.suffix.lower() not in SHEET_SUFFIXES or _is_robot(path):
+            if len(parts) > 1 or path.suffix.lower() not in SHEET_SUFFIXES:
                 yield Sheet(path, student, UNREAD)
         else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
@@ -164,8 +164,8 @@ def _fault_of_link(path: Path, inside: Path) -> str:
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):
-        return "a link that leads nowhere" if path.suffix.lower() in SUFFIXES else ""
-    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in SUFFIXES):
+        return "a link that leads nowhere" if path.suffix.lower() in SHEET_SUFFIXES else ""
+    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in SHEET_SUFFIXES):
         return ""
     return "a link out of the folder; it is not followed"
 

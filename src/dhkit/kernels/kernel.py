@@ -115,7 +115,8 @@ class Kernel:
         mode = kernel_mode()
         if mode == "off":
             return None
-        if self._function is None and not self._failed and (mode == "on" or (count >= SMALL_BATCH and _counting())):
+        counts = count >= SMALL_BATCH and not _uncounted.depth
+        if self._function is None and not self._failed and (mode == "on" or counts):
             self._items += count
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()
@@ -189,10 +190,6 @@ class _Uncounted(threading.local):
 
 
 _uncounted = _Uncounted()
-
-
-def _counting() -> bool:
-    return _uncounted.depth == 0
 
 
 @contextmanager

@@ -218,11 +218,8 @@ def _array(k: int, name: str) -> Iterator[str]:
 
 def _address(body: Body, row: int) -> str:
     """Return the address of the current vector in a row."""
-    return body.define(f"getelementptr double, ptr {_row(body, row)}, i64 %item")
-
-
-def _row(body: Body, row: int) -> str:
-    return body.define(f"getelementptr double, ptr %work, i64 {row * BLOCK}")
+    start = body.define(f"getelementptr double, ptr %work, i64 {row * BLOCK}")
+    return body.define(f"getelementptr double, ptr {start}, i64 %item")
 
 
 def _loaded(body: Body, row: int) -> Vector:

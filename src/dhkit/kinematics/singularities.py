@@ -115,7 +115,7 @@ def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
     """Return a measure of the distance from each kind of singularity, 0 at the singularity, without unit.
 
     For elbow and wrist it is abs(sin) of the angle; for the shoulder and a prismatic joint, the length over the reach.
-    Inverse kinematics flag a branch where one is below 1e-6.
+    Inverse kinematics flag a branch where one is below 1e-5.
 
     Parameters
     ----------

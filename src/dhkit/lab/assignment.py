@@ -30,8 +30,7 @@ ROUNDING = 1e-9
 class Condition:
     """What a goal asks for; its subclasses are the kinds of conditions."""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -37,7 +37,7 @@ def mesh_file_names(folder: Path) -> tuple[str, ...]:
     Raises
     ------
     ModelError
-        No such folder, more files than :data:`MAX_FILES`, or a link that leaves the folder.
+        No such folder, more files than :data:`MAX_FILES`, or a symbolic link to a file outside the folder.
     """
     try:
         if not folder.is_dir():
@@ -64,7 +64,7 @@ def mat_file(folder: Path) -> Path | None:
     Raises
     ------
     ModelError
-        A link that leaves the folder.
+        A symbolic link to a file outside the folder.
     """
     if not folder.is_dir() or mesh_file_names(folder):
         return None
@@ -110,7 +110,7 @@ def assign_parts(
     """Return the parts of each link, 0 to ``links``.
 
     Numbers are those of the table, 0 or "base" for the part that does not move. If no part has number 0, n + 1 parts
-    that are numbered 1 to n + 1 are taken as in the course: part 1 is the base.
+    that are numbered 1 to n + 1 are numbered from the base, if nothing is stated: part 1 is link 0.
 
     Parameters
     ----------

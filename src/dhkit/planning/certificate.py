@@ -41,8 +41,7 @@ class Check:
     time: float
     """Time of the largest excess, s."""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A quantity that must stay between ``low`` and 1 in every state of a motion."""
+    """A quantity that must stay below 1, or between -1 and 1, in every state of a motion.
+
+    Raises
+    ------
+    TypeError
+        A subclass with other bounds: the certificate checks none.
+    """
 
     moving: ClassVar[bool] = True
     """Whether the quantity depends on velocity, so that a motion keeps the constraint if it is slow enough."""
     low: ClassVar[float] = -math.inf
     high: ClassVar[float] = 1.0
     needs_torque: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        if cls.measured is not Constraint.measured and (cls.low, cls.high) not in ((-math.inf, 1.0), (-1.0, 1.0)):
+            raise TypeError(f"{cls.__name__}: bounds are {cls.low:g} and {cls.high:g}; expected -inf or -1, and 1")
 
     @property
     def is_two_sided(self) -> bool:
@@ -48,11 +58,11 @@ class Constraint:
         return f"{100 * use:.4g} % of its limit"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit, between ``low`` and 1."""
+        """Return the limited expressions, k x 1, without unit, which must stay between ``low`` and ``high``."""
         raise NotImplementedError
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
         raise NotImplementedError
 
     def size(self, description: Description) -> int:
@@ -85,11 +95,10 @@ class MotorPower(Constraint):
         return point.tau * point.qd / _each(self.watts, point.n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
         return states.tau * states.qd / _each(self.watts, states.n)
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -118,13 +127,12 @@ class TorqueSpeedLine(Constraint):
         return point.tau / _each(self.stall_torque, n) + point.qd / _each(self.no_load_speed, n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
         n = states.n
         measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(self.no_load_speed, n)
         return measured
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def _each(value: float | tuple[float, ...], n: int) -> Array:

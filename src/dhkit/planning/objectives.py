@@ -144,8 +144,7 @@ class Energy(Term):
         total: Array = np.sum(power, axis=1)
         return total
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -224,8 +223,7 @@ class Objective:
             return " + ".join(names)
         return " + ".join(f"{term.weight:g} {name}" for term, name in zip(self.terms, names, strict=True))
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 ObjectiveLike: TypeAlias = "str | Term | Objective"

@@ -44,8 +44,7 @@ class Progress:
     seconds: float
     """Time since the solution began, s."""
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 ProgressCall: TypeAlias = Callable[[Progress], object]

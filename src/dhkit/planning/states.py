@@ -111,7 +111,7 @@ class States:
     def with_tool(self, T_world_tool: Array) -> States:
         """Return these states with the tool at rest in poses (N, 4, 4) whose joint values are not known."""
         other = replace(self)
-        other.__dict__["_tool"] = (T_world_tool, np.zeros((self.n, 3)), np.zeros((self.n, 3)))
+        other.__dict__["_tool"] = (T_world_tool, *np.zeros((2, len(T_world_tool), 3)))
         return other
 
     def slowed(self, c: float) -> States:

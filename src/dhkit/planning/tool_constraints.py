@@ -120,8 +120,7 @@ class ToolDirection(Constraint):
         cosine = (states.T_world_tool[:, :3, :3] @ np.array(self.axis)) @ parameters
         return np.asarray(_share_of_angle(cosine, self.tolerance))[:, None]
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from dhkit.programs.rubric import CheckRubric
 SAME_SOLUTION = 1e-5
 """Largest difference of joint values, rad and m, of one solution; near singular poses they are less exact."""
 MIN_SINGULAR_POSES = 10
-"""Fewest singular poses, if there are as many samples."""
+"""Smallest number of singular poses, or the number of samples if that is smaller."""
 MAX_JOINT_VALUE = 1e6
 """Largest joint value of a solution, rad and m."""
 RANK_TOLERANCE = 1e-9
@@ -34,7 +34,8 @@ SOLUTION_ORDERS = {
     "three_parallel": (0, 4, 5, 2, 1, 3),
     "yaw_three": (0, 2, 1, 3),
 }
-"""Order in which joints are solved for, by family of arms, where it is not that of the chain: q2 follows from q3."""
+"""Indices of joints, from 0, in the order in which they are solved for, by family of arms, where it is not that of the
+chain: the third before the second."""
 
 
 def score_inverse(
@@ -162,7 +163,8 @@ class PoseJudge:
             return None, True
         finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < MAX_JOINT_VALUE).all(axis=1)
         if not finite.all():
-            self._errors["NaN or infinity was returned; expected no row where there is no solution"] += 1
+            found = f"NaN, infinity or a value above {MAX_JOINT_VALUE:.0e} was returned"
+            self._errors[f"{found}; expected no row where there is no solution"] += 1
         return rows[finite], bool(finite.all())
 
     def _pose_error(self, q: Array, T: Array) -> float:

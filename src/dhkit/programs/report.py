@@ -31,8 +31,7 @@ class Part:
     text: str
     details: tuple[str, ...] = ()
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ class ForwardPoints:
 
     agrees: Points = 100.0
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -53,8 +52,7 @@ class InversePoints:
     time: Points = 10.0
     seconds: Positive = 0.01
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -85,8 +83,7 @@ class ControllerTask:
     payload: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     bound: Positive = 0.01
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -27,8 +27,8 @@ from .differentiable.frames import (
 )
 from .differentiable.friction import (
     Friction as Friction,
+    friction_parameters as friction_parameters,
     friction_torque as friction_torque,
-    smooth_direction as smooth_direction,
 )
 from .differentiable.inertial_table import InertialTable as InertialTable, inertial_pattern as inertial_pattern
 from .differentiable.moments import Moments as Moments

@@ -79,8 +79,7 @@ class MadeAt:
         link = "" if self.link is None else f" at link {self.link}"
         return f"{self.identity}{link}" if self.body is None else f"{self.identity}{link}, {self.body}"
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:

@@ -261,7 +261,7 @@ class TextbookKinematics:
         """Return the linear and the angular half of column i, counted from 0, shape (3,) each."""
         ring, axis = self.arm.ring, self._axis(i)
         nothing = np.array([ring.zero] * 3, dtype=object)
-        turning = _cross(axis, self._lever(i))
+        turning = np.cross(axis, self._lever(i))
         if self._has("cross_product_order"):
             turning = -turning
         slides = ring.kinds[i] != "R"
@@ -421,10 +421,6 @@ def _translation(ring: Ring, axis: int, length: Element) -> Elements:
     T = _identity(ring)
     T[axis, 3] = length
     return T
-
-
-def _cross(a: Elements, b: Elements) -> Elements:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
 
 
 def _sum(first: Direction, second: Direction) -> Direction:

@@ -245,7 +245,8 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
     fit = classify(description).fit
     if fit is not None:
         solutions = inverse_kinematics(description, T)
-        near = configuration(description, q0, "q0") if q0 is not None else _middle(description)
+        middle = Newton.of(description, position_only=True, limits=True).middle
+        near = middle if q0 is None else configuration(description, q0, "q0")
         usable = solutions.q[solutions.allowed if q0 is None else solutions.valid]
         yield from sorted(_wind_near(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
         return
@@ -257,10 +258,6 @@ def _wind_near(q: Array, near: Array, description: Description) -> list[Array]:
     """Return joint values (N, n) with the whole turns added that bring them nearest to ``near``."""
     turns = np.where(description.numbers.prismatic, 0.0, 2 * np.pi * np.rint((near - q) / (2 * np.pi)))
     return list(q + turns)
-
-
-def _middle(description: Description) -> Array:
-    return Newton.of(description, position_only=True, limits=True).middle
 
 
 def _aims_position(description: Description) -> bool:

@@ -40,7 +40,8 @@ def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
     except Exception as error:  # a second reader that fails says nothing about the file
         yield f"yourdfpy does not read it: {' '.join(str(error).split())[:120] or type(error).__name__}"
         return
-    different = [name for name in _links(chain) if not _same_inertial(robot, chain, name)]
+    links = [link for group in chain.groups for link in group]
+    different = [name for name in links if not _same_inertial(robot, chain, name)]
     version = getattr(yourdfpy, "__version__", "")
     if frames <= TOLERANCE and not different:
         yield f"yourdfpy {version} reads the same frames (within {frames:.1e}) and inertials"
@@ -54,10 +55,6 @@ def _tool_difference(robot: object, chain: Chain, q: Array, tool: Array) -> floa
     robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)))  # type: ignore[attr-defined]
     T = robot.get_transform(TIP_FRAME, BASE_FRAME)  # type: ignore[attr-defined]
     return float(np.abs(T - tool).max())
-
-
-def _links(chain: Chain) -> tuple[str, ...]:
-    return tuple(link for group in chain.groups for link in group)
 
 
 def _same_inertial(robot: object, chain: Chain, name: str) -> bool:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.viewer.overlays import TINTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CURVE_COLORS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
+CURVE_COLORS = (*TINTS[:6], "#bbbbbb")
 """Tol's bright scheme (SRON/EPS/TN/09-002, 2021), told apart by colour-blind people too."""
 GRID_COLOR = "#d5d9e0"
 LIMIT_STYLE: dict[str, Any] = {"ls": (0, (5, 3)), "lw": 1.0, "alpha": 0.75}

@@ -12,6 +12,7 @@ from dhkit.description import Array, Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.errors import ModelError
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.stl import binary_stl
+from dhkit.viewer.overlays import AXIS_COLORS, rgb_bytes
 
 if TYPE_CHECKING:
     from dhkit.model.shapes import Part
@@ -21,9 +22,6 @@ Lowered: TypeAlias = dict[str, Any]
 
 Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """meshcat's cylinders stand along y, dhkit's along z: a quarter turn about x."""
-
-AXIS_COLORS = np.array([[0.898, 0.282, 0.302], [0.188, 0.643, 0.424], [0.231, 0.510, 0.965]])
-"""Red, green and blue, from 0 to 1, of x, y and z, readable on white and on black."""
 
 ROUND_SIDES = 48
 """Sides of round solids; a multiple of 4, so that the silhouette has the true radius."""
@@ -86,7 +84,7 @@ def triad_object(length: float, name: str) -> Lowered:
     geometry = meshcat.TriangularMeshGeometry(
         length * np.concatenate(along),
         np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
-        np.repeat(AXIS_COLORS, len(vertices), axis=0),
+        np.repeat(rgb_bytes(AXIS_COLORS) / 255, len(vertices), axis=0),
     )
     material = meshcat.MeshBasicMaterial(vertexColors=True, depthTest=False, transparent=True)
     return _lowered("Mesh", geometry, material, name)

@@ -14,16 +14,13 @@ from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
 from dhkit.viewer.diagrams import CURVE_COLORS, GRID_COLOR, joint_color, joint_kinds
 from dhkit.viewer.motion import check_motion
 from dhkit.viewer.notebook import new_figure
-from dhkit.viewer.scene import first_configuration, frame_labels, scene_size
+from dhkit.viewer.overlays import AXIS_COLORS
+from dhkit.viewer.scene import PICTURE_TRIAD_SHARE, first_configuration, frame_labels, scene_size
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
-"""Colors of x, y and z, as in the viewer."""
 LINK_COLOR, PATH_COLOR = "#3a4252", "#d9480f"
-TRIAD_SHARE = 0.11
-"""Length of a triad, as a share of the arm's size."""
 FLATNESS = 1e-9
 """Largest extent across a plane, as a share of the arm's size, of an arm that is drawn in that plane."""
 MIN_EDGE_SHARE = 0.5
@@ -88,7 +85,7 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     line = skeleton(description, frames, tool)
     _draw_links(axes, description, frames, line)
     _draw_triads(axes, description, np.concatenate([frames, tool[None]]))
-    set_space_limits(axes, line, margin=1.4 * TRIAD_SHARE * scene_size(description))
+    set_space_limits(axes, line, margin=1.4 * PICTURE_TRIAD_SHARE * scene_size(description))
     axes.set_title(description.name, fontsize=13, fontweight="bold")
     return figure
 
@@ -158,7 +155,7 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
     """Draw frames 0 ... n and the tool, T of shape (n + 2, 4, 4)."""
     from matplotlib.patheffects import withStroke
 
-    length = TRIAD_SHARE * scene_size(description)
+    length = PICTURE_TRIAD_SHARE * scene_size(description)
     for k, color in enumerate(AXIS_COLORS):
         start = T[:, :3, 3]
         ends = np.stack([start, start + length * T[:, :3, k]], axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from dhkit.planning.obstacles import Scene
 
 GREY = (0.5, 0.55, 0.62)
+AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
+"""Colors of the x, y and z axes of frames, readable on white and on black; the page has them in ``colors.js``."""
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""
 HEAT_COLORMAP, HEAT_END = "viridis", 0.87
@@ -77,8 +80,12 @@ def heat_colors(values: ArrayLike) -> Array:
 
 def ghost_tints(count: int) -> NDArray[np.uint8]:
     """Return colors of ghosts as bytes, shape (count, 3); they repeat after eight."""
-    tints = [list(bytes.fromhex(TINTS[k % len(TINTS)][1:])) for k in range(count)]
-    return np.array(tints, dtype=np.uint8).reshape(count, 3)
+    return rgb_bytes([TINTS[k % len(TINTS)] for k in range(count)])
+
+
+def rgb_bytes(colors: Sequence[str]) -> NDArray[np.uint8]:
+    """Return colors such as "#e5484d" as bytes from 0 to 255, shape (k, 3)."""
+    return np.array([list(bytes.fromhex(color[1:])) for color in colors], dtype=np.uint8).reshape(-1, 3)
 
 
 def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -> Array:

@@ -21,6 +21,7 @@ MODULES = (
     "main.js",
     "stage.js",
     "boxes.js",
+    "colors.js",
     "player.js",
     "trace.js",
     "overlays.js",

@@ -19,7 +19,8 @@ from dhkit.errors import ModelError
 from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.viewer.drawables import grid_step
-from dhkit.viewer.scene import first_configuration, frame_labels, node_transforms, scene_size
+from dhkit.viewer.overlays import AXIS_COLORS
+from dhkit.viewer.scene import PICTURE_TRIAD_SHARE, first_configuration, frame_labels, node_transforms, scene_size
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -40,10 +41,7 @@ LIGHTS = ((0.5, np.array([0.5, -0.55, 0.75])), (0.18, np.array([-0.8, 0.3, 0.35]
 """Strengths of the lights, and directions to them, world."""
 AMBIENT_LIGHT = 0.42
 GROUND_COLOR, GRID_COLOR, PATH_COLOR = (244, 245, 247), (205, 210, 219), (217, 72, 15)
-AXIS_COLORS = ((229, 72, 77), (48, 164, 108), (59, 130, 246))
 REFERENCE_COLOR = (140, 153, 173)
-TRIAD_SHARE = 0.11
-"""Length of a frame's axes, as a share of the arm's size."""
 GHOST_OPACITY = 0.35
 ROUND_SIDES = 40
 """Sides of a round solid."""
@@ -222,7 +220,7 @@ def _extent(
         nodes = [transforms[:, solid.link], *(ghost.transforms[None, solid.link] for ghost in ghosts)]
         extent += [(box @ T[:3, :3].T + T[:3, 3]) for node in nodes for T in node]
     if frames:
-        length = TRIAD_SHARE * scene_size(description)
+        length = PICTURE_TRIAD_SHARE * scene_size(description)
         tips = transforms[..., :3, 3, None] + length * transforms[..., :3, :3]
         extent.append(np.moveaxis(tips, -1, -2).reshape(-1, 3))
     return np.concatenate(extent)
@@ -418,7 +416,7 @@ def _finish(
         draw.line(line, fill=PATH_COLOR, width=2 * SUPERSAMPLING, joint="curve")
     names = []
     if nodes is not None:
-        length = TRIAD_SHARE * scene_size(description)
+        length = PICTURE_TRIAD_SHARE * scene_size(description)
         for T in nodes:
             origin = camera.project(T[:3, 3])[:2]
             for axis, color in enumerate(AXIS_COLORS):

@@ -185,7 +185,9 @@ def _draw_torques(axes: Axes, result: SimulationResult) -> bool:
     axes.set_ylim(low - margin, high + margin)
     if len(joints):
         i = int(joints[np.argmax(limited[:, joints].mean(axis=0))])
-        _remark(axes, f"saturated: {description.joints[i].name} {_percent(float(limited[:, i].mean()))} of the time")
+        share = 100 * float(limited[:, i].mean())
+        percent = f"{share:.2g}" if share < 99.5 else "100"
+        _remark(axes, f"saturated: {description.joints[i].name} {percent} % of the time")
     return bool(len(joints))
 
 
@@ -276,10 +278,6 @@ def _legend_handles(saturated: bool) -> tuple[Any, ...]:
 
 def _remark(axes: Axes, text: str) -> None:
     axes.set_title(text, fontsize=SMALL_TEXT, color=SHARED_COLOR, loc="right")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else "100 %"
 
 
 def _prefix(largest: float) -> tuple[float, str]:

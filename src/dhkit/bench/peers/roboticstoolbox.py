@@ -12,7 +12,7 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
 from dhkit.description import Array, Convention, Description
 
-IK_TOLERANCE = 1e-20
+IK_OPTIONS = {"joint_limits": False, "tol": 1e-20}
 """Half the squared error at which ik_LM stops: its default of 1e-6 leaves the tool a millimetre off."""
 SAME_ARM = 1e-12
 """Largest difference of poses, m, of the toolbox's own PUMA and ours if they are the same arm."""
@@ -31,7 +31,12 @@ def contenders() -> tuple[Contender, ...]:
         ("ets.jacob0", "jacobian", Mode.SINGLE, _single("jacobian", lambda robot: robot.ets().jacob0)),
         ("ikine_a", "ik", Mode.SINGLE, _ikine_a),
         ("analytic_ik", "ik", Mode.SINGLE, _analytic_ik),
-        ("ik_LM", "ik", Mode.SINGLE, _single("ik", _ik_LM, _successful)),
+        (
+            "ik_LM",
+            "ik",
+            Mode.SINGLE,
+            _single("ik", lambda robot: partial(robot.ets().ik_LM, **IK_OPTIONS), _successful),
+        ),
         ("rne", "inverse_dynamics", Mode.SINGLE, _single("inverse_dynamics", lambda robot: robot.rne, np.ravel)),
         ("inertia", "mass_matrix", Mode.SINGLE, _single("mass_matrix", lambda robot: robot.inertia)),
         ("accel", "forward_dynamics", Mode.SINGLE, _single("forward_dynamics", lambda robot: robot.nofriction().accel)),
@@ -87,10 +92,6 @@ def _analytic_ik(workload: Workload) -> Task:
     except (ValueError, NotImplementedError) as error:
         raise UnavailableError(str(error)) from None
     return single_task(solver.solve, workload.T, _successful)
-
-
-def _ik_LM(robot: Any) -> Callable[..., Any]:
-    return partial(robot.ets().ik_LM, joint_limits=False, tol=IK_TOLERANCE)
 
 
 def _successful(solution: Any) -> Array:

@@ -31,11 +31,13 @@ SPACE_NAMES = word_set(
     "quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf"
 )
 SPACES = SPACE_NAMES | frozenset(",;:!> \n")
-"""Macros that set spaces and type, and say nothing."""
+"""Macros for spacing and fonts, which are ignored."""
 SIZES = word_set("left right big Big bigg Bigg bigl bigr Bigl Bigr biggl biggr Biggl Biggr")
 FRACTIONS = frozenset(("frac", "tfrac", "dfrac", "cfrac"))
-UPRIGHT = word_set("mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal")
-TIMES = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
+STYLE_MACROS = word_set(
+    "mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal"
+)
+SYMBOL_MACROS = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
 DOTS = ("dot", "ddot")
 GREEK = LETTERS - {"pi", "Pi"} | {"varepsilon", "vartheta", "varrho", "varphi"}
 OVER = "\\over"
@@ -121,7 +123,7 @@ class _LatexReader:
         return self._fraction(in_brackets(above, at), in_brackets(below, at), at)
 
     def _item(self, piece: re.Match[str]) -> list[Token]:
-        """Read one thing with what stands below it."""
+        """Read one item with its subscript."""
         at = piece.start(piece.lastindex or 0)
         self.at = piece.end()
         if piece[1] is not None:
@@ -248,16 +250,16 @@ class _LatexReader:
             return [Token("name", "sqrt", at), *self._bracketed(at)]
         if name in DOTS:
             return self._dotted(name, at, bare)
-        if name in UPRIGHT:
+        if name in STYLE_MACROS:
             return self._upright(at, bare)
         if name in ("begin", "end"):
             return self._environment(name, at)
         if name in FUNCTION_NAMES or name == "top":
             return [Token("name", name, at)]
         if name in ("pi", "ell") or name in GREEK:
-            return self._name(TIMES.get(name, name), at, bare)
-        if name in TIMES:
-            return [sign(TIMES[name], at)]
+            return self._name(SYMBOL_MACROS.get(name, name), at, bare)
+        if name in SYMBOL_MACROS:
+            return [sign(SYMBOL_MACROS[name], at)]
         if name in "{}":
             return [sign("(" if name == "{" else ")", at)]
         return fail(self.text, at, f"the macro \\{name}, which is not read,")

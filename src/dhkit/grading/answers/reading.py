@@ -23,7 +23,7 @@ STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
 """What sympy's maple_code adds to a matrix."""
 
 MAX_MEANING = 20_000
-"""Largest number of tokens that a student's own name stands for, the names in it written out."""
+"""Largest number of tokens that a student's own name stands for, after the names in its meaning are replaced."""
 
 BAR = re.compile(r"-{2,}")
 
@@ -35,7 +35,9 @@ RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan"}
 
 
 def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
-    """Read an expression in Python's, MATLAB's, sympy's or LaTeX notation, or in the shorthand of the field.
+    """Read an expression in Python's, MATLAB's, sympy's or LaTeX notation.
+
+    The shorthand c1, s12 for cos(q1), sin(q1 + q2) is understood in all of them.
 
     Parameters
     ----------

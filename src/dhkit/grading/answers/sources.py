@@ -83,3 +83,5 @@ def _latex(text: str, file: str, line_name: LineName, description: Description) 
 
 LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}
 """Readers by suffix."""
+SHEET_SUFFIXES = (".toml", *LANGUAGES, ".ipynb")
+"""Suffixes of answer sheets; a notebook has a program of one of the languages."""

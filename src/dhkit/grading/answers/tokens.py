@@ -47,7 +47,7 @@ def word_set(text: str) -> frozenset[str]:
 
 
 def quote(text: str) -> str:
-    """Return text as messages show it: short, and with nothing that a terminal would obey."""
+    """Return text as messages show it: short, and with control characters escaped."""
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
 

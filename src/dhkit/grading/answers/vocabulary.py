@@ -66,13 +66,13 @@ class Vocabulary:
     further
         Names that the task has besides, such as px and r11.
     sums
-        Of each joint the joints, from 0, whose variables the student's variable is the sum of: those of parallel axes
-        before it where angles are measured from a fixed direction; itself alone unless given.
+        For each joint, the indices (from 0) of the joints whose angles add up to the student's variable: with absolute
+        angles the joint and the parallel joints before it; by default the joint alone.
 
     Raises
     ------
     AnswerError
-        A name that is none, or one for two things.
+        An invalid name, or one with two meanings.
     """
 
     def __init__(

@@ -35,7 +35,7 @@ Differences: TypeAlias = Mapping[Index, Element]
 Key: TypeAlias = frozenset[Any]
 TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
 ROUNDED_DECIMALS = 2e-3
-"""Tolerance relative to the largest entry, which decimals of four digits stay below."""
+"""Tolerance relative to the largest entry: numbers of four decimals, multiplied and added, stay below it."""
 MAX_DERIVED_PAIRS = 150
 """Largest number of pairs of mistakes at one link that are derived for a quantity; their changes do not add up."""
 
@@ -48,7 +48,7 @@ class Variants:
     truth
         The right answers.
     numbers
-        Parameters that stand for their numbers in the file.
+        Names of the parameters that this student replaced by their numbers in the file.
     """
 
     def __init__(self, truth: Truth, numbers: frozenset[str] = frozenset()) -> None:
@@ -61,7 +61,7 @@ class Variants:
 
     @cached_property
     def dynamic(self) -> list[Variant]:
-        """Possible mistakes in the robot's equations, the least rare first."""
+        """Possible mistakes in the robot's equations, the most common first."""
         variants = [
             lagrangian_sum(self.truth),
             *energy_variants(self.truth),

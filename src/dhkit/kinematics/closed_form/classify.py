@@ -40,7 +40,7 @@ class Classification:
 
     @property
     def closed_form(self) -> bool:
-        """Whether its inverse kinematics have a closed form of ours."""
+        """Whether dhkit has a closed form of its inverse kinematics."""
         return self.family is not None
 
     @property
@@ -68,7 +68,7 @@ def classify(description: Description) -> Classification:
     Axes count as parallel or perpendicular to 1e-12 rad, as intersecting to 1e-12 of the reach.
     """
     axes = Axes.of(description)
-    kinds = _kinds(axes.kinds)
+    kinds = f"{axes.n}R" if set(axes.kinds) == {"R"} else axes.kinds
     found = _first(axes)
     if found is not None:
         family, fit = found
@@ -89,7 +89,3 @@ def _first(axes: Axes) -> tuple[Family, Fit] | None:
         if fit is not None:
             return family, fit
     return None
-
-
-def _kinds(letters: str) -> str:
-    return f"{len(letters)}R" if set(letters) == {"R"} else letters

@@ -46,10 +46,10 @@ class Fit:
     words: str
     """How the axes lie, in words."""
     parameters: Mapping[str, Parameter]
-    """The numbers that the family's formulas work with, by name."""
+    """The numbers that the family's formulas work with, by name; ``reach``, m, is required of every family."""
     branches: tuple[str, ...]
     met: tuple[str, ...]
-    """Coordinates of a pose that the arm can meet."""
+    """Coordinates of a pose that the arm can reach: those of ``ALL_COORDINATES``, and yaw for its turn in the plane."""
     structure: str = ""
     """What the formulas depend on besides their parameters, such as the order of the joints."""
     free: int | None = None
@@ -103,7 +103,7 @@ class PoseSymbols:
     T: ca.SX
     """The pose without its last row, 3 x 4."""
     scale: SX
-    """Length that rounding of positions is a share of, m."""
+    """Length scale of rounding errors of positions, m: the reach plus the sum of the absolute coordinates."""
     structure: str = ""
     """Structure of the fit."""
     free: Pair = (1.0, 0.0)

@@ -20,8 +20,8 @@ ROUNDING = 2e-14
 SINGULAR = 1e-5
 """A branch counts as singular where the sine, or distance over reach, that vanishes there is below this."""
 MIN_DIRECTION = 1e-13
-"""A vector shorter than this share of ``scale`` has no direction but rounding, and any direction may replace it: the
-pose then closes to about this."""
+"""Shortest vector, as a share of ``scale``, that has a direction. That of a shorter one is only rounding error, and is
+replaced by a default: forward kinematics of the solution then differs from the pose by about this share."""
 
 
 @dataclass(frozen=True)

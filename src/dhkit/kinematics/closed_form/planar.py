@@ -100,7 +100,7 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     off = 0.0 if "P" in kinds else _off_plane(rise, pose.scale)
     branches = []
     for side in (0, 1):
-        # FramedPose from above, left is left where v points up.
+        # Seen from above, the elbow is on the left if v points up; otherwise left and right are exchanged.
         upright, other = p["up"] > 0, 1 - side
         qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
         qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)

@@ -27,7 +27,7 @@ ENTRY_COST = 1000.0
 OBLIQUE_COST, STRAIGHT_COST, NEGATIVE_COST = 20.0, 2.0, 1.0
 """Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
 EARLY_COST = 0.1
-"""Extra cost of an offset d for each row that comes after it: parallel axes share one offset, the last row has it."""
+"""Extra cost of an offset d for each row after it, so that the last of parallel axes has the whole offset."""
 ON_AXIS_DISTANCE = 1e-9
 """Distance from an axis, relative to the arm's size, below which a point counts as on the axis."""
 ZERO = 1e-10
@@ -35,25 +35,27 @@ ZERO = 1e-10
 MIN_SINE = 1e-3
 """Directions closer to an axis than this sine define no perpendicular direction."""
 MAX_PARTIAL_TABLES = 336
-"""Number of partial tables that are extended at each axis, times the number of joints: 48 for seven joints."""
+"""Beam width of the search times the number of joints: 48 partial tables are kept at each axis of a 7-joint arm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
     """The axes of n joints in the base, with every joint at zero.
 
+    Lengths are in units of about the arm's size, by which :func:`~dhkit.model.extraction.table.tidiest_table` divides.
+
     Attributes
     ----------
     points, directions
-        A point on each axis, m, and its unit vector, shape (n, 3).
+        A point on each axis and its unit vector, shape (n, 3).
     prismatic
-        Whether each joint is; shape (n,).
+        Whether each joint is prismatic, shape (n,).
     T_base_tip
-        The tip's pose, shape (4, 4), m.
+        The tip's pose, shape (4, 4).
     frames
         Unit vectors of the joints' frames, shape (n, 3, 3), one a row.
     feet
-        Points where skew neighbouring axes are nearest to each other, m, shape (k, 3).
+        Points where skew neighbouring axes are nearest to each other, shape (k, 3).
     normals
         Directions of their common normals, shape (k, 3).
     parallel_below
@@ -75,9 +77,9 @@ class Axes:
         return len(self.points)
 
     def heights(self, i: int, on_axis: Array) -> Array:
-        """Return points at whose height a normal may begin on axis i (from 0), m, shape (k, 3).
+        """Return points at whose height a normal may begin on axis i (from 0), shape (k, 3).
 
-        They are ``on_axis``, a point on the axis, shape (3,), m, nearby frames, base, tip, and feet on the axis.
+        They are ``on_axis``, a point on the axis, shape (3,), nearby frames, base, tip, and feet on the axis.
         """
         z, feet = self.directions[i], self.feet
         if len(feet):
@@ -87,9 +89,9 @@ class Axes:
         )
 
     def lines(self, i: int, on_previous_axis: Array | None) -> Array:
-        """Return points through which the axis of a prismatic joint i (from 0) may go, m, shape (k, 3).
+        """Return points through which the axis of a prismatic joint i (from 0) may go, shape (k, 3).
 
-        ``on_previous_axis`` is a point on the axis before, shape (3,), m, if there is one.
+        ``on_previous_axis`` is a point on the axis before, shape (3,), if there is one.
         """
         own = self.points[i : i + 2]
         previous = own[:0] if on_previous_axis is None else on_previous_axis[None]
@@ -291,7 +293,7 @@ def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous:
         parts = axes.perpendicular(i, previous)
         directions = _distinct(np.vstack([parts, -parts]))
     heights = (axes.heights(i, on_axis) - on_axis) @ z
-    heights[0] = 0.0
+    heights[0] = 0.0  # on_axis itself, without rounding
     _, places = np.unique(np.round(heights, 10), return_index=True)
     starts = [on_axis + heights[place] * z for place in np.sort(places)]
     return [Normal(x, start, start + gap) for start in starts for x in directions]

@@ -53,8 +53,7 @@ class Residual:
             parts += [f"M {self.mass_matrix:.1e}", f"g {self.gravity:.1e}"]
         return f"{', '.join(parts)} over {self.states} random states"
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 class Original:

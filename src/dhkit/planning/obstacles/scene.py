@@ -186,8 +186,7 @@ class Floor:
         if height.shape != () or not np.isfinite(height):
             raise ValueError(f"floor: height is {self.height!r}; expected a finite number, m")
 
-    def __repr__(self) -> str:
-        return value_line(self)
+    __repr__ = value_line
 
 
 Scene: TypeAlias = Sequence[Obstacle | Floor]

@@ -12,7 +12,7 @@ from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_ma
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
 from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleration
 from dhkit.symbolic.differentiable.frames import SymbolicTable, jacobian, joint_symbols
-from dhkit.symbolic.differentiable.friction import Friction, friction_torque
+from dhkit.symbolic.differentiable.friction import Friction, friction_parameters, friction_torque
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.moments import Moments
 from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
@@ -199,10 +199,9 @@ class CasadiFunctions:
             J = jacobian(SymbolicTable.of(description), self._q)
             load += J.T @ self._wrench_input["wrench"]
         if self._friction is not None:
-            numbers = description.numbers
-            directions = [self._friction.direction(self._qd[i]) for i in range(description.n)]
-            coulomb = [(row[0], row[1]) for row in numbers.coulomb.tolist()]
-            load -= friction_torque(self._qd, numbers.viscous.tolist(), coulomb, directions)
+            width = self._friction.width
+            parameters = casadi.SX(casadi.DM(friction_parameters(description.numbers, width)))
+            load -= friction_torque(self._qd, parameters, smooth=width > 0)
         return load
 
     def _dynamics(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.differentiable.vectors import Scalar
+import numpy as np
+
+from dhkit.description import Array, Numbers
 
 if TYPE_CHECKING:
     import casadi
@@ -32,7 +33,7 @@ class Friction:
     """
 
     width: float = 0.0
-    """rad/s or m/s."""
+    """Rate at which the direction factor s reaches 1/sqrt(2), rad/s or m/s; 0: a step with stiction."""
 
     def __post_init__(self) -> None:
         known = isinstance(self.width, Real) and math.isfinite(self.width)
@@ -54,40 +55,33 @@ class Friction:
             raise TypeError(f"friction is {friction!r}; expected False, True or a Friction")
         return cls() if friction else None
 
-    def direction(self, speed: Scalar) -> Scalar:
-        """Return the direction of a speed, rad/s or m/s: -1 to 1."""
-        import casadi
 
-        return smooth_direction(speed, self.width) if self.width else casadi.sign(speed)
-
-
-def smooth_direction(speed: Scalar, width: Scalar) -> Scalar:
-    """Return v / sqrt(v^2 + width^2), without unit; speed and width in rad/s or m/s."""
-    import casadi
-
-    return speed / casadi.sqrt(speed * speed + width * width)
+def friction_parameters(numbers: Numbers, width: float) -> Array:
+    """Return the inputs of :func:`friction_torque`, shape (3 n + 1,): viscous, dry (two a joint), and the width."""
+    return np.concatenate([numbers.viscous, numbers.coulomb.ravel(), [width]])
 
 
-def friction_torque(
-    qd: casadi.SX, viscous: Sequence[Scalar], coulomb: Sequence[tuple[Scalar, Scalar]], directions: Sequence[Scalar]
-) -> casadi.SX:
+def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> casadi.SX:
     """Return friction torques, n x 1, N m and N: viscous qd, plus c_pos for positive and c_neg for negative rates.
 
     Parameters
     ----------
     qd
-        Joint rates, n x 1.
-    viscous, coulomb
-        At the joint side, N m s/rad and N m (or N s/m and N), one entry a joint; c_neg is at most 0.
-    directions
-        Direction of each joint's motion, -1 to 1; see :class:`Friction`.
+        Joint rates, n x 1, rad/s and m/s.
+    parameters
+        Those of :func:`friction_parameters`: N m s/rad and N m (or N s/m and N) at the joint side, c_neg at most 0.
+    smooth
+        Whether dry friction changes its direction smoothly, over the width; else by a step, 0 at rest.
     """
     import casadi
 
+    n = qd.numel()
     torques = []
-    for i, s in enumerate(directions):
-        positive, negative = coulomb[i]
+    for i in range(n):
+        speed, width = qd[i], parameters[3 * n]
+        s = speed / casadi.sqrt(speed * speed + width * width) if smooth else casadi.sign(speed)
+        positive, negative = parameters[n + 2 * i], parameters[n + 2 * i + 1]
         dry = (positive - negative) / 2 * s + (positive + negative) / 2 * (s * s)
-        torques.append(viscous[i] * qd[i] + dry)
+        torques.append(parameters[i] * speed + dry)
     stacked: casadi.SX = casadi.vertcat(*torques)
     return stacked

@@ -134,7 +134,9 @@ def _numbers(description: Description) -> Array:
     base, links = regroup(exact_moments(description), rows)
     gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
     mass = base.mass + sum(link.mass for link in links)
-    energy = -(gravity @ _floats(base.first)) - float(mass) * (numbers.gravity @ numbers.T_world_base[:3, 3])
+    energy = -(gravity @ np.array(base.first, dtype=float)) - float(mass) * (
+        numbers.gravity @ numbers.T_world_base[:3, 3]
+    )
     joints = [entry for row in rows for entry in row.entries]
     moments = [float(entry) for link in links for entry in link.entries]
     return np.array([*joints, *moments, *numbers.armature, *gravity, energy], dtype=float)
@@ -157,7 +159,3 @@ def exact_moments(description: Description) -> list[Moments]:
             inertia = [list(about_x(c, s, (col[0], col[1], col[2]))) for col in zip(*half, strict=True)]
         moments.append(Moments.of_body(Fraction(float(numbers.mass[i])), com, inertia))
     return moments
-
-
-def _floats(a: Vector3) -> Array:
-    return np.array([float(x) for x in a])

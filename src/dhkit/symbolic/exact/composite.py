@@ -76,7 +76,7 @@ def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Ele
             M[i, j] = M[j, i] = torque[2] if ring.kinds[i] == "R" else force[2]
             if i:
                 force = steps[i].R @ force
-                torque = steps[i].R @ torque + _cross(steps[i].p, force)
+                torque = steps[i].R @ torque + np.cross(steps[i].p, force)
         M[j, j] = M[j, j] + arm.armature[j]
     return M
 
@@ -129,7 +129,3 @@ def _behind(ring: Ring, row: ExactRow) -> JointTransform:
     (ca, sa), zero, one = row.alpha, ring.zero, ring.one
     R = np.array([[one, zero, zero], [zero, ca, -sa], [zero, sa, ca]], dtype=object)
     return JointTransform(R, np.array([row.a, zero, zero], dtype=object))
-
-
-def _cross(a: Elements, b: Elements) -> Elements:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)

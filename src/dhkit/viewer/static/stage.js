@@ -1,6 +1,7 @@
 // The scene on screen: meshcat's viewer without its panels, our camera, light and colors.
 
 import { corners, inView, localBox } from "./boxes.js";
+import { AXES } from "./colors.js";
 import { Labels } from "./labels.js";
 import { placements } from "./messages.js";
 import { Overlays } from "./overlays.js";
@@ -17,7 +18,6 @@ const REST = 400; // ms without a change after which the picture is drawn finely
 const FINEST = 2; // pixels of the picture for one of the page
 const TRACE_RADIUS = 0.0035; // share of the arm's size
 const POINT = 0.008; // diameter of a point, share of the arm's size
-const AXIS_COLORS = [0xe5484d, 0x30a46c, 0x3b82f6];
 const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/scene.py
 
 export class Stage {
@@ -387,7 +387,7 @@ export class Stage {
   // Three rods along x, y and z.
   axes(length, thickness) {
     const axes = new THREE.Group();
-    AXIS_COLORS.forEach((color, k) => {
+    AXES.forEach((color, k) => {
       const rod = new THREE.Mesh(new THREE.CylinderGeometry(thickness, thickness, length, 8), new THREE.MeshBasicMaterial({ color, depthTest: false, transparent: true }));
       rod.position.setComponent(k, length / 2);
       if (k === 0) rod.rotation.z = -Math.PI / 2;

@@ -297,11 +297,8 @@ class _ProgramReader:
             self._assign(tokens[:assigning], tokens[assigning + 1 :])
         elif is_change:
             self._change(changing)
-        elif len(tokens) == 1 and word and not self._is_known(word):
+        elif len(tokens) == 1 and word and word not in {*KNOWN_WORDS, *self.bound, *self.function_line_names}:
             raise self._refuse(f"found {word!r}, which may be a script that changes any name", "assignments")
-
-    def _is_known(self, word: str) -> bool:
-        return word in KNOWN_WORDS or word in self.bound or word in self.function_line_names
 
     def _syms(self) -> None:
         """Read ``syms q1(t) m [2 1] real``."""

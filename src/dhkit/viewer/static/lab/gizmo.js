@@ -1,9 +1,9 @@
 // A target in the scene: three arrows to move it and three rings to turn it.
 
 import { inView } from "../boxes.js";
+import { AXES } from "../colors.js";
 
 const { THREE } = MeshCat;
-const COLORS = [0xe5484d, 0x30a46c, 0x3b82f6];
 const LENGTH = 0.16; // of the arm's reach
 const OUT_OF_REACH = 0x9aa3b2;
 
@@ -30,7 +30,7 @@ export class Gizmo {
   }
 
   material(axis) {
-    return new THREE.MeshBasicMaterial({ color: COLORS[axis], transparent: true, opacity: 0.9, depthTest: false });
+    return new THREE.MeshBasicMaterial({ color: AXES[axis], transparent: true, opacity: 0.9, depthTest: false });
   }
 
   arrow(axis) {
@@ -67,7 +67,7 @@ export class Gizmo {
     this.group.visible = Boolean(T);
     this.reach = reach;
     if (T && !this.dragged) this.pose.set(...T);
-    for (const { userData } of this.handles) userData.material.color.set(reached ? COLORS[userData.axis] : OUT_OF_REACH);
+    for (const { userData } of this.handles) userData.material.color.set(reached ? AXES[userData.axis] : OUT_OF_REACH);
     this.place();
   }
 

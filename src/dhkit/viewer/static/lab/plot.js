@@ -1,8 +1,8 @@
 // Curves over time, drawn by uPlot: colours that colour-blind people tell apart, limits dashed.
 
+import { CURVES } from "../colors.js";
 import { h, save } from "./dom.js";
 
-export const COLORS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb"];
 const HEIGHT = 150;
 const DIGITS = 8; // of numbers in a CSV
 
@@ -65,7 +65,7 @@ export class Plot {
     const style = getComputedStyle(document.documentElement);
     const value = (name) => style.getPropertyValue(name).trim();
     const axis = { stroke: value("--faint"), grid: { stroke: value("--line"), width: 1 }, ticks: { show: false }, font: "11px system-ui" };
-    const series = this.names.map((name, k) => ({ label: name, stroke: COLORS[k % COLORS.length], width: 1.6, dash: k >= COLORS.length ? [6, 4] : undefined, points: { show: false } }));
+    const series = this.names.map((name, k) => ({ label: name, stroke: CURVES[k % CURVES.length], width: 1.6, dash: k >= CURVES.length ? [6, 4] : undefined, points: { show: false } }));
     this.plot = new uPlot({
       width: Math.max(200, this.area.clientWidth),
       height: HEIGHT,
@@ -87,7 +87,7 @@ export class Plot {
       for (const value of pair ?? []) {
         if (value === null || value < plot.scales.y.min || value > plot.scales.y.max) continue;
         const y = Math.round(plot.valToPos(value, "y", true)) + 0.5;
-        ctx.strokeStyle = COLORS[k % COLORS.length];
+        ctx.strokeStyle = CURVES[k % CURVES.length];
         ctx.beginPath();
         ctx.moveTo(bbox.left, y);
         ctx.lineTo(bbox.left + bbox.width, y);
@@ -140,7 +140,7 @@ export class Plot {
     paint.fillText(`${this.title} [${this.unit}]`, 8 * scale, line * 0.8);
     places.forEach((place, k) => {
       const y = (place.row + 0.8) * line;
-      paint.fillStyle = COLORS[k % COLORS.length];
+      paint.fillStyle = CURVES[k % CURVES.length];
       paint.fillRect(place.x, y - 5 * scale, 12 * scale, 3 * scale);
       paint.fillStyle = value("--ink");
       paint.fillText(this.names[k], place.x + 17 * scale, y);
@@ -152,5 +152,5 @@ export class Plot {
 }
 
 export function legend(names) {
-  return h("ul", { class: "legend" }, names.map((name, k) => h("li", {}, h("i", { style: `background:${COLORS[k % COLORS.length]}` }), name)));
+  return h("ul", { class: "legend" }, names.map((name, k) => h("li", {}, h("i", { style: `background:${CURVES[k % CURVES.length]}` }), name)));
 }

@@ -1,11 +1,11 @@
 // The tool: its pose in numbers, a target that the arm follows, and the branches that reach it.
 
+import { GHOSTS } from "../colors.js";
 import { euler } from "../offline/kinematics.js";
 import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
 import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
-const GHOSTS = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988"]; // dhkit/viewer/overlays.py
 const AWAY = 1e-4; // m
 const ORDERS = ["XYZ", "ZYX", "ZYZ", "ZXZ", "xyz", "zyx", "zyz", "zxz"];
 

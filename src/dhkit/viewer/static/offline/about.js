@@ -1,5 +1,6 @@
 // What the page shows: its caption, what colours mean, and where to read on.
 
+import { AXES } from "../colors.js";
 import { h } from "../lab/dom.js";
 
 export class AboutPanel {
@@ -12,7 +13,7 @@ export class AboutPanel {
     const swatch = (color) => h("i", { style: `background:${color}` });
     const meaning = (color, text) => h("li", {}, swatch(color), text);
     const colors = [meaning("var(--accent)", "orange: the tool's path, and links beyond a limit")];
-    colors.push(h("li", {}, swatch("#e5484d"), swatch("#30a46c"), swatch("#3b82f6"), "red, green and blue: the x, y and z axis of a frame"));
+    colors.push(h("li", {}, ...AXES.map(swatch), "red, green and blue: the x, y and z axis of a frame"));
     colors.push(...ghosts.map(({ text, color }) => meaning(color, text)), ...overlays.map(({ text, color }) => meaning(color, text)));
     this.root.replaceChildren(
       ...(caption || source).split("\n").filter((text) => text.trim()).map((text) => h("p", { class: "caption" }, text)),
