@@ -73,7 +73,7 @@ def _meets_whole_poses(arm: Arm) -> bool:
     """Return whether inverse kinematics of an arm meet whole poses; arms of few joints may meet the position alone."""
     fit = arm.family.fit
     # A planar arm or a SCARA that meets position and yaw meets the whole pose.
-    return fit is None or len(fit.met) == 6 or "yaw" in fit.met
+    return fit is None or len(fit.coordinates) == 6 or "yaw" in fit.coordinates
 
 
 def _worst(difference: Array) -> float | None:

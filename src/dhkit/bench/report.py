@@ -239,7 +239,7 @@ class BenchReport:
     operations: tuple[Operations, ...] = ()
     requirements: tuple[Requirement, ...] = ()
 
-    def json(self) -> dict[str, Any]:
+    def json(self) -> dict[str, object]:
         """Return the report as plain data for JSON, without NaN, tuples and classes."""
         plain = asdict(self)
         for entry, row in zip(plain["rows"], self.rows, strict=True):
@@ -248,7 +248,7 @@ class BenchReport:
         for key in ("outcomes", "requirements", "scaling", "memory"):
             for entry, value in zip(plain[key], getattr(self, key), strict=True):
                 entry |= value.derived
-        data: dict[str, Any] = with_lists(plain)
+        data: dict[str, object] = with_lists(plain)
         return data
 
     def markdown(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -265,20 +266,15 @@ def _derive(arm: Arm, measurements: _Measurements) -> None:
 
 def _probe(workload: Workload, quantity: str, repeats: int, measurements: _Measurements, tell: Progress) -> None:
     """Measure the probes of a quantity; a probe that cannot be measured is listed as missing."""
-    steps: tuple[tuple[str, Callable[[], None]], ...] = (
-        ("two threads", lambda: measurements.scaling.append(thread_scaling(workload, quantity, repeats))),
-        *(
-            (
-                f"memory, {called}",
-                lambda called=called: measurements.memory.append(peak_memory(workload, quantity, called)),
-            )
-            for called in PeakMemory.CALLED
-        ),
-        ("a new process", lambda: measurements.starts.append(first_call(workload, quantity))),
-    )
-    for name, step in steps:
+
+    def probe(name: str, results: list[Any], measure: Callable[..., object], *options: object) -> None:
         tell(f"{quantity}: {name}")
         try:
-            step()
+            results.append(measure(workload, quantity, *options))
         except Exception as error:  # it may fail in any way, as contenders may
             measurements.missing.append(_missing(quantity, name, error))
+
+    probe("two threads", measurements.scaling, thread_scaling, repeats)
+    for called in PeakMemory.CALLED:
+        probe(f"memory, {called}", measurements.memory, peak_memory, called)
+    probe("a new process", measurements.starts, first_call)

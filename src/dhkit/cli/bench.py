@@ -23,13 +23,13 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def bench(
-    quantities: Annotated[list[str] | None, typer.Argument(help="What to time; all unless given.")] = None,
+    quantities: Annotated[list[str] | None, typer.Argument(help="Quantities to time; default: all.")] = None,
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Items of a batch.")] = 100_000,
-    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads that batch calls may use.")] = 1,
-    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Interleaved rounds.")] = 9,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
-    probes: Annotated[bool, typer.Option(help="Measure threads, memory and new processes too.")] = True,
+    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of items of a batch.")] = 100_000,
+    threads: Annotated[int, typer.Option(min=1, max=1024, help="Number of threads that batch calls may use.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Number of interleaved rounds.")] = 9,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    probes: Annotated[bool, typer.Option(help="Measure thread scaling, memory and first calls too.")] = True,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
     json: Json = False,
 ) -> ExitStatus:

@@ -44,15 +44,18 @@ def _raise_interrupt(*_: object) -> None:
 @app.command()
 def lab(
     robot: Annotated[str, typer.Argument(help="A library name, a robot file or an assignment (.toml).")],
-    port: Annotated[int | None, typer.Option(min=1024, max=65535, help="Keep this address, token included.")] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(min=1024, max=65535, help="Port of the page; the address, token included, stays the same."),
+    ] = None,
     mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
     run: Annotated[
         str | None, typer.Option(help="Your program in place of a file; ARGUMENTS follow the robot.")
     ] = None,
-    arguments: Annotated[list[str] | None, typer.Argument(help="Of the program of --run.")] = None,
-    sandbox: Annotated[str | None, typer.Option(help="bwrap: your program in bubblewrap.")] = None,
-    solid: Annotated[Path | None, typer.Option(help="An STL file for the panel of transforms.")] = None,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
+    arguments: Annotated[list[str] | None, typer.Argument(help="Arguments of the program of --run.")] = None,
+    sandbox: Annotated[str | None, typer.Option(help="bwrap: run your program in bubblewrap.")] = None,
+    solid: Annotated[Path | None, typer.Option(help="STL file for the panel of transforms.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
 ) -> ExitStatus:
     """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
     if mine is not None and run is not None:
@@ -81,8 +84,8 @@ def lab(
 @app.command()
 def view(
     robot: Robot,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Only print the address.")] = False,
-    html: Annotated[Path | None, typer.Option(help="Write a page in place of it.")] = None,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
+    html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
 ) -> ExitStatus:
     """Show an arm in the browser, to look at; Ctrl-C ends it."""
     arm = Arm.load(robot)

@@ -59,8 +59,8 @@ class InverseKinematics:
 @app.command()
 def demo(
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer samples.")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Use fewer samples.")] = False,
     json: Json = False,
 ) -> ExitStatus:
     """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""

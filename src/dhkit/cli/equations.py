@@ -11,7 +11,7 @@ import typer
 
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.options import Json, Robot, Uniform, load_arm
-from dhkit.cli.output import print_json, say_written
+from dhkit.cli.output import print_json, report_files
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
@@ -72,13 +72,22 @@ def _kinematics_of(description: Description, symbols: str, base: bool) -> Symbol
 @app.command()
 def equations(
     robot: Robot,
-    what: Annotated[str, typer.Option(help="Any of M, C, h, g, tau, K, V; or of A (A1 ... An), T, J.")] = "M,C,g",
-    form: Annotated[str, typer.Option("--format", help="text, latex, python, c, matlab or html.")] = "text",
+    what: Annotated[
+        str, typer.Option(help="Quantities: any of M, C, h, g, tau, K, V; or any of A (A1 ... An), T, J.")
+    ] = "M,C,g",
+    form: Annotated[str, typer.Option("--format", help="Format: text, latex, python, c, matlab or html.")] = "text",
     symbols: Annotated[
-        str, typer.Option(help="none: numbers; file: the file's parameters; inertial: every inertial parameter.")
+        str,
+        typer.Option(
+            help="Symbols: none (numbers), file (the file's parameters), or inertial (every inertial parameter)."
+        ),
     ] = "file",
     base: Annotated[
-        bool, typer.Option("--base-parameters", help="The fewest inertial parameters, and what they stand for.")
+        bool,
+        typer.Option(
+            "--base-parameters",
+            help="Use the base parameters (the fewest inertial parameters), and print their definitions.",
+        ),
     ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
     uniform: Uniform = False,
@@ -97,10 +106,7 @@ def equations(
         shown = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
     if output is not None:
         files = _write(lag, shown, form, output)
-        if json:
-            print_json({"files": [str(file) for file in files]})
-        else:
-            say_written(files)
+        report_files(files, json=json)
         return
     text = FORMATS[form](lag, shown)
     if json:

@@ -26,9 +26,13 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def extract(
     urdf: Annotated[str, typer.Argument(metavar="FILE", help="A URDF, or example:NAME of example-robot-data.")],
-    base: Annotated[str | None, typer.Option(help="The chain's first link, which becomes the world; the root.")] = None,
-    tip: Annotated[str | None, typer.Option(help="Its last link; may be left out where there is one chain.")] = None,
-    modified: Annotated[bool, typer.Option("--modified", help="Craig's table instead of the standard one.")] = False,
+    base: Annotated[
+        str | None, typer.Option(help="First link of the chain, which becomes the world; default: the root.")
+    ] = None,
+    tip: Annotated[str | None, typer.Option(help="Last link of the chain; not needed if there is one chain.")] = None,
+    modified: Annotated[
+        bool, typer.Option("--modified", help="Return a modified (Craig's) table, not a standard one.")
+    ] = False,
     as_designed: Annotated[
         bool, typer.Option("--as-designed", help="Read 1.5708 as a right angle, and say what that changes.")
     ] = False,

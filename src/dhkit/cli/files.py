@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.arguments import OutsideLimits, option_values, with_long_options
 from dhkit.cli.options import Json, Robot, Uniform, degrees_option, load_arm
-from dhkit.cli.output import print_json, say, say_written
+from dhkit.cli.output import print_json, report_files, say, say_written
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
 from dhkit.model.cad_assembly import import_cad as import_assembly
@@ -38,9 +38,9 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def build(
     robot: Robot,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The URDF to write; ./NAME.urdf.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="URDF to write; default: ./NAME.urdf.")] = None,
     mesh_prefix: Annotated[
-        str | None, typer.Option(help="What it names its meshes by, as package://my_robot/meshes/; meshes/.")
+        str | None, typer.Option(help="Prefix of the meshes' names, as package://my_robot/meshes/; default: meshes/.")
     ] = None,
     uniform: Uniform = False,
     json: Json = False,
@@ -52,10 +52,7 @@ def build(
         raise DescriptionError(f"{path}: a URDF would overwrite a robot file; expected another name")
     check_place(path)
     files = arm.write_urdf(path, mesh_prefix)
-    if json:
-        print_json({"files": [str(file) for file in files]})
-    else:
-        say_written(files)
+    report_files(files, json=json)
 
 
 @app.command(name="import-cad", cls=with_long_options({"--at": None}))
@@ -66,19 +63,29 @@ def import_cad(
     ],
     table: Annotated[str, typer.Option("--table", help="The DH table: a robot file (.toml) or a library name.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The new folder: robot.toml, robot.urdf, meshes.")],
-    density: Annotated[float | None, typer.Option(help="Of all links, kg/m^3; nothing is assumed.")] = None,
-    mass: Annotated[list[str] | None, typer.Option(metavar="LINK=KG", help="Of one link; may be given again.")] = None,
+    density: Annotated[float | None, typer.Option(help="Density of all links, kg/m^3; none is assumed.")] = None,
+    mass: Annotated[
+        list[str] | None, typer.Option(metavar="LINK=KG", help="Mass of one link; may be given again.")
+    ] = None,
     report: Annotated[
         list[Path] | None, typer.Option(help="Mass properties from the CAD program: SolidWorks' text or a .csv.")
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="Of the files: m, cm, mm or in; by size unless given.")] = None,
-    simplify: Annotated[int | None, typer.Option(metavar="N", help="Reduce parts to N triangles.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of the files: m, cm, mm or in; default: guessed from the size.")
+    ] = None,
+    simplify: Annotated[int | None, typer.Option(metavar="N", help="Reduce each part to N triangles.")] = None,
     mapping: Annotated[
         list[str] | None,
-        typer.Option("--map", metavar="LINK=FILE", help="Where names do not say it; may be given again."),
+        typer.Option(
+            "--map", metavar="LINK=FILE", help="File of a link whose name does not say it; may be given again."
+        ),
     ] = None,
     at: Annotated[
-        str | None, typer.Option(metavar="Q ...", help="Joint values of the export; ready, else zero, unless given.")
+        str | None,
+        typer.Option(
+            metavar="Q ...",
+            help="Joint values of the export; default: the configuration ready if there is one, else zero.",
+        ),
     ] = None,
     degrees: Annotated[bool, degrees_option("Angles of --at are in degrees.")] = False,
     json: Json = False,
@@ -151,7 +158,7 @@ def _names(text: str) -> list[str]:
 
 
 @app.command()
-def schema(what: Annotated[str, typer.Argument(help=f"Which file: {', '.join(SCHEMAS)}.")]) -> None:
+def schema(what: Annotated[str, typer.Argument(help=f"Format: {', '.join(SCHEMAS)}.")]) -> None:
     """Print the JSON Schema of a file format."""
     if what not in SCHEMAS:
         raise DescriptionError(f"no schema {what!r}; expected {', '.join(SCHEMAS)}")

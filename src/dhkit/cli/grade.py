@@ -44,17 +44,19 @@ def grade(
     task: Annotated[
         Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
     ] = None,
-    rubric: Annotated[Path | None, typer.Option(help="What answers are worth (.toml).")] = None,
+    rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the answers (.toml).")] = None,
     read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
-    form: Annotated[str, typer.Option("--format", help="text, json, gradescope, junit or html.")] = "text",
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
+    form: Annotated[str, typer.Option("--format", help="Format: text, json, gradescope, junit or html.")] = "text",
     feedback: Annotated[
-        str | None, typer.Option(help="full, hint or verdict: how much is told; the rubric's unless given.")
+        str | None, typer.Option(help="Feedback: full, hint or verdict; default: that of the rubric.")
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, max=1024, help="Sheets at once; one for each core.")] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="The longest that a sheet may take.")] = 60.0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one for each core.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, help="Longest time of judging a sheet, s.")] = 60.0,
     remark: Annotated[
-        bool, typer.Option("--remark", help="The files are reports written before (JSON): mark them again.")
+        bool, typer.Option("--remark", help="Mark earlier reports (JSON) again, without judging.")
     ] = False,
     template: Annotated[str | None, typer.Option(help="Print an empty sheet for this robot.")] = None,
     explain: Annotated[str | None, typer.Option(help="Print this robot's worked solution, step by step.")] = None,

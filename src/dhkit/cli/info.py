@@ -26,7 +26,7 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def robots(
     examples: Annotated[
-        bool, typer.Option("--examples", help="Those of the package example-robot-data instead.")
+        bool, typer.Option("--examples", help="List the chains of the package example-robot-data.")
     ] = False,
     json: Json = False,
 ) -> None:
@@ -87,7 +87,7 @@ def fk(
     robot: Robot,
     q: Annotated[list[str], typer.Argument(help="Joint values, or the name of a configuration such as ready.")],
     degrees: Degrees = False,
-    frames: Annotated[bool, typer.Option("--frames", help="All DH frames too.")] = False,
+    frames: Annotated[bool, typer.Option("--frames", help="Print all DH frames too.")] = False,
     json: Json = False,
 ) -> None:
     """Print where the tool is for given joint values (rad and m)."""

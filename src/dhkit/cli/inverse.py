@@ -108,16 +108,20 @@ class ReachedPose:
 def ik(
     robot: Robot,
     xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
-    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
-    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")] = "0 0 0",
+    order: Annotated[
+        str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
+    ] = "XYZ",
     matrix: Annotated[
         str | None, typer.Option(metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them.")
     ] = None,
-    like: Annotated[str | None, typer.Option(metavar="Q ...", help="Where these joint values put the tool.")] = None,
-    near: Annotated[str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these values.")] = None,
+    like: Annotated[str | None, typer.Option(metavar="Q ...", help="The tool pose of these joint values.")] = None,
+    near: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these joint values.")
+    ] = None,
     degrees: Degrees = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Only branches inside the joint limits.")] = False,
-    numeric: Annotated[bool, typer.Option("--numeric", help="One solution, by iteration, for any arm.")] = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Print only branches inside the joint limits.")] = False,
+    numeric: Annotated[bool, typer.Option("--numeric", help="Find one solution by iteration, for any arm.")] = False,
     json: Json = False,
 ) -> ExitStatus:
     """Print every way to put the tool at a pose, given by --xyz, --matrix or --like; exit status 1 where there is none.

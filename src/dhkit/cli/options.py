@@ -27,10 +27,13 @@ def degrees_option(text: str) -> Any:
 
 Degrees = Annotated[bool, degrees_option("Angles in and out are in degrees.")]
 Uniform = Annotated[
-    bool, typer.Option("--uniform-links", help="Thin uniform rods of 1 kg each for links, in place of their bodies.")
+    bool, typer.Option("--uniform-links", help="Replace the bodies of the links by thin uniform rods of 1 kg each.")
 ]
 Columns = Annotated[
-    str | None, typer.Option("--columns", metavar="OURS=THEIRS ...", help='Of such a file: "t=tout q=yout".')
+    str | None,
+    typer.Option(
+        "--columns", metavar="OURS=THEIRS ...", help='Columns of a file of another program, such as "t=tout q=yout".'
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 

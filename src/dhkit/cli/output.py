@@ -72,6 +72,14 @@ def say_written(files: Iterable[object]) -> None:
     say("\n".join(f"wrote {file}" for file in files))
 
 
+def report_files(files: Iterable[object], *, json: bool) -> None:
+    """Print the paths of written files, as JSON or a line each."""
+    if json:
+        print_json({"files": [str(file) for file in files]})
+    else:
+        say_written(files)
+
+
 def print_json(value: object, indent: int | None = None) -> None:
     """Print a value as one JSON document, in which NaN and infinity are null."""
     plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text

@@ -29,14 +29,14 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command(cls=with_long_options({"--at": None}))
 def picture(
     robot: Robot,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The file: .png, or .gif of a motion.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File to write: .png, or .gif of a motion.")],
     at: Annotated[
         str | None, typer.Option(metavar="Q ...", help="Joint values, or the name of a configuration.")
     ] = None,
-    motion: Annotated[Path | None, typer.Option(help="A motion or a simulation: pictures of it.")] = None,
+    motion: Annotated[Path | None, typer.Option(help="File of a motion or a simulation to draw.")] = None,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Width and height, px.")] = None,
-    count: Annotated[int, typer.Option(min=2, max=900, help="PNG files of a motion.")] = 6,
-    rate: Annotated[float, typer.Option(min=1, max=50, help="Pictures a second of a GIF.")] = 15.0,
+    count: Annotated[int, typer.Option(min=2, max=900, help="Number of PNG files of a motion.")] = 6,
+    rate: Annotated[float, typer.Option(min=1, max=50, help="Pictures per second of a GIF.")] = 15.0,
     frames: Annotated[bool, typer.Option("--frames", help="Draw the DH frames.")] = False,
     degrees: Annotated[bool, degrees_option("Angles are in degrees.")] = False,
     uniform: Uniform = False,
@@ -68,10 +68,10 @@ def _size(text: str) -> tuple[int, int]:
 @app.command()
 def play(
     robot: Robot,
-    file: Annotated[Path, typer.Argument(help="A motion or a simulation.")],
+    file: Annotated[Path, typer.Argument(help="File of a motion or a simulation.")],
     html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
     columns: Columns = None,
-    degrees: Annotated[bool, degrees_option("Samples from elsewhere have degrees.")] = False,
+    degrees: Annotated[bool, degrees_option("Angles in a file of another program are in degrees.")] = False,
     uniform: Uniform = False,
 ) -> ExitStatus:
     """Play a motion or a simulation in the browser, or write a page of it."""

@@ -56,53 +56,79 @@ def plan(
     start: Annotated[
         str, typer.Option("--from", metavar="Q ...", help="Joint values, or the name of a configuration.")
     ] = "ready",
-    to: Annotated[str | None, typer.Option(metavar="Q ...", help="The same at the goal.")] = None,
-    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Or the tool's position there, m.")] = None,
-    euler: Annotated[str, typer.Option(metavar="A B C", help="Its Euler angles, rad.")] = "0 0 0",
-    order: Annotated[str, typer.Option(help="Of the Euler angles: XYZ moving axes, xyz fixed ones.")] = "XYZ",
+    to: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="Joint values at the goal, or the name of a configuration.")
+    ] = None,
+    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Tool position at the goal, m.")] = None,
+    euler: Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")] = "0 0 0",
+    order: Annotated[
+        str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
+    ] = "XYZ",
     matrix: Annotated[
-        str | None, typer.Option(metavar="M11 ... M44", help="Or the pose by row, 16 or 12 numbers; or a file of them.")
+        str | None,
+        typer.Option(metavar="M11 ... M44", help="Tool pose at the goal by row, 16 or 12 numbers; or a file of them."),
     ] = None,
     like: Annotated[
-        str | None, typer.Option(metavar="Q ...", help="Or where these joint values put the tool, by any branch.")
+        str | None, typer.Option(metavar="Q ...", help="Goal: the tool pose of these joint values, by any branch.")
     ] = None,
     via: Annotated[
-        list[str] | None, typer.Option(metavar="Q ...", help="Pass here on the way; may be given again.")
+        list[str] | None, typer.Option(metavar="Q ...", help="Joint values to pass on the way; may be given again.")
     ] = None,
     wanted: Annotated[
-        str, typer.Option("--objective", help='time, effort, energy, jerk, or a sum: "time + 1e-4 effort".')
+        str,
+        typer.Option(
+            "--objective", help='Objective: time, effort, energy, jerk, or a sum such as "time + 1e-4 effort".'
+        ),
     ] = "time",
-    duration: Annotated[float | None, typer.Option(help="s; for objectives without time.")] = None,
-    speed: Annotated[float, typer.Option(min=0.001, max=1, help="Share of the joints' speeds that may be used.")] = 1.0,
+    duration: Annotated[float | None, typer.Option(help="Duration, s, for objectives without time.")] = None,
+    speed: Annotated[
+        float, typer.Option(min=0.001, max=1, help="Share of the velocity limits that may be used.")
+    ] = 1.0,
     velocity: Annotated[
-        str | None, typer.Option(metavar="V ...", help="Limit in place of the robot's, for all joints or each; rad/s.")
+        str | None,
+        typer.Option(
+            metavar="V ...", help="Velocity limits in place of the robot's, one or one for each joint; rad/s."
+        ),
     ] = None,
-    acceleration: Annotated[str | None, typer.Option(metavar="A ...", help="Likewise; rad/s^2.")] = None,
-    jerk: Annotated[str | None, typer.Option(metavar="J ...", help="Likewise; rad/s^3.")] = None,
-    torque: Annotated[str | None, typer.Option(metavar="T ...", help="Likewise; N m.")] = None,
+    acceleration: Annotated[
+        str | None, typer.Option(metavar="A ...", help="Acceleration limits, one or one for each joint; rad/s^2.")
+    ] = None,
+    jerk: Annotated[
+        str | None, typer.Option(metavar="J ...", help="Jerk limits, one or one for each joint; rad/s^3.")
+    ] = None,
+    torque: Annotated[
+        str | None,
+        typer.Option(metavar="T ...", help="Torque limits in place of the robot's, one or one for each joint; N m."),
+    ] = None,
     load: Annotated[
         str | None,
-        typer.Option("--payload", metavar="KG [@ X Y Z]", help="Load, its centre of mass in the tool's frame, m."),
+        typer.Option(
+            "--payload", metavar="KG [@ X Y Z]", help="Payload, kg, and its centre of mass in the tool's frame, m."
+        ),
     ] = None,
     tool_speed: Annotated[float | None, typer.Option(help="Limit of the tool's speed, m/s.")] = None,
     box: Annotated[
-        list[str] | None, typer.Option(metavar="SX SY SZ @ X Y Z", help="Keep away from it; edges and centre, m.")
+        list[str] | None,
+        typer.Option(metavar="SX SY SZ @ X Y Z", help="Box to avoid: edge lengths and centre, m; may be given again."),
     ] = None,
     sphere: Annotated[
-        list[str] | None, typer.Option(metavar="R @ X Y Z", help="Keep away from it; radius and centre, m.")
+        list[str] | None,
+        typer.Option(metavar="R @ X Y Z", help="Sphere to avoid: radius and centre, m; may be given again."),
     ] = None,
-    floor: Annotated[str | None, typer.Option(metavar="Z", help="Stay above this height, m.")] = None,
-    clearance: Annotated[float, typer.Option(min=0, help="How far to keep away, m.")] = 0.01,
-    self_collision: Annotated[bool, typer.Option("--self-collision", help="Keep links from each other too.")] = False,
-    line: Annotated[bool, typer.Option("--line", help="The tool goes straight.")] = False,
-    intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Of the mesh.")] = None,
-    time_limit: Annotated[float, typer.Option(min=0.01, help="To search, s.")] = 30.0,
+    floor: Annotated[str | None, typer.Option(metavar="Z", help="Height of a floor to stay above, m.")] = None,
+    clearance: Annotated[float, typer.Option(min=0, help="Smallest distance from obstacles, m.")] = 0.01,
+    self_collision: Annotated[
+        bool, typer.Option("--self-collision", help="Avoid collisions between links too.")
+    ] = False,
+    line: Annotated[bool, typer.Option("--line", help="Move the tool along a straight line.")] = False,
+    intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Number of mesh intervals.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0.01, help="Longest search, s.")] = 30.0,
     degrees: Degrees = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
     ] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays the motion.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:

@@ -41,35 +41,58 @@ app = typer.Typer(rich_markup_mode=None)
 
 LONG_OPTIONS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
 Motion = Annotated[
-    Path | None, typer.Option("--motion", help="Follow it: .npz, .mat, .csv or .yaml of dhkit or from elsewhere.")
+    Path | None,
+    typer.Option(
+        "--motion", help="File of the motion to follow: .npz, .mat, .csv or .yaml, of dhkit or of another program."
+    ),
 ]
 Start = Annotated[
-    str | None, typer.Option("--from", metavar="Q ...", help="Or go from here, joint values or a configuration's name,")
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="Q ...",
+        help="Start of a motion in place of a file: joint values, or the name of a configuration.",
+    ),
 ]
-Goal = Annotated[str | None, typer.Option("--to", metavar="Q ...", help="to here.")]
-Duration = Annotated[float | None, typer.Option(help="s, of a motion between configurations.")]
-Bandwidth = Annotated[float, typer.Option(help="Of the controller, rad/s.")]
-Damping = Annotated[float, typer.Option(help="Of the controller.")]
-Rate = Annotated[float, typer.Option(help="Calls of the controller, Hz.")]
-PlantRate = Annotated[float | None, typer.Option(help="Steps of the integration, Hz; those of the controller.")]
+Goal = Annotated[
+    str | None,
+    typer.Option(
+        "--to",
+        metavar="Q ...",
+        help="Goal of a motion in place of a file: joint values, or the name of a configuration.",
+    ),
+]
+Duration = Annotated[float | None, typer.Option(help="Duration of a motion between configurations, s.")]
+Bandwidth = Annotated[float, typer.Option(help="Bandwidth that gains are tuned for, rad/s.")]
+Damping = Annotated[float, typer.Option(help="Damping ratio that gains are tuned for.")]
+Rate = Annotated[float, typer.Option(help="Sampling rate of the controller, Hz.")]
+PlantRate = Annotated[
+    float | None, typer.Option(help="Rate of the integration's steps, Hz; default: that of the controller.")
+]
 Load = Annotated[
     str | None,
     typer.Option(
         "--payload",
         metavar="KG [@ X Y Z]",
-        help="What it carries, centre of mass in the tool's frame, m; what the motion was planned with unless given.",
+        help="Payload, kg, and its centre of mass in the tool's frame, m; default: that of the planned motion.",
     ),
 ]
-Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller does not know of the payload.")]
+Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller's model has no payload.")]
 FrictionOption = Annotated[
     str,
-    typer.Option("--friction", metavar="none|stiction|WIDTH", help="Of the joints; WIDTH of smooth one, rad/s."),
+    typer.Option(
+        "--friction", metavar="none|stiction|WIDTH", help="Joint friction; WIDTH, rad/s, is that of smooth friction."
+    ),
 ]
-Restitution = Annotated[float, typer.Option(help="Of the joint stops, 0 to 1.")]
-NoStops = Annotated[bool, typer.Option("--no-stops", help="Joints pass their limits.")]
+Restitution = Annotated[float, typer.Option(help="Coefficient of restitution of the joint stops, 0 to 1.")]
+NoStops = Annotated[bool, typer.Option("--no-stops", help="Simulate without joint stops.")]
 PushOption = Annotated[
     list[str] | None,
-    typer.Option("--push", metavar="FX FY FZ @ BEGIN END", help="A force on the tool, N, world axes, over a time, s."),
+    typer.Option(
+        "--push",
+        metavar="FX FY FZ @ BEGIN END",
+        help="Force on the tool, N, world axes, from BEGIN to END, s; may be given again.",
+    ),
 ]
 
 
@@ -79,7 +102,7 @@ def simulate(
     controller: Annotated[
         str,
         typer.Option(
-            help="pd, pid, pd-gravity, feed-forward, computed-torque, operational-space, adaptive, lqr, none."
+            help="pd, pid, pd-gravity, feed-forward, computed-torque, operational-space, adaptive, lqr or none."
         ),
     ] = "computed-torque",
     motion: Motion = None,
@@ -91,11 +114,13 @@ def simulate(
     damping: Damping = 1.0,
     rate: Rate = 1000.0,
     plant_rate: PlantRate = None,
-    continuous: Annotated[bool, typer.Option("--continuous", help="A controller in continuous time.")] = False,
+    continuous: Annotated[
+        bool, typer.Option("--continuous", help="Run the controller in continuous time, without a sampling rate.")
+    ] = False,
     load: Load = None,
     unmodelled: Unmodelled = False,
     friction: FrictionOption = "none",
-    compensate: Annotated[bool, typer.Option("--compensate", help="The controller compensates friction.")] = False,
+    compensate: Annotated[bool, typer.Option("--compensate", help="Let the controller compensate friction.")] = False,
     restitution: Restitution = 0.0,
     no_stops: NoStops = False,
     push: PushOption = None,
@@ -103,12 +128,12 @@ def simulate(
         float, typer.Option(min=0, help="Standard deviation of measured joint values; rad, with --degrees too, and m.")
     ] = 0.0,
     resolution: Annotated[
-        float, typer.Option(min=0, help="Of the encoders, on the joints' side; rad, with --degrees too, and m.")
+        float, typer.Option(min=0, help="Resolution of the encoders at the joints; rad, also with --degrees, and m.")
     ] = 0.0,
     degrees: Degrees = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page that plays it.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Write a figure of it: .png, .svg or .pdf.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page that plays the motion.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
@@ -223,7 +248,7 @@ def _facts(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, ob
 @app.command(cls=with_long_options(LONG_OPTIONS))
 def compare(
     robot: Robot,
-    controllers: Annotated[str, typer.Option(help="Which, separated by commas; all unless given.")] = "",
+    controllers: Annotated[str, typer.Option(help="Names of controllers, separated by commas; default: all.")] = "",
     motion: Motion = None,
     columns: Columns = None,
     start: Start = None,

@@ -74,9 +74,9 @@ def branches(arm: Arm, q: Array) -> Branches:
     solutions = result.q[result.valid]
     names = tuple(name for name, valid in zip(result.branches, result.valid, strict=True) if valid)
     errors = np.abs(arm.fk(solutions) - T)
-    if len(fit.met) < 6:
+    if len(fit.coordinates) < 6:
         errors = errors[:, :3, 3]
-    return Branches(solutions, names, float(errors.max()) if "x" in fit.met else None, closed_form=True)
+    return Branches(solutions, names, float(errors.max()) if "x" in fit.coordinates else None, closed_form=True)
 
 
 def straight_line(arm: Arm) -> Line | None:

@@ -26,12 +26,14 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def verify(
     robot: Robot,
-    samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many random states.")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
-    urdf: Annotated[str | None, typer.Option(help="Somebody's URDF to hold against the robot's table.")] = None,
-    base: Annotated[str | None, typer.Option(help="Its link that is the world; the root.")] = None,
-    tip: Annotated[str | None, typer.Option(help="Its link that is the tool; the end of the only chain.")] = None,
-    tolerance: Annotated[float, typer.Option(help="The largest error that agrees, with --urdf.")] = 1e-9,
+    samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of random states.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    urdf: Annotated[str | None, typer.Option(help="A URDF to compare with the robot's table.")] = None,
+    base: Annotated[str | None, typer.Option(help="Link of that URDF that is the world; default: the root.")] = None,
+    tip: Annotated[
+        str | None, typer.Option(help="Link of that URDF that is the tool; default: the end of the only chain.")
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Largest error that counts as agreement, with --urdf.")] = 1e-9,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
     uniform: Uniform = False,
     json: Json = False,
@@ -75,11 +77,13 @@ def check(
     run: Annotated[
         bool, typer.Option("--run", help="Execute PROGRAM, which speaks the protocol of docs/own-code.md.")
     ] = False,
-    rubric: Annotated[Path | None, typer.Option(help="What each part is worth (.toml).")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Of the random states, to replay a report.")] = None,
-    samples: Annotated[int, typer.Option(min=1, max=100_000, help="Random states.")] = 200,
-    seconds: Annotated[float, typer.Option(min=0.01, max=3600, help="The longest that a call may take.")] = 5.0,
-    sandbox: Annotated[str | None, typer.Option(help="bwrap: in bubblewrap, for strangers' files.")] = None,
+    rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the parts (.toml).")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
+    samples: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random states.")] = 200,
+    seconds: Annotated[float, typer.Option(min=0.01, max=3600, help="Longest time of a call, s.")] = 5.0,
+    sandbox: Annotated[
+        str | None, typer.Option(help="bwrap: run the program in bubblewrap, for strangers' files.")
+    ] = None,
     json: Json = False,
 ) -> ExitStatus:
     """Score a program's forward and inverse kinematics and its controller, and say where it fails first.

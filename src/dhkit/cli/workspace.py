@@ -29,9 +29,9 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def workspace(
     robot: Robot,
-    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="How many random states.")] = 100_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; out/NAME.")] = None,
+    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of random states.")] = 100_000,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")] = None,
     json: Json = False,
 ) -> None:
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""

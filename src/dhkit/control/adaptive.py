@@ -87,8 +87,7 @@ class Adaptive:
         self._columns = list(grouping.columns)
         self.adaptation = _adaptation_gains(adaptation, len(grouping))
         if estimate is None:
-            own = grouping.matrix @ inertial_parameters(self.description)
-            self._start: Array = positive(masses, "masses") * own
+            self._start: Array = positive(masses, "masses") * (grouping.matrix @ inertial_parameters(self.description))
         else:
             self._start = _first_estimate(estimate, len(grouping))
         self.reset()
@@ -157,8 +156,7 @@ class Adaptive:
         if self._time is not None:
             self.estimate = self.estimate + (t - self._time) / 2 * (self._rate + rate)
         self._time, self._rate = t, rate
-        tau: Array = Y @ self.estimate + known
-        return tau
+        return Y @ self.estimate + known
 
     def initial_state(self, q: Array | None = None) -> Array:
         """Return the estimate at the start, shape (m,), which does not depend on q."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.control.result import EnergyAudit, SimulationResult
+from dhkit.control.result import EnergyAudit, SimulationResult, span_text
 from dhkit.description import Array, Description, write_atomically
 from dhkit.description.joint_text import joint_unit
 from dhkit.display import counted, html_block, html_table, repr_line
@@ -146,7 +146,7 @@ class BatchResult:
         return path
 
     def __repr__(self) -> str:
-        said, unit = [self._span], joint_unit(self.arms[0].numbers.prismatic)
+        said, unit = [span_text(self.t)], joint_unit(self.arms[0].numbers.prismatic)
         if self.peak_error is not None:
             said.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
         return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*said, *self._remarks]))
@@ -163,12 +163,8 @@ class BatchResult:
             for i, joint in enumerate(self.arms[0].joints)
         ]
         headings, align = ("joint", *columns, ""), "l" + "r" * len(columns) + "l"
-        title = f"{len(self)} x {self.arms[0].name}: {', '.join([self._span, *self._remarks])}"
+        title = f"{len(self)} x {self.arms[0].name}: {', '.join([span_text(self.t), *self._remarks])}"
         return html_block(title, html_table(headings, rows, "Largest of all runs that did not fail", align))
-
-    @property
-    def _span(self) -> str:
-        return f"{self.t[-1]:g} s in {counted(len(self.t) - 1, 'step')}"
 
     @property
     def _remarks(self) -> list[str]:

@@ -202,9 +202,7 @@ class BatchRun:
         """Return commanded torques cut off at the drives' limits, shape (B, n)."""
         if np.isinf(self.effort_limits).all():
             return commanded
-        applied: Array = np.minimum(commanded, self.effort_limits)
-        np.maximum(applied, -self.effort_limits, out=applied)
-        return applied
+        return np.clip(commanded, -self.effort_limits, self.effort_limits)
 
     def _record_errors(self, record: Record, k: int, q: Array, commanded: Array, applied: Array) -> None:
         error = self._setpoint(k).q - q

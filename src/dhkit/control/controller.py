@@ -57,8 +57,7 @@ def reset(controller: object) -> None:
     try:
         method()
     except Exception as error:
-        text = " ".join(str(error).split())
-        raise SimulationError(f"reset() of the controller raised {type(error).__name__}: {text}") from error
+        raise _failure("reset() of the controller", error) from error
 
 
 def require_fits(controller: object, description: Description) -> None:
@@ -102,8 +101,7 @@ def continuous_law(controller: Controller | ContinuousController, q: Array) -> t
         try:
             state = np.array(controller.initial_state(q.copy()), dtype=float).reshape(-1)
         except Exception as error:
-            text = " ".join(str(error).split())
-            raise SimulationError(f"initial_state of the controller raised {type(error).__name__}: {text}") from error
+            raise _failure("initial_state of the controller", error) from error
         if not np.isfinite(state).all():
             raise SimulationError("initial_state of the controller has values that are not finite")
         return state, controller.continuous
@@ -126,8 +124,12 @@ def call_controller(controller: Callable[..., object], t: float, *arguments: obj
     try:
         return controller(t, *arguments)
     except Exception as error:
-        text = " ".join(str(error).split())
-        raise SimulationError(f"the controller raised {type(error).__name__} at {t:g} s: {text}") from error
+        raise _failure("the controller", error, f" at {t:g} s") from error
+
+
+def _failure(what: str, error: Exception, when: str = "") -> SimulationError:
+    """Return the error of a run that says, in one line, what of the controller raised which exception."""
+    return SimulationError(f"{what} raised {type(error).__name__}{when}: {' '.join(str(error).split())}")
 
 
 def torques(returned: object, n: int, t: float) -> Array:

@@ -85,8 +85,7 @@ class RungeKutta:
         stages = ((q, qd), (q2, v2), (q3, v3), (q4, v4))
         friction, push = state.friction_work, state.push_work
         if plant.friction is not None:
-            powers = [float(v @ plant.resistance(v, phase.contact.directions)) for _, v in stages]
-            friction += h * _weighted(powers)
+            friction += h * _weighted([float(v @ plant.resistance(v, phase.contact.directions)) for _, v in stages])
         if phase.pushes:
             push += h * _weighted([float(v @ plant.push_torques(phase.pushes, x)) for x, v in stages])
         q_next = q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dhkit.control.gains import batch_of, effective_inertia, gain, gains_text, pid_gains, positive
 from dhkit.control.references import Setpoint
@@ -96,8 +96,7 @@ class PID:
         description = description_of(robot)
         m = effective_inertia(description, q)
         kp, ki, kd = pid_gains(bandwidth, damping, integral)
-        limit = description.numbers.effort
-        return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=limit)
+        return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=description.numbers.effort)
 
     def reset(self) -> None:
         """Set the integral, the filter and the time back to the start."""
@@ -135,20 +134,16 @@ class PID:
             rate = rate if self._rate is None else self._rate + share * (rate - self._rate)
             self._rate = rate
         tau = self._torques(error, self._integral, rate)
-        self._integral = self._integral + np.where(self._grows(tau, error), error * step, 0.0)
+        # The integral changes where the drive is below its limit, or where the error reduces the torque.
+        grows = (np.abs(tau) < self.limit) | (tau * error < 0)
+        self._integral = self._integral + np.where(grows, error * step, 0.0)
         return tau
 
     def __repr__(self) -> str:
         return repr_line(type(self).__name__, said=gains_text(kp=self.kp, ki=self.ki, kd=self.kd))
 
     def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
-        tau: Array = self.kp * error + self.ki * integral + self.kd * rate
-        return tau
-
-    def _grows(self, tau: Array, error: Array) -> NDArray[np.bool_]:
-        """Return the joints whose integral may change: drive below its limit, or error that reduces the torque."""
-        grows: NDArray[np.bool_] = (np.abs(tau) < self.limit) | (tau * error < 0)
-        return grows
+        return self.kp * error + self.ki * integral + self.kd * rate
 
 
 def _require_joints(n: int, **gains: Array) -> None:

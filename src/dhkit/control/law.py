@@ -43,5 +43,4 @@ def law_of(controller: Any) -> Law | None:
 
     A subclass has no law unless it defines one: the inherited law would ignore the methods that it overrides.
     """
-    law: Law | None = controller.law() if "law" in vars(type(controller)) else None
-    return law
+    return controller.law() if "law" in vars(type(controller)) else None

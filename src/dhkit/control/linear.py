@@ -60,9 +60,8 @@ def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = Non
 def _derivatives(description: Description) -> casadi.Function:
     import casadi
 
-    forward = CasadiFunctions(description).forward_dynamics
     state = [casadi.SX.sym(name, description.n) for name in ("q", "qd", "tau")]
-    qdd = forward(*state)
+    qdd = CasadiFunctions(description).forward_dynamics(*state)
     return casadi.Function("derivatives", state, [casadi.jacobian(qdd, x) for x in state], {"cse": True})
 
 

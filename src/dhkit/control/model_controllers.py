@@ -44,8 +44,7 @@ class _Proportional:
         return Law(name, self.description, np.concatenate(gains, axis=-1), torques)
 
     def _correction(self, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        correction: Array = self.kp * (setpoint.q - q) + self.kd * (setpoint.qd - qd)
-        return correction
+        return self.kp * (setpoint.q - q) + self.kd * (setpoint.qd - qd)
 
 
 class ComputedTorque(_Proportional):
@@ -190,8 +189,7 @@ class FrictionCompensation:
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,) or (B, n), N m and N."""
-        tau: Array = np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._friction(setpoint)
-        return tau
+        return np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._friction(setpoint)
 
     def __repr__(self) -> str:
         return repr_line(type(self).__name__, self.description.name, f"{self.friction}, around {name_of(self.inner)}")

@@ -144,8 +144,7 @@ class OperationalSpace:
 
     def _scaled(self, J: Array) -> Array:
         """Return the controlled rows of Jacobians, shape (..., k, n), with lengths divided by the reach."""
-        scaled: Array = self._row_scale[:, None] * J[..., self._rows, :] * self._joint_scale
-        return scaled
+        return self._row_scale[:, None] * J[..., self._rows, :] * self._joint_scale
 
     def _freedoms(self) -> int:
         """Return the number of controlled directions in which the tool can be moved.

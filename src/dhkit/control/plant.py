@@ -66,7 +66,8 @@ class Plant:
         object.__setattr__(self, "description", description_of(self.description))
         require_inertia(self.description)
         for push in self.pushes:
-            _require_push(push)
+            if not isinstance(push, Push):
+                raise TypeError(f"pushes has {type(push).__name__}; expected Push objects")
             if push.link is not None and push.link > self.n:
                 raise ValueError(f"link is {push.link}; {self.description.name} has {self.n}")
         numbers = self.description.numbers
@@ -129,7 +130,7 @@ class Plant:
     @cached_property
     def nothing_holds(self) -> Contact:
         """The contact in which no joint holds."""
-        return Contact.free(self.n)
+        return Contact(np.zeros(self.n, dtype=np.int8), np.zeros(self.n, dtype=bool))
 
     def active_pushes(self, t: float) -> tuple[Push, ...]:
         """Return the pushes that act at a time t, s."""
@@ -167,15 +168,11 @@ class Plant:
             return friction_torque(self.description, qd, self.friction)
         numbers = self.description.numbers
         dry = np.where(directions > 0, numbers.coulomb[:, 0], np.where(directions < 0, numbers.coulomb[:, 1], 0.0))
-        resisting: Array = numbers.viscous * qd + dry
-        return resisting
+        return numbers.viscous * qd + dry
 
     def push_torques(self, pushes: Sequence[Push], q: Array) -> Array:
         """Return the joint torques of some pushes, shape (n,), N m and N."""
-        total = np.zeros(self.n)
-        for push in pushes:
-            total += push.torque(self.description, q)
-        return total
+        return sum((push.torque(self.description, q) for push in pushes), np.zeros(self.n))
 
     def contact(self, q: Array, qd: Array, tau: Array, pushes: Sequence[Push] = ()) -> Contact:
         """Return the joints that hold, by friction or at a stop, and the directions of the others.
@@ -261,11 +258,6 @@ class Contact:
     holds: NDArray[np.bool_]
     """Joints that hold their position, shape (n,)."""
 
-    @classmethod
-    def free(cls, n: int) -> Contact:
-        """Return the contact of n joints of which none holds."""
-        return cls(np.zeros(n, dtype=np.int8), np.zeros(n, dtype=bool))
-
 
 @dataclass(frozen=True, eq=False)
 class Phase:
@@ -275,11 +267,6 @@ class Phase:
     pushes: tuple[Push, ...]
     qdd: Array
     """Accelerations at its start, shape (n,), rad/s^2 and m/s^2."""
-
-
-def _require_push(push: object) -> None:
-    if not isinstance(push, Push):
-        raise TypeError(f"pushes has {type(push).__name__}; expected Push objects")
 
 
 MAX_STALLED_ROUNDS = 10

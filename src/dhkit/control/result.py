@@ -179,7 +179,7 @@ class SimulationResult:
     def __repr__(self) -> str:
         unit = joint_unit(self.description.numbers.prismatic)
         error = f"largest error {self.peak_error.max(initial=0.0):.3g} {unit}"
-        return repr_line("SimulationResult", self.description.name, f"{self._span}, {error}")
+        return repr_line("SimulationResult", self.description.name, f"{span_text(self.t)}, {error}")
 
     def _repr_html_(self) -> str:
         joints, peak, rms, final = self.description.joints, self.peak_error, self.rms_error, self.final_error
@@ -197,14 +197,15 @@ class SimulationResult:
         headings = ("joint", "largest error", "RMS", "at the end", "", "largest torque", "saturated")
         by = f" under {self.controller}" if self.controller else ""
         return html_block(
-            f"{self.description.name}{by}: {self._span}",
+            f"{self.description.name}{by}: {span_text(self.t)}",
             html_table(headings, rows, align="lrrrlr"),
             self.audit._repr_html_(),
         )
 
-    @property
-    def _span(self) -> str:
-        return f"{self.t[-1]:g} s in {counted(len(self.t) - 1, 'step')}"
+
+def span_text(t: Array) -> str:
+    """Return the duration and the number of steps of a run, from the times of its rows, shape (N+1,), s."""
+    return f"{t[-1]:g} s in {counted(len(t) - 1, 'step')}"
 
 
 def _norms(error: Array) -> ErrorNorms:

@@ -102,14 +102,10 @@ def load_result(path: str | Path, description: Description | None = None) -> Sim
             robot = SIMULATION.robot_of_archive(values, description)
             checked = _checked_arrays(values, robot.n)
             SIMULATION.require_whole(values)
-        return _result(robot, checked)
     except (DescriptionError, ValueError) as error:
         raise DescriptionError(f"{path}: {error}") from None
-
-
-def _result(robot: Description, values: Mapping[str, Array]) -> SimulationResult:
-    audit = EnergyAudit(**{name: float(values[f"{AUDIT}{name}"]) for name in ENERGIES})
-    arrays: dict[str, Any] = {name: values[name] for name in ("t", *ROWS, SATURATED, POSES)}
+    audit = EnergyAudit(**{name: float(checked[f"{AUDIT}{name}"]) for name in ENERGIES})
+    arrays: dict[str, Any] = {name: checked[name] for name in ("t", *ROWS, SATURATED, POSES)}
     return SimulationResult(robot, audit=audit, **arrays)
 
 

@@ -62,8 +62,7 @@ class Run(ABC):
     ) -> None:
         self.description, self.plant, self.controller = description, plant, controller
         self.t, self.reference, self.effort_limits = t, reference, effort_limits
-        shape = (len(t), plant.n)
-        self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros(shape) for _ in range(5))
+        self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros((len(t), plant.n)) for _ in range(5))
         self.turnover = 0.0
 
     @abstractmethod
@@ -79,8 +78,7 @@ class Run(ABC):
             With the result of all rows so far.
         """
         plant, steps = self.plant, len(self.t) - 1
-        edges = sorted({edge for push in plant.pushes for edge in (push.begin, push.end)} | set(self.edges()))
-        first, kept = state, -1
+        edges, first, kept = self.edges(), state, -1
         try:
             for k in range(steps + 1):
                 commanded, integrator = self.integrator(k, state)
@@ -103,9 +101,9 @@ class Run(ABC):
             raise
         return self.result(steps, first, state)
 
-    def edges(self) -> Sequence[float]:
-        """Return the times (s) at which torques jump, apart from those of the rows."""
-        return ()
+    def edges(self) -> list[float]:
+        """Return the times (s) at which torques jump, apart from those of the rows, ascending."""
+        return sorted({edge for push in self.plant.pushes for edge in (push.begin, push.end)})
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the times at which integration from row k to the next one pauses, the next row's at the end."""
@@ -181,20 +179,18 @@ class ContinuousRun(Run):
         if self.controller is not None:
             reset(self.controller)
             self.memory, self._law = continuous_law(self.controller, q0)
-        edges = [*self.edges(), *(edge for push in self.plant.pushes for edge in (push.begin, push.end))]
         end = float(self.t[-1])
-        inside = sorted(edge for edge in edges if 0 < edge < end)
-        free = self.plant.has_no_events and self.controller is None
-        longest = np.inf if free else LONGEST_STEP
+        inside = [edge for edge in self.edges() if 0 < edge < end]
+        longest = np.inf if self.plant.has_no_events and self.controller is None else LONGEST_STEP
         self._integrator = DormandPrince(self.plant, self._torques, tolerance, [*inside, end], longest)
 
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
         """Return the torques at a row, shape (n,), N m and N, and the integrator of the whole run."""
         return self._commanded(state.t, state.q, state.qd, state.memory)[0], self._integrator
 
-    def edges(self) -> Sequence[float]:
-        """Return the times at which the reference jumps."""
-        return [float(x) for x in getattr(self.continuous_reference, "jumps", ())]
+    def edges(self) -> list[float]:
+        """Return the times (s) at which pushes begin or end or the reference jumps, ascending."""
+        return sorted({*super().edges(), *(float(x) for x in getattr(self.continuous_reference, "jumps", ()))})
 
     def _torques(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
         commanded, derivative = self._commanded(t, q, qd, memory)
@@ -246,8 +242,7 @@ def result_of(
     controller
         The controller, for its name; None for none.
     """
-    q = recorded["q"]
-    moving = float(kinetic_energy(plant.description, q, recorded["qd"]).max())
+    moving = float(kinetic_energy(plant.description, recorded["q"], recorded["qd"]).max())
     audit = EnergyAudit(
         change=plant.energy(last.q, last.qd) - plant.energy(first.q, first.qd),
         drives=last.drive_work,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.control.controller import Controller, require_fits
+from dhkit.control.controller import NO_STATE, Controller, require_fits
 from dhkit.control.integrators import State
 from dhkit.control.plant import Plant
 from dhkit.control.references import Held, Reference, reference_of
@@ -107,7 +107,8 @@ def simulate(
         An argument that does not fit: says which, and what is expected.
     """
     _require_types(plant=(plant, Plant), sensors=(sensors, Sensors))
-    _require_flag("saturation", saturation)
+    if not isinstance(saturation, bool | np.bool_):
+        raise TypeError(f"saturation is {saturation!r}; expected True or False")
     require_fits(controller, description)
     moved = Plant(description) if plant is None else plant
     if moved.description.kinds != description.kinds:
@@ -120,8 +121,7 @@ def simulate(
     q, qd = _state(description, q0, setpoints[0][0], "q0"), _state(description, qd0, setpoints[1][0], "qd0")
     _warn_beyond_stops(moved, setpoints[0])
     q = _moved_to_stops(moved, q, "q0" if q0 is not None else "the reference's first state")
-    memory = np.zeros(0)
-    run: ContinuousRun | SampledRun
+    run_arguments = (description, moved, controller, t, setpoints, effort_limits)
     if rate is None:
         if sensors is not None:
             raise ValueError("sensors measure samples; expected a rate in Hz, or no sensors")
@@ -129,25 +129,12 @@ def simulate(
             raise ValueError(f"tolerance is {tolerance!r}; expected {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
         # DOP853's steps in stiff friction are about as long as those of a fixed step.
         substeps(moved.stiffness, t[-1] / MAX_STEPS)
-        run = ContinuousRun(
-            description,
-            moved,
-            controller,
-            t,
-            setpoints,
-            effort_limits,
-            continuous_reference=followed,
-            q0=q,
-            tolerance=tolerance,
-        )
-        memory = run.memory
-    else:
-        steps = substeps(moved.stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
-        measuring = None if sensors is None else sensors.start(moved.n, 1 / rate)
-        run = SampledRun(
-            description, moved, controller, t, setpoints, effort_limits, substeps=steps, measuring=measuring
-        )
-    return run(State(0.0, q, qd, memory), progress)
+        continuous = ContinuousRun(*run_arguments, continuous_reference=followed, q0=q, tolerance=tolerance)
+        return continuous(State(0.0, q, qd, continuous.memory), progress)
+    steps = substeps(moved.stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
+    measuring = None if sensors is None else sensors.start(moved.n, 1 / rate)
+    sampled = SampledRun(*run_arguments, substeps=steps, measuring=measuring)
+    return sampled(State(0.0, q, qd, NO_STATE), progress)
 
 
 def _reference_or_hold(description: Description, reference: Any, q0: ArrayLike | None) -> Reference:
@@ -160,11 +147,6 @@ def _require_types(**arguments: tuple[object, type]) -> None:
     for name, (value, kind) in arguments.items():
         if value is not None and not isinstance(value, kind):
             raise TypeError(f"{name} is {type(value).__name__}; expected a {kind.__name__}, or None")
-
-
-def _require_flag(name: str, value: object) -> None:
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"{name} is {value!r}; expected True or False")
 
 
 def _warn_beyond_stops(plant: Plant, q: Array) -> None:

@@ -85,12 +85,11 @@ class StepKernel:
             Joint values, rates and accelerations in a row, shape (3n,) for all runs or (B, 3n) of each.
         """
         pattern, plant = _plant(arms, friction, h)
-        model_pattern, model = ("", None) if _shares_symbols(arms, law) else inertial_pattern(law.description)
-        numbers = (
-            {"setpoint": setpoint} | plant | {"gains": law.gains, "effort_limits": np.minimum(effort_limits, NO_LIMIT)}
-        )
-        if model is not None:
-            numbers["model"] = model
+        numbers = {"setpoint": setpoint, **plant, "gains": law.gains}
+        numbers["effort_limits"] = np.minimum(effort_limits, NO_LIMIT)
+        model_pattern = ""
+        if list(arms) != [law.description]:  # a controller whose model is the arm that moves shares its symbols
+            model_pattern, numbers["model"] = inertial_pattern(law.description)
         return cls._of(f"{pattern} {law.name} {model_pattern}", numbers, arms, law)
 
     @classmethod
@@ -146,11 +145,6 @@ class StepKernel:
         if self.setpoint_shared:
             self.shared[: len(drive)] = drive
         self.kernel(self.shared, [*states, *own], list(into), threads)
-
-
-def _shares_symbols(arms: Sequence[Description], law: Law) -> bool:
-    """Return whether the controller's model is the arm that moves, so that both use the same symbols."""
-    return len(arms) == 1 and arms[0] == law.description
 
 
 def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> tuple[str, dict[str, Array]]:

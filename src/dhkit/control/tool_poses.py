@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Robot, check_pose, description_of, joint_vector
 from dhkit.description.arrays import number_array
+from dhkit.description.poses import one_pose
 from dhkit.display import counted, repr_line
 from dhkit.errors import PlanningError, UnreachableError
 from dhkit.kinematics import classify, forward_kinematics, inverse_kinematics, solve_numerically
@@ -129,10 +130,7 @@ def joints_at_pose(description: Description, T: ArrayLike, near: Array | None, n
     UnreachableError
         The arm does not reach the pose: says why.
     """
-    pose = number_array(T, name, "(4, 4)")
-    if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise ValueError(f"{name} has shape {pose.shape}; expected (4, 4), finite")
-    check_pose(pose, name)
+    pose = one_pose(T, name)
     closed = classify(description).fit is not None
     found = inverse_kinematics(description, pose, near) if closed else solve_numerically(description, pose, near)
     try:

@@ -90,7 +90,7 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
     if vector.shape != (description.n,):
         raise ValueError(f"{name} has shape {vector.shape}; expected ({description.n},)")
     if not np.isfinite(vector).all():
-        raise ValueError(f"{name} has values that are not finite: {vector.tolist()}")
+        raise ValueError(f"{name} has values that are not finite: {vector.tolist()}; expected finite values")
     return vector
 
 
@@ -191,9 +191,5 @@ def world_to_tool(description: Description, q: ArrayLike) -> Array:
     q
         Joint values, shape (..., n), rad and m.
     """
-    A = link_transforms(description, q)
-    T = np.broadcast_to(description.numbers.T_world_base, (*A.shape[:-3], 4, 4))
-    for i in range(description.n):
-        T = T @ A[..., i, :, :]
-    tool: Array = T @ description.numbers.T_last_tool
+    tool: Array = world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool
     return tool

@@ -129,6 +129,20 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     return array
 
 
+def one_pose(T: ArrayLike, name: str = "T") -> Array:
+    """Return T as a single pose, shape (4, 4), m, all finite.
+
+    Raises
+    ------
+    ValueError
+        Another shape, values that are not finite, or no rigid transform within 1e-6.
+    """
+    array = number_array(T, name, "(4, 4)")
+    if array.shape != (4, 4) or not np.isfinite(array).all():
+        raise ValueError(f"{name} has shape {array.shape}; expected (4, 4), finite values")
+    return check_pose(array, name)
+
+
 def _array(name: str, value: ArrayLike, size: int) -> Array:
     array = number_array(value, name, f"(..., {size})")
     if array.shape[-1:] != (size,):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextvars import ContextVar, Token
-from types import TracebackType
 
 from dhkit.display import repr_line
 from dhkit.errors import ExpressionError
@@ -33,9 +32,7 @@ class Budget:
         self._tokens.append(_ACTIVE.set(self))
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         _ACTIVE.reset(self._tokens.pop())
 
     def __repr__(self) -> str:

@@ -185,4 +185,4 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         return
     for quantity in report.quantities:
         if quantity in quantity_names(description.n):
-            variants_of(truth_of(description)).prepare(quantity)
+            variants_of(truth_of(description), frozenset()).prepare(quantity)

@@ -29,7 +29,7 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
-from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
+from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of
 from dhkit.grading.mistakes.explaining import explain as explain_mistakes
 from dhkit.grading.report import (
@@ -301,14 +301,11 @@ def _factorization(truth: Truth, judged: JudgedQuantity) -> NoteKind | None:
     lag, coordinates = truth.lagrangian, truth.coordinates
     C = np.empty((lag.n, lag.n), dtype=object)
     reader = RingReader(lag.arm.ring)
-    try:
-        for entry in judged.given:
-            element = reader.read(entry.tree).element() if entry.tree else None
-            if element is None:
-                return NoteKind.BY_TORQUES
-            C[entry.index] = element
-    except (OutsideTheRingError, AnswerError):
-        return NoteKind.BY_TORQUES
+    for entry in judged.given:
+        element = reader.element(entry.tree) if entry.tree else None
+        if element is None:
+            return NoteKind.BY_TORQUES
+        C[entry.index] = element
     if all(element.is_zero for element in (C - coordinates.in_y("C", lag.C)).flat):
         return NoteKind.CHRISTOFFEL
     rate = np.array([[entry.by_time() for entry in row] for row in truth.of("M")], dtype=object)

@@ -91,7 +91,7 @@ def inverse_kinematics(
         status_code=status,
         distance=distance,
         branches=fit.branches,
-        met=fit.met,
+        met=fit.coordinates,
         description=description,
     )
 

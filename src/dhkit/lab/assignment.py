@@ -363,7 +363,7 @@ def _tool_at(arm: Arm, form: PoseForm, tolerance: ToleranceForm, place: str) -> 
     fit = classify(arm.description).fit
     # With a rotation, the closed form of six joints decides whether the pose is reached; without one, the closed form
     # of an arm whose solutions meet the position alone.
-    if fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.met) <= {"x", "y", "z"}):
+    if fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.coordinates) <= {"x", "y", "z"}):
         solutions = arm.ik(T)
         is_near = 0 < float(solutions.distance) <= tolerance.position  # beyond the workspace by less than the tolerance
         if not is_near and not bool(np.any(solutions.valid & solutions.allowed)):

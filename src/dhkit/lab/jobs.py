@@ -67,11 +67,6 @@ class Job:
         """Make the next :meth:`progress` or :meth:`wait` raise :class:`Cancelled`."""
         self._cancelled.set()
 
-    @property
-    def is_cancelled(self) -> bool:
-        """Whether the job was cancelled."""
-        return self._cancelled.is_set()
-
 
 class Jobs:
     """Jobs of which the latest counts: one runs, and at most one waits until that one has noticed its cancelling.
@@ -142,8 +137,8 @@ class Jobs:
         try:
             result = work(job)
             with self._result_lock:
-                if not job.is_cancelled:
-                    take(result)
+                job.wait(0.0)  # the result of a job that was cancelled meanwhile is not taken
+                take(result)
         except Cancelled:
             return
         except (DhkitError, ValueError, TypeError) as failure:

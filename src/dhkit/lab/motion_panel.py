@@ -140,8 +140,7 @@ class MotionPanel(Panel):
     @answers("motion.play")
     def play(self, _: Fields) -> None:
         """Play the motion once more, where another state has taken its place."""
-        motion = self._movable_motion("motion.play")
-        self.desk.view.play(motion)
+        self.desk.view.play(self._movable_motion("motion.play"))
 
     @answers("motion.show", "time")
     def show(self, fields: Fields) -> None:

@@ -134,10 +134,7 @@ def back_and_forth(motion: Trajectory, t: float, free: list[int]) -> tuple[Array
         The k joints, from 0.
     """
     half_period = motion.duration + REST_TIME
-    s = t % (2 * half_period)
-    returning = s >= half_period
-    if returning:
-        s -= half_period
+    returning, s = divmod(t % (2 * half_period), half_period)
     time = min(s, motion.duration)
     if returning:
         time = motion.duration - time

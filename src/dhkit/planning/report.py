@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.planning.certificate import Certificate
@@ -112,7 +111,7 @@ class PlanReport:
     def _joint(self, what: str, row: int) -> str | None:
         return self.joints[row] if what in JOINT_LIMITS else None
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the report as numbers and texts, for JSON."""
         certificate = self.certificate
         return {

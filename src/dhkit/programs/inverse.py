@@ -109,7 +109,7 @@ class PoseJudge:
         fit = self._classification.fit
         q = random_states(arm, np.random.default_rng(0), 1)[0]
         position_decides = np.linalg.matrix_rank(arm.jacobian(q)[:3], RANK_TOLERANCE) == arm.n
-        self._position_only = fit is not None and set(fit.met) <= {"x", "y", "z"} and bool(position_decides)
+        self._position_only = fit is not None and set(fit.coordinates) <= {"x", "y", "z"} and bool(position_decides)
         """Whether solutions must meet the position alone, which decides all joints; otherwise the whole pose."""
         self._errors: Counter[str] = Counter()
         self._example = ""

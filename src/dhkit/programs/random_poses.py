@@ -24,8 +24,7 @@ def random_states(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     free = np.where(numbers.prismatic, arm.description.reach or 1.0, np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -free)
     upper = np.where(np.isfinite(numbers.upper), numbers.upper, free)
-    values: Array = rng.uniform(lower, upper, (count, arm.n))
-    return values
+    return rng.uniform(lower, upper, (count, arm.n))
 
 
 def _singular_value_ratio(arm: Arm, q: Array) -> float:

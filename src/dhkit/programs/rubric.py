@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
@@ -112,7 +112,7 @@ class CheckRubric:
         return cls.from_dict(data, f"{path}: ")
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], where: str = "") -> CheckRubric:
+    def from_dict(cls, data: dict[str, object], where: str = "") -> CheckRubric:
         """Return a rubric of a file's tables; ``where`` begins the message of an error.
 
         Raises
@@ -133,12 +133,11 @@ class CheckRubric:
 
     def points(self, function: str) -> dict[str, float]:
         """Return the points of each part of a function's score."""
-        parts: dict[str, float] = {
+        return {
             "fk": {"agrees": self.fk.agrees},
             "ik": {name: getattr(self.ik, name) for name in ("closes", "branches", "singular", "time")},
             "controller": {"follows": self.controller.follows},
         }[function]
-        return parts
 
     def __repr__(self) -> str:
         functions = self.scored_functions(("fk", "ik", "controller"))

@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, check_pose
+from dhkit.description import Array
 from dhkit.description.arrays import number_array
+from dhkit.description.poses import one_pose
 from dhkit.display import repr_line
 
 
@@ -108,7 +109,7 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
     """
     from scipy.spatial.transform import Rotation
 
-    start, goal = _pose(T0, "T0"), _pose(T1, "T1")
+    start, goal = one_pose(T0, "T0"), one_pose(T1, "T1")
     turn = Rotation.from_matrix(goal[:3, :3] @ start[:3, :3].T).as_rotvec()
     return ToolLine(start, goal[:3, 3] - start[:3, 3], turn)
 
@@ -136,7 +137,7 @@ def tool_circle(
     ValueError
         Other shapes, no pose, values that are not finite, an axis of length 0, or a position on the axis.
     """
-    start = _pose(T0, "T0")
+    start = one_pose(T0, "T0")
     point, direction = _vector(centre, "centre"), _vector(axis, "axis")
     length = float(np.linalg.norm(direction))
     if not length:
@@ -162,13 +163,6 @@ def _rotations(turns: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(turns).as_matrix())
-
-
-def _pose(T: ArrayLike, name: str) -> Array:
-    array = check_pose(T, name)
-    if array.shape != (4, 4) or not np.isfinite(array).all():
-        raise ValueError(f"{name} has shape {array.shape}; expected (4, 4), finite values")
-    return array
 
 
 def _vector(value: ArrayLike, name: str) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Convention, Description, takes_robot
-from dhkit.description.frames import joint_array, world_to_frames, world_to_tool
-from dhkit.viewer.diagrams import CURVE_COLORS, GRID_COLOR, joint_color, joint_kinds
+from dhkit.description.frames import joint_vector, world_to_frames, world_to_tool
+from dhkit.viewer.diagrams import CURVE_COLORS, GRID_COLOR, joint_color, joint_kinds, style_axes
 from dhkit.viewer.motion import check_motion
 from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.overlays import AXIS_COLORS
@@ -73,11 +73,9 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     Raises
     ------
     ValueError
-        Another shape.
+        Another shape, or values that are not finite.
     """
-    q = joint_array(description, q)
-    if q.ndim != 1:
-        raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
+    q = joint_vector(description, q)
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
     axes = space_axes(figure, 111)
     frames = world_to_frames(description, q)
@@ -119,10 +117,8 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
             style = ("-", "--", ":")[i // len(CURVE_COLORS) % 3]
             axes.plot(times, unit * q[:, i], style, color=joint_color(i), lw=1.8, label=description.joints[i].name)
         axes.margins(x=0.01)
-        axes.grid(color=GRID_COLOR, lw=0.6)
-        axes.spines[["top", "right"]].set_visible(False)
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
-        axes.set_ylabel(label)
+        style_axes(axes, label)
     axes.set_xlabel("time [s]")
     draw_path(space_axes(figure, grid[:, 1]), description, q)
     return figure
@@ -164,8 +160,7 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
         axes.plot([], [], [], color=color, lw=1.5, label="xyz"[k])
     halo = [withStroke(linewidth=3, foreground="white")]
     for label in frame_labels(description):
-        place = T[label.frame, :3, 3]
-        axes.text(*place, f"   {label.text}", fontsize=9, va="bottom", path_effects=halo, zorder=6)
+        axes.text(*T[label.frame, :3, 3], f"   {label.text}", fontsize=9, va="bottom", path_effects=halo, zorder=6)
     axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3, handlelength=1, columnspacing=1)
 
 

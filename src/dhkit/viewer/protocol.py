@@ -78,8 +78,7 @@ def encode_scene(scene: Scene) -> bytes:
         """Return what meshcat gives for an array as msgpack writes it."""
         return msgpack.ExtType(value.type, value.data)
 
-    about = _json(scene.about)
-    blocks = [about, *(msgpack.packb(command, default=packed_array) for command in scene.commands)]
+    blocks = [_json(scene.about), *(msgpack.packb(command, default=packed_array) for command in scene.commands)]
     body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
     return _message(MessageType.SCENE, body, joints=len(scene.about["joints"]))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -173,8 +173,7 @@ def _frame_name(description: Description, frame: int) -> str:
     return "tool" if frame == description.n + 1 else str(frame)
 
 
-def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
-    commands: list[Lowered] = []
+def _part_commands(parts: Sequence[Part]) -> Iterator[Lowered]:
     count: dict[int, int] = {}
     for part in parts:
         k = count[part.link] = count.get(part.link, -1) + 1
@@ -184,23 +183,18 @@ def _part_commands(parts: Sequence[Part]) -> list[Lowered]:
         except ModelError as error:  # the mesh has a valid header, and content that is not valid
             log.warning("%s; it is left out", error)
             continue
-        commands.append(_set_object(path, drawn))
-        commands.append(_set_transform(path, part_transform(part)))
-    return commands
+        yield _set_object(path, drawn)
+        yield _set_transform(path, part_transform(part))
 
 
-def _triad_commands(description: Description, places: list[list[list[int]]], size: float) -> list[Lowered]:
-    commands: list[Lowered] = []
+def _triad_commands(description: Description, places: list[list[list[int]]], size: float) -> Iterator[Lowered]:
     for place in places:
         for k, same in enumerate(place):
             name = _frame_name(description, same[0])
             node = "tool" if name == "tool" else f"link{name}"
             triad = triad_object(TRIAD_SHARE * size * NESTED_RATIO**k, f"{node}/frame")
-            commands.append(_set_object(f"{ROOT}/{node}/frame", triad))
-            commands.append(
-                {"type": "set_property", "path": f"{ROOT}/{node}/frame", "property": "visible", "value": False}
-            )
-    return commands
+            yield _set_object(f"{ROOT}/{node}/frame", triad)
+            yield {"type": "set_property", "path": f"{ROOT}/{node}/frame", "property": "visible", "value": False}
 
 
 def _upward(description: Description) -> list[float]:

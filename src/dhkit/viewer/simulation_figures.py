@@ -117,8 +117,7 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
             raise ValueError(f"{name} has joints {result.description.kinds}; expected {first.kinds}")
     layout = ConstrainedLayoutEngine(w_pad=DIAGRAM_MARGIN)
     figure = new_figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
-    text = title or f"{first.name}: errors of {len(results)} controllers"
-    figure.suptitle(text, fontsize=13, fontweight="bold")
+    figure.suptitle(title or f"{first.name}: errors of {len(results)} controllers", fontsize=13, fontweight="bold")
     curves, bars = figure.subplots(1, 2, width_ratios=(1.5, 1))
     unit = _unit(first, np.arange(first.n))
     _draw_largest_errors(curves, results)

@@ -6,6 +6,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,8 +26,6 @@ from dhkit.viewer.scene import build_scene, first_configuration, node_transforms
 from dhkit.viewer.session import OF_ONE_ARM, Slot
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
     from dhkit.viewer.protocol import Samples
@@ -116,11 +115,9 @@ class View(Exportable):
         """
         url = self.url
         webbrowser.open(url)
-        try:
+        with suppress(KeyboardInterrupt):
             while block:
                 time.sleep(0.2)
-        except KeyboardInterrupt:
-            pass
         return url
 
     def show(self, q: ArrayLike) -> None:
@@ -217,12 +214,7 @@ class View(Exportable):
         ValueError
             Another shape, or values that are not finite.
         """
-        line = np.zeros((0, 3)) if points is None else np.asarray(points, dtype=float)
-        if line.ndim != 2 or line.shape[1] != 3:
-            raise ValueError(f"points has shape {line.shape}; expected (N, 3)")
-        if not np.isfinite(line).all():
-            raise ValueError("points has values that are not finite")
-        self._trace = line
+        self._trace = line = _point_rows(points, "points")
         self._publish(Slot.TRACE, protocol.encode_trace(line))
 
     def points(self, positions: ArrayLike | None, colors: ArrayLike | None = None) -> None:
@@ -240,11 +232,7 @@ class View(Exportable):
         ValueError
             Other shapes, values that are not finite, or colors below 0 or above 1.
         """
-        cloud = np.zeros((0, 3)) if positions is None else np.asarray(positions, dtype=float)
-        if cloud.ndim != 2 or cloud.shape[1] != 3:
-            raise ValueError(f"positions has shape {cloud.shape}; expected (N, 3)")
-        if not np.isfinite(cloud).all():
-            raise ValueError("positions has values that are not finite")
+        cloud = _point_rows(positions, "positions")
         self._publish(Slot.POINTS, protocol.encode_points(cloud, color_bytes(colors, len(cloud))))
 
     def ellipsoid(self, ellipsoid: Ellipsoid | None, scale: float | None = None) -> None:
@@ -346,9 +334,7 @@ class View(Exportable):
     def __enter__(self) -> View:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _repr_html_(self) -> str:
@@ -419,3 +405,13 @@ class View(Exportable):
                 self._widget.send({"q": self._q.tolist()})
             else:
                 self._widget.send({}, [message])
+
+
+def _point_rows(value: ArrayLike | None, name: str) -> Array:
+    """Return points, shape (N, 3), m, all finite; no point for None."""
+    points = np.zeros((0, 3)) if value is None else np.asarray(value, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"{name} has shape {points.shape}; expected (N, 3)")
+    if not np.isfinite(points).all():
+        raise ValueError(f"{name} has values that are not finite")
+    return points

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_array, takes_robot, world_to_frames, world_to_tool
+from dhkit.description import Array, Description, joint_vector, takes_robot, world_to_frames, world_to_tool
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
-from dhkit.viewer.diagrams import GRID_COLOR
+from dhkit.viewer.diagrams import style_axes
 from dhkit.viewer.figures import LINK_COLOR, plot, set_space_limits, skeleton, space_axes
 from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.scene import first_configuration, scene_size
@@ -91,14 +91,14 @@ class _Pixels:
         centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
         reached = np.isfinite(self.best).astype(float).T
         axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
-        axes.set(xlabel=self.plane.labels[0], ylabel=self.plane.labels[1], aspect="equal")
+        axes.set(xlabel=self.plane.labels[0], aspect="equal")
+        style_axes(axes, self.plane.labels[1])
         axes.set_title(self.plane.title, fontsize=10)
-        axes.grid(color=GRID_COLOR, lw=0.6)
         axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
         return image
 
 
+@plot.register(Workspace)
 def plot_workspace(workspace: Workspace) -> Figure:
     """Return a figure of an arm's workspace, colored by the best manipulability at each place, with the arm in it.
 
@@ -124,7 +124,8 @@ def plot_workspace(workspace: Workspace) -> Figure:
         image = reach.draw(ax, float(workspace.manipulability.max()))
         _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
         for boundary in borders:
-            _draw_border(ax, reach.plane.border(boundary), BOUNDARY_STYLES[boundary.name])
+            border, dashes = reach.plane.border(boundary), BOUNDARY_STYLES[boundary.name]
+            ax.plot(*border.T, dashes, color=BOUNDARY_COLOR, lw=1.3, zorder=1.9)  # below the arm
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
     bar.set_label("best translational manipulability (SI)", fontsize=9)
     bar.outline.set_visible(False)
@@ -152,11 +153,7 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     ValueError
         The joint values have another shape or are not finite.
     """
-    q = joint_array(description, q)
-    if q.ndim != 1:
-        raise ValueError(f"q has shape {q.shape}; expected ({description.n},)")
-    if not np.isfinite(q).all():
-        raise ValueError(f"q is {q.tolist()}; expected finite values")
+    q = joint_vector(description, q)
     ellipsoid = velocity_ellipsoid(description, q)
     longest = float(ellipsoid.lengths[0])
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
@@ -170,11 +167,6 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     )
     axes.set_title(f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12)
     return figure
-
-
-@plot.register(Workspace)
-def _(value: Workspace) -> Figure:
-    return plot_workspace(value)
 
 
 @plot.register(Ellipsoid)
@@ -246,11 +238,6 @@ def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
     for color, width in (("white", 6.5), (LINK_COLOR, 3.5)):
         axes.plot(*line.T, color=color, lw=width, solid_capstyle="round", solid_joinstyle="round")
     axes.plot(*best, "*", color=BEST_COLOR, mec="white", ms=15, zorder=5)
-
-
-def _draw_border(axes: Axes, points: Array, dashes: str) -> None:
-    """Draw a boundary, shape (k, 2), below the arm."""
-    axes.plot(*points.T, dashes, color=BOUNDARY_COLOR, lw=1.3, zorder=1.9)
 
 
 def _boundary_label(boundary: Boundary) -> str:

@@ -86,8 +86,7 @@ def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
             if quantity != "mass_matrix":
                 return result
             upper = np.triu(np.reshape(result, (model.nv, model.nv)))
-            symmetric: Array = upper + np.triu(upper, 1).T
-            return symmetric
+            return upper + np.triu(upper, 1).T
 
         def prepare(items: int) -> Call:
             chosen = list(islice(cycle(states), items))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import accumulate
 
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import begins_with, derivative_by_time, fail, replace_runs, sign
@@ -107,11 +108,8 @@ def _closing_places(tokens: Sequence[Token], text: str) -> dict[int, int]:
 
 def _only_comma(tokens: Sequence[Token], start: int, end: int) -> int:
     """Return where the one comma of a bracket's own level is; 0 where there is none, or more than one."""
-    depth, commas = 0, []
-    for k in range(start + 1, end):
-        depth += (tokens[k].text in OPENING) - (tokens[k].text in CLOSING)
-        if depth == 0 and tokens[k].text == ",":
-            commas.append(k)
+    depths = accumulate((token.text in OPENING) - (token.text in CLOSING) for token in tokens[start + 1 : end])
+    commas = [k for k, depth in enumerate(depths, start + 1) if depth == 0 and tokens[k].text == ","]
     return commas[0] if len(commas) == 1 else 0
 
 

@@ -38,7 +38,7 @@ STYLE_MACROS = word_set(
     "mathrm mathit mathbf mathsf mathcal text textrm operatorname boldsymbol bm vec hat bar mathnormal"
 )
 SYMBOL_MACROS = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
-DOTS = ("dot", "ddot")
+DOT_MACROS = ("dot", "ddot")
 GREEK = LETTERS - {"pi", "Pi"} | {"varepsilon", "vartheta", "varrho", "varphi"}
 OVER = "\\over"
 MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
@@ -248,7 +248,7 @@ class _LatexReader:
             if self._next_is("["):
                 fail(self.text, at, "a root other than the square root")
             return [Token("name", "sqrt", at), *self._bracketed(at)]
-        if name in DOTS:
+        if name in DOT_MACROS:
             return self._dotted(name, at, bare)
         if name in STYLE_MACROS:
             return self._upright(at, bare)

@@ -21,6 +21,7 @@ from dhkit.grading.answers.tokens import (
     fail,
     in_brackets,
     nesting,
+    places_outside_brackets,
     quote,
     sign,
     word_set,
@@ -226,20 +227,11 @@ def _rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
     may_have_spaces = not is_latex(text) and not is_mathematica(text)
     return [
         _split_at_spaces(row, text)
-        if may_have_spaces and not _has_column_sign(row)
+        if may_have_spaces and not places_outside_brackets(row, *COLUMN_SIGNS)
         else _split(row, COLUMN_SIGNS, text)
         for row in _split(inner, ROW_SIGNS, text)
         if row
     ]
-
-
-def _has_column_sign(row: Sequence[Token]) -> bool:
-    depth = 0
-    for token in row:
-        depth += nesting(token.text)
-        if depth == 0 and token.kind == "sign" and token.text in COLUMN_SIGNS:
-            return True
-    return False
 
 
 def _split(tokens: Sequence[Token], signs: Sequence[str], text: str) -> list[list[Token]]:

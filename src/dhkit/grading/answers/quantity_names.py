@@ -64,8 +64,7 @@ class QuantityNames:
 
     def is_scalar(self, quantity: str) -> bool:
         """Whether a quantity has one entry, so that a formula without brackets gives it whole."""
-        shape = self.shape(quantity)
-        return all(length == 1 for length in shape)
+        return all(length == 1 for length in self.shape(quantity))
 
     def quantity(self, name: str) -> str:
         """Return the quantity that a name stands for, by itself or as an alias; empty of another name."""

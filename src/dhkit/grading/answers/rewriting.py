@@ -15,6 +15,7 @@ from dhkit.grading.answers.tokens import (
     derivative_by_time,
     fail,
     in_brackets,
+    places_outside_brackets,
     replace_runs,
     sign,
     word_set,
@@ -136,7 +137,7 @@ class _Rewriting:
                 return None
             end = self._closing(tokens, k + 1)
             inner = tokens[k + 2 : end]
-            comma = _first_comma(inner)
+            comma = next(iter(places_outside_brackets(inner, ",")), 0)
             order = ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
             if not comma or not order:
                 self._fail(token, "a derivative other than by t")
@@ -273,11 +274,7 @@ class _Rewriting:
 
     def _functions(self, tokens: Sequence[Token]) -> list[Token]:
         """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions behind them, sin^2(q1)."""
-
-        def read_run(k: int) -> tuple[Sequence[Token], int] | None:
-            return self._function(tokens, k) if tokens[k].kind == "function" else None
-
-        return replace_runs(tokens, read_run)
+        return replace_runs(tokens, lambda k: self._function(tokens, k) if tokens[k].kind == "function" else None)
 
     def _function(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int]:
         """Return the call of the function at k, and where it ends."""
@@ -337,16 +334,6 @@ def _without_methods(tokens: Sequence[Token]) -> list[Token]:
         return [method, bracket, name, sign(",", dot.at)], k + 4
 
     return replace_runs(tokens, read_run)
-
-
-def _first_comma(tokens: Sequence[Token]) -> int:
-    """Return where the first comma outside brackets is; 0 without one."""
-    depth = 0
-    for k, token in enumerate(tokens):
-        depth += {"(": 1, ")": -1}.get(token.text, 0)
-        if depth == 0 and token.text == ",":
-            return k
-    return 0
 
 
 def _end_of_over_time(tokens: Sequence[Token], k: int, order: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Sequence
+from itertools import accumulate
 from typing import NoReturn
 
 from dhkit.errors import AnswerError
@@ -157,6 +158,12 @@ def closing_bracket(tokens: Sequence[Token], k: int) -> int:
         if depth == 0:
             return end
     return len(tokens)
+
+
+def places_outside_brackets(tokens: Sequence[Token], *texts: str) -> list[int]:
+    """Return where tokens of some texts stand outside all brackets."""
+    depths = accumulate(nesting(token.text) for token in tokens)
+    return [k for k, depth in enumerate(depths) if depth == 0 and tokens[k].text in texts]
 
 
 def sign(text: str, at: int) -> Token:

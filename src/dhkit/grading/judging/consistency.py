@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dhkit.grading.answers.sheet import quantity_names
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Note, NoteKind
@@ -33,9 +34,9 @@ class Consistency:
         judged = self.judged[quantity]
         if quantity not in _ROUTES:
             return {}
-        sources, derive = _ROUTES[quantity]
+        sources = _ROUTES[quantity][0]
         wrong = [name for name in sources if name in self.judged and self.judged[name].wrong]
-        expected = derive(self) if wrong else None
+        expected = self.derived(quantity) if wrong else None
         if expected is None:
             return {}
         answers = {index: judged.findings[index].answer for index in judged.wrong_indices}
@@ -48,13 +49,13 @@ class Consistency:
     def notes(self) -> list[Note]:
         """Return notes on which quantities agree with each other, right or wrong, if one of them is wrong."""
         notes = []
-        for quantity, (sources, derive) in _ROUTES.items():
+        for quantity, (sources, _) in _ROUTES.items():
             given = tuple(name for name in sources if name in self.judged)
             if quantity not in self.judged or not given:
                 continue
             if not any(self.judged[name].wrong for name in (quantity, *given)):
                 continue
-            own, expected = self.own(quantity), derive(self)
+            own, expected = self.own(quantity), self.derived(quantity)
             if own is None or expected is None:
                 continue
             agrees = all((a - b).is_zero for a, b in zip(own.flat, expected.flat, strict=True))
@@ -81,6 +82,19 @@ class Consistency:
             array[place_of(name, index)] = element
         return array
 
+    def derived(self, quantity: str) -> Elements | None:
+        """Return a quantity as it follows from those that the sheet has; None if one of them is outside the ring."""
+        sources, derive = _ROUTES[quantity]
+        values = []
+        for name in sources:
+            if name == "C" or name not in quantity_names(self.n):  # own("h") is C qd where C alone is given
+                continue
+            value = self.own(name)
+            if value is None:
+                return None
+            values.append(value)
+        return derive(self, *values)
+
     @property
     def n(self) -> int:
         """The number of joints."""
@@ -92,36 +106,27 @@ class Consistency:
         return self.truth.coordinates.rates(element_array([generator(ring, i) for i in range(self.n)]))
 
 
-Route = Callable[[Consistency], Elements | None]
-"""Derives a quantity from the sheet's others; None if one of them is outside the ring."""
+Route = Callable[..., Elements]
+"""Derives a quantity from the sheet's others, which follow its first argument, a :class:`Consistency`."""
 
 
-def _gradient(parts: Consistency) -> Elements | None:
+def _gradient(parts: Consistency, V: Elements) -> Elements:
     """Return dV/dq."""
-    V = parts.own("V")
-    if V is None:
-        return None
     by = parts.truth.coordinates.by_position
     energy: Element = V.item()
     return np.array([by(energy, i) for i in range(parts.n)], dtype=object)
 
 
-def _hessian(parts: Consistency) -> Elements | None:
+def _hessian(parts: Consistency, K: Elements) -> Elements:
     """Return the second derivatives of K by the rates."""
-    K = parts.own("K")
-    if K is None:
-        return None
     by, n = parts.truth.coordinates.by_rate, parts.n
     energy: Element = K.item()
     momenta = [by(energy, i) for i in range(n)]
     return np.array([[by(p, j) for j in range(n)] for p in momenta], dtype=object).reshape(n, n)
 
 
-def _velocity_torques(parts: Consistency) -> Elements | None:
+def _velocity_torques(parts: Consistency, M: Elements) -> Elements:
     """Return dM/dt qd - d(qd^T M qd / 2)/dq."""
-    M = parts.own("M")
-    if M is None:
-        return None
     rates, by = parts.rates(Ring.rate), parts.truth.coordinates.by_position
     momenta = M @ rates
     K = rates @ momenta / 2
@@ -133,39 +138,29 @@ def _velocity_torques(parts: Consistency) -> Elements | None:
     return np.array(torques, dtype=object)
 
 
-def _torques(parts: Consistency) -> Elements | None:
+def _torques(parts: Consistency, M: Elements, h: Elements, g: Elements) -> Elements:
     """Return M qdd + h + g."""
-    M, h, g = parts.own("M"), parts.own("h"), parts.own("g")
-    if M is None or h is None or g is None:
-        return None
     torques = M @ parts.rates(Ring.acceleration) + h + g
     friction = parts.truth.coordinates.in_y("tau", parts.truth.viscous) if parts.truth.friction else 0
     return torques + friction
 
 
-def _lagrangian(parts: Consistency) -> Elements | None:
+def _lagrangian(parts: Consistency, K: Elements, V: Elements) -> Elements:
     """Return K - V."""
-    K, V = parts.own("K"), parts.own("V")
-    return None if K is None or V is None else element_array(K[()] - V[()])
+    return element_array(K[()] - V[()])
 
 
-def _product(parts: Consistency) -> Elements | None:
+def _product(parts: Consistency, *links: Elements) -> Elements:
     """Return base A1 ... An tool."""
     T = parts.truth.kinematics.base
-    for i in range(1, parts.n + 1):
-        A = parts.own(f"A{i}")
-        if A is None:
-            return None
+    for A in links:
         T = T @ A
     pose: Elements = T @ parts.truth.kinematics.tool
     return pose
 
 
-def _jacobian(parts: Consistency) -> Elements | None:
+def _jacobian(parts: Consistency, T: Elements) -> Elements:
     """Return the derivatives of T's origin by the variables, and the axes of dR/dq R^T, shape (6, n)."""
-    T = parts.own("T")
-    if T is None:
-        return None
     by, columns = parts.truth.coordinates.by_position, []
     for i in range(parts.n):
         rate = np.array([[by(entry, i) for entry in row] for row in T[:3]], dtype=object)

@@ -305,7 +305,8 @@ def _first_difference(
     work, constants = 0, list[Tree]()
 
     def differs(state: sampling.Sample, value: Any, right: Any, why: str) -> Finding:
-        witness = Witness(sampling.show_state(state, used), _finite(value), _finite(right))
+        shown = {name: float(x) for name, x in state.names.items() if name in used}
+        witness = Witness(shown, _finite(value), _finite(right))
         return Finding(Verdict.WRONG, f"a state shows it: {why}", witness=witness)
 
     if by.up_to_constant:  # energies count from any zero, however large, if it is a number at all

@@ -111,7 +111,7 @@ class Search:
     def _explain(self, branch: Branch, joint: int) -> Explanation:
         """Return the mistake of a branch with a known first wrong joint."""
         here = self._agreeing_edits(branch, joint)
-        candidates = [Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree)) for edit in here]
+        candidates = [_edited(branch, joint, edit) for edit in here]
         halves = [
             Explanation(mistake, other, repaired)
             for other in branch.order[: branch.rank(joint) + 1]
@@ -125,11 +125,7 @@ class Search:
             following = candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
             if following is None or branch.rank(following) > branch.rank(joint):
                 return candidate
-        frequent = [
-            Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree))
-            for edit in self._edits(branch, joint)
-            if edit.mistake in FREQUENT
-        ]
+        frequent = [_edited(branch, joint, edit) for edit in self._edits(branch, joint) if edit.mistake in FREQUENT]
         best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
         return best if gained > MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
@@ -168,7 +164,7 @@ class Search:
         """Yield changes of formulas before the first wrong joint, whose values may be those of another solution."""
         for other in branch.order[: branch.rank(joint)]:
             for edit in self._agreeing_edits(branch, other):
-                yield Explanation(edit.mistake, other, branch.with_tree(other, edit.tree))
+                yield _edited(branch, other, edit)
 
     def _explain_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
@@ -202,6 +198,10 @@ def lengths_of(description: Description) -> Lengths:
     return Lengths(parameters, tuple(trees))
 
 
+def _edited(branch: Branch, joint: int, edit: Edit) -> Explanation:
+    return Explanation(edit.mistake, joint, branch.with_tree(joint, edit.tree))
+
+
 def _count_of_closed(explanation: Explanation) -> int:
     return int(np.sum(explanation.repaired.closed)) if explanation.repaired is not None else 0
 
@@ -220,12 +220,6 @@ def _offsets(branch: Branch, joint: int) -> list[float]:
     s = int(np.argmax(wrong))
     alive = branch.alive[branch.rank(joint)][s]
     return [float(x) for x in np.unique((branch.poses.truths[s, alive, joint] - branch.q[s, joint]).round(12))]
-
-
-def _with_part_repaired(branch: Branch, joint: int, wrong: Mask, changed: Tree) -> Branch:
-    """Return the branch whose joint has the values of a changed formula at the poses of a mask, shape (S,)."""
-    values = branch.repaired(joint, branch.editable(joint).of(changed))
-    return branch.with_repair(joint, lambda x: np.where(wrong, values, x))
 
 
 def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Branch]]:
@@ -249,7 +243,8 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
     arcs = [function for function in ARCS if has_call(tree, (function,))]
     if own and len(arcs) == 1 and not isinstance(tree, Call):
         mistake, change = ARCS[arcs[0]]
-        changed = with_calls_changed(tree, arcs, change)
-        branches.append((mistake, _with_part_repaired(branch, joint, wrong, changed)))
+        changed = branch.editable(joint).of(with_calls_changed(tree, arcs, change))
+        values = branch.repaired(joint, changed)
+        branches.append((mistake, branch.with_repair(joint, lambda x: np.where(wrong, values, x))))
     # Both may give a solution: the half that the formula's own function does not cover comes first.
     return branches[::-1] if has_call(tree, ("acos",)) and not has_call(tree, ("atan", "asin")) else branches

@@ -113,6 +113,13 @@ class RingReader:
         except RingError:
             raise OutsideTheRingError(TOO_MANY_TERMS) from None
 
+    def element(self, tree: Tree) -> Element | None:
+        """Return a syntax tree as an element of the ring; None if it is none, or cannot be read."""
+        try:
+            return self.read(tree).element()
+        except (OutsideTheRingError, AnswerError):
+            return None
+
     def _quotient(self, tree: Tree) -> Quotient:
         # CasADi's graphs share what is used twice.
         quotient = self._shared.get(id(tree))
@@ -393,6 +400,15 @@ def sum_of_angles(ring: Ring, directions: Iterable[Direction]) -> Direction:
     for x, y in directions:
         c, s = c * x - s * y, s * x + c * y
     return c, s
+
+
+def varying(element: Element) -> Element:
+    """Return an element without its terms that do not depend on the state."""
+    ring = element.ring
+    constant = [g.kind == "constant" for g in ring.generators]
+    return ring.from_terms(
+        {m: c for m, c in element.terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
+    )
 
 
 def _rational(element: Element) -> Fraction | None:

@@ -19,7 +19,7 @@ import numpy as np
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.judging.numeric import parts_of
-from dhkit.grading.judging.quotients import Quotient, RingReader
+from dhkit.grading.judging.quotients import Quotient, RingReader, varying
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.elements import PolynomialRing
 
@@ -168,7 +168,7 @@ class _Expansion:
             numerator, denominator = self.of(term)
             if not added:
                 numerator = {m: -c for m, c in numerator.items()}
-            if not _same(bottom, denominator):
+            if bottom != denominator:
                 top, numerator = self._multiply(top, denominator), self._multiply(numerator, bottom)
                 bottom = self._multiply(bottom, denominator)
             top = dict(top)
@@ -251,7 +251,7 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
         top, bottom = expansion.of(tree)
     except _TooLongError:
         return None
-    is_quotient = not _same(bottom, expansion.one)
+    is_quotient = bottom != expansion.one
     if is_quotient and not _is_plain(residuals, truth):
         return None
     ring = truth.ring
@@ -308,11 +308,8 @@ def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Frac
 
     An energy's terms that do not depend on the state are left out: energies count from any zero.
     """
-    ring = difference.ring
     if is_energy:
-        constant = [generator.kind == "constant" for generator in ring.generators]
-        free = {m for m in difference.terms if all(c or not e for e, c in zip(m, constant, strict=True))}
-        difference = ring.from_terms({m: c for m, c in difference.terms.items() if m not in free})
+        difference = varying(difference)
     references = {group: sum(sizes) for group, sizes in _groups(reference).items()}
     for group, sizes in _groups(difference).items():
         share = shares.get(group, Fraction(0)) + DOUBLE_ALLOWANCE
@@ -326,10 +323,6 @@ def _is_plain(residuals: Residuals, truth: Element) -> bool:
     """Whether the residual is the difference itself: then quotients are linear in their coefficients too."""
     one = truth.ring.one
     return list(residuals(Quotient(truth + one, one), truth)) == [one]
-
-
-def _same(left: Polynomial, right: Polynomial) -> bool:
-    return left is right or left == right
 
 
 def _allowance(value: Fraction, text: str, digits: int) -> Fraction:

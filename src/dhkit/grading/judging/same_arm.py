@@ -49,23 +49,23 @@ class Overlay:
         D: Array = np.linalg.inv(own) @ self.B @ self.answer.frames(np.zeros(self.answer.n))
         return D
 
-    def holds(self, scale: float) -> bool:
+    def holds(self) -> bool:
         """Whether both arms move alike at joint values that were not used to find the relation."""
         W = np.linalg.inv(self.differences[-1])
         for q in np.random.default_rng(1).uniform(-2, 2, (STATES, self.answer.n)):
             gap = self.truth.frames(self.senses * q + self.offsets)[-1] - self.B @ self.answer.frames(q)[-1] @ W
-            gap[:3, 3] /= scale
+            gap[:3, 3] /= self.truth.scale
             if not np.max(np.abs(gap)) <= SAME:
                 return False
         return True
 
-    def allowed(self, strict: bool, scale: float) -> bool:
+    def allowed(self, strict: bool) -> bool:
         """Whether frames 0 and n differ by free choices, and not by a wrong number.
 
         They may differ by the file's own numbers, which the answer then leaves to base and tool. A last link of another
         length is wrong in any case if the file gives its length (``strict``).
         """
-        tolerance, standard = SAME * scale, self.answer.convention is Convention.STANDARD
+        tolerance, standard = SAME * self.truth.scale, self.answer.convention is Convention.STANDARD
         first, last = self.differences[0], self.differences[-1]
         numbers, own = self.answer.entries, self.truth.entries
         if strict and standard and abs(abs(numbers[-1, 2]) - abs(own[-1, 2])) > tolerance:
@@ -91,15 +91,10 @@ class Overlay:
         return len(self.changes), sum(change.change.concerns_joint for change in self.changes)
 
     @property
-    def scale(self) -> float:
-        """Sum of the arm's lengths, m; 1 if it has none."""
-        return _scale(self.truth)
-
-    @property
     def moves_zero(self) -> bool:
         """Whether a joint variable has another zero or the opposite sense."""
         return any(
-            sense < 0 or (abs(wrapped(offset)) > SAME if kind == "R" else abs(offset) > SAME * self.scale)
+            sense < 0 or (abs(wrapped(offset)) > SAME if kind == "R" else abs(offset) > SAME * self.truth.scale)
             for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True)
         )
 
@@ -107,7 +102,7 @@ class Overlay:
     def changes(self) -> tuple[FrameChange, ...]:
         """Changes of frames and joint variables."""
         # Lengths are compared as finely as arms are: a wrong number is no choice of frames.
-        tolerance = SAME * self.scale
+        tolerance = SAME * self.truth.scale
         changes = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D, tolerance)]
         joints = zip(self.truth.kinds, self.senses, self.offsets, strict=True)
         for i, (kind, sense, offset) in enumerate(joints, start=1):
@@ -122,21 +117,16 @@ def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
     return free
 
 
-def _scale(arm: TableArm) -> float:
-    return float(np.sum(np.abs(arm.entries[:, 1:3]))) or 1.0
-
-
 def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
     """Return the relation between two arms with the fewest changes; None if they are two different arms."""
-    scale = _scale(truth)
-    matching = _Matching(answer, truth, scale)
+    matching = _Matching(answer, truth, truth.scale)
     if not matching.links_agree:
         return None
     best = None
     for senses, B, offsets in matching.solutions(np.ones(0), np.eye(4), np.zeros(truth.n)):
-        aligned = _align_ends(Overlay(truth, answer, senses, offsets, B), scale)
+        aligned = _align_ends(Overlay(truth, answer, senses, offsets, B))
         for overlay in (aligned, _slide_along_first_axis(aligned), matching.fit_ends(aligned)):
-            if overlay is not None and overlay.holds(scale) and overlay.allowed(strict, scale):
+            if overlay is not None and overlay.holds() and overlay.allowed(strict):
                 best = min(best or overlay, overlay, key=Overlay.length)
     return best
 
@@ -171,13 +161,13 @@ class _Matching:
             return
         for sense in (1.0, -1.0):
             tried = np.append(senses, sense)
-            for guess in self.guesses(k, B, offsets, sense):
+            for guess in self.guesses(k, B, offsets):
                 solved = self.solve(tried, *guess)
                 if solved is not None:
                     yield from self.solutions(tried, *solved)
                     break
 
-    def guesses(self, k: int, B: Array, offsets: Array, sense: float) -> Iterator[tuple[Array, Array]]:
+    def guesses(self, k: int, B: Array, offsets: Array) -> Iterator[tuple[Array, Array]]:
         """Yield starts for axis k, from 0: four positions of the preceding joint."""
         if k == 0:
             for turn in (np.eye(4), *(_half_turn(axis) for axis in range(3)), *_quarter_turns()):
@@ -281,12 +271,12 @@ def _rate(screw: NDArray[np.floating[Any]]) -> Array:
     return rate
 
 
-def _align_ends(overlay: Overlay, scale: float) -> Overlay:
+def _align_ends(overlay: Overlay) -> Overlay:
     """Choose the first and last offset, which base and tool can take up, so that frames 0 and n agree."""
     truth, n = overlay.truth, overlay.truth.n
     own, other = truth.frames(overlay.offsets), overlay.B @ overlay.answer.frames(np.zeros(n))
     screws = truth.screws(overlay.offsets, 1.0)
-    first, last = (_joint_travel(screws[k], own[k], other[k], scale) for k in (0, -1))
+    first, last = (_joint_travel(screws[k], own[k], other[k], truth.scale) for k in (0, -1))
     offsets = overlay.offsets.copy()
     # Moving the first joint moves the whole arm: truth(q + o1) = exp(o1) truth(q).
     offsets[0] -= first

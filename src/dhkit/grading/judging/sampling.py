@@ -142,8 +142,3 @@ def differ(answer: mpf, truth: mpf) -> bool:
     """Whether two numbers of mpmath differ by more than the tolerance."""
     size = max(abs(answer), abs(truth), MIN_SIZE)
     return bool(abs(answer - truth) > TOLERANCE * size)
-
-
-def show_state(sample: Sample, names: set[str]) -> dict[str, float]:
-    """Return those values of a sample that are named, as doubles; SI units and rad."""
-    return {name: float(value) for name, value in sample.names.items() if name in names}

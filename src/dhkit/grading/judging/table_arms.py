@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -134,6 +135,11 @@ class TableArm:
     def n(self) -> int:
         """The number of joints."""
         return len(self.kinds)
+
+    @cached_property
+    def scale(self) -> float:
+        """Sum of the arm's lengths, m; 1 if it has none."""
+        return float(np.sum(np.abs(self.entries[:, 1:3]))) or 1.0
 
     def frames(self, q: Array) -> Array:
         """Return frames 0 ... n in frame 0, shape (n + 1, 4, 4), m, at joint values of shape (n,), rad and m."""

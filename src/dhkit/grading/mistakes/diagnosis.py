@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache, partial
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.quantities import Index, place_of
+from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import DYNAMICS, Truth, kinematic_quantity
 from dhkit.grading.mistakes.energy_variants import energy_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
@@ -51,7 +52,7 @@ class Variants:
         Names of the parameters that this student replaced by their numbers in the file.
     """
 
-    def __init__(self, truth: Truth, numbers: frozenset[str] = frozenset()) -> None:
+    def __init__(self, truth: Truth, numbers: frozenset[str]) -> None:
         self.truth = truth
         self.numbers = numbers
         self._changes: dict[str, list[_Changed]] = {}
@@ -122,11 +123,7 @@ class Variants:
         if not wrong:
             return []
         candidates = min((self._by_entry[quantity].get(entry, []) for entry in wrong), key=len)
-        return [
-            changed.variant
-            for changed in candidates
-            if all(changed.keys[place] == key for place, key in wanted.items())
-        ]
+        return [changed.variant for changed in candidates if _fits(changed.keys, wanted)]
 
     def changes_none(self, variant: Variant, quantity: str, places: Sequence[Index]) -> bool:
         """Whether a mistake leaves some entries of a quantity unchanged."""
@@ -168,9 +165,7 @@ class Variants:
     def pair(self, quantity: str, differences: Differences) -> tuple[Variant, Variant] | None:
         """Return two of the textbook's mistakes that together cause exactly the differences; None if no two do."""
         self.prepare(quantity)
-        if quantity not in self._pairs:
-            self._pairs[quantity] = _Pairs(self, quantity)
-        return self._pairs[quantity].find(differences)
+        return self._pairs.setdefault(quantity, _Pairs(self, quantity)).find(differences)
 
     def textbook(self, quantity: str) -> list[Variant]:
         """Return the textbook's mistakes that change a quantity, one for each different change."""
@@ -203,7 +198,6 @@ class _Pairs:
     tables: Variants
     quantity: str
     derived_pairs: dict[tuple[Any, ...], tuple[Variant, Variant]] = field(default_factory=dict)
-    derived: int = 0
 
     def find(self, differences: Differences) -> tuple[Variant, Variant] | None:
         wanted = keys_of(self.quantity, differences)
@@ -235,17 +229,14 @@ class _Pairs:
     def _todo(self) -> Iterator[tuple[Variant, Variant]]:
         additive = self.quantity in DYNAMICS
         pairs = combinations(self.tables.textbook(self.quantity), 2)
-        return ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
+        derived = ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
+        return islice(derived, MAX_DERIVED_PAIRS)
 
     def _derived(self, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
         for keys, pair in self.derived_pairs.items():
             if _fits(dict(keys), wanted):
                 return pair
-        while self.derived < MAX_DERIVED_PAIRS:
-            following = next(self._todo, None)
-            if following is None:
-                break
-            self.derived += 1
+        for following in self._todo:
             keys_of_both = self._both(*following)
             self.derived_pairs.setdefault(tuple(keys_of_both.items()), following)
             if _fits(keys_of_both, wanted):
@@ -253,13 +244,9 @@ class _Pairs:
         return None
 
 
-def variants_of(truth: Truth, numbers: frozenset[str] = frozenset()) -> Variants:
-    """Return the mistakes on a robot; the same object each time, so that nothing is derived twice."""
-    return _variants_of(truth, numbers)
-
-
 @lru_cache(maxsize=32)
-def _variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:  # without a default, which has a key of its own
+def variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:  # without a default, which has a key of its own
+    """Return the mistakes on a robot; the same object each time, so that nothing is derived twice."""
     return Variants(truth, numbers)
 
 
@@ -276,15 +263,6 @@ def keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
 def key_of(quantity: str, element: Element) -> Key:
     """Return the hashable normal form of an element; of an energy without the terms that do not depend on the state."""
     return frozenset((varying(element) if quantity in ("V", "L") else element).terms.items())
-
-
-def varying(element: Element) -> Element:
-    """Return an element without its terms that do not depend on the state."""
-    ring = element.ring
-    constant = [g.kind == "constant" for g in ring.generators]
-    return ring.from_terms(
-        {m: c for m, c in element.terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
-    )
 
 
 def _fits(keys: Mapping[Index, Key], wanted: Mapping[Index, Key]) -> bool:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from dhkit.errors import AnswerError
 from dhkit.grading.judging.coordinates import ANGLE
 from dhkit.grading.judging.findings import readable
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
-from dhkit.grading.judging.quotients import OutsideTheRingError
+from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.mistakes.diagnosis import varying
 from dhkit.grading.mistakes.library import FACTORS, capitalize, hint_of
 from dhkit.grading.mistakes.slips import Slip, slip_in
-from dhkit.grading.mistakes.wording import diagnosis_of_identity, entry_names
-from dhkit.grading.report import Diagnosis
+from dhkit.grading.mistakes.wording import diagnosis_of_slip
+from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
@@ -63,10 +61,7 @@ def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | No
     for given in quantity.given:
         if given.index[0] != index[0] or given.tree is None:
             continue
-        try:
-            answer = reader.read(given.tree).element()
-        except (OutsideTheRingError, AnswerError):
-            return None
+        answer = reader.element(given.tree)
         if answer is None:
             return None
         if answer != right[given.index]:
@@ -99,8 +94,7 @@ def mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
     """Return the diagnosis of an entry of M whose mirror image is right; None for other entries."""
     if quantity.name != "M" or index[0] == index[1] or not quantity.findings[index[::-1]].verdict.passes:
         return None
-    (entry,) = entry_names(quantity, [index])
-    return diagnosis_of_identity("mass_matrix_not_symmetric", quantity, [index], entry)
+    return diagnosis_of_slip(quantity, index, Slip("mass_matrix_not_symmetric", ""))
 
 
 def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
@@ -110,15 +104,14 @@ def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
         return None
     for name, factor in FACTORS.items():
         if difference == right * (factor - 1):
-            (entry,) = entry_names(quantity, [index])
-            return diagnosis_of_identity(name, quantity, [index], entry)
+            return diagnosis_of_slip(quantity, index, Slip(name, ""))
     return None
 
 
 def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
     """Return a diagnosis without a mistake, which compares the terms of a wrong entry with the right ones."""
     finding, right = quantity.findings[index], quantity.right(index)
-    (entry,) = entry_names(quantity, [index])
+    entry = entry_name(quantity.name, index)
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
         text = finding.statement

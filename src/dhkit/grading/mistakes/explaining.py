@@ -22,8 +22,8 @@ from dhkit.grading.mistakes.diagnosis import Differences
 from dhkit.grading.mistakes.library import hint_of
 from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
-from dhkit.grading.mistakes.wording import diagnosis_of, diagnosis_of_slip, entry_names, merge
-from dhkit.grading.report import Diagnosis
+from dhkit.grading.mistakes.wording import diagnosis_of, diagnosis_of_slip, merge
+from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
 
@@ -227,11 +227,9 @@ def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: 
     wrong = entries.distinct(quantity)
     if any(entries.mirrored(quantity, index) for index in wrong):
         return []
-    factors = [entries.whole_factor(quantity, index) for index in wrong]
-    names = {one.mistake for one in factors if one is not None}
-    if None in factors or len(names) != 1:
-        return []
-    return [one for one in factors if one is not None]
+    factors = [one for index in wrong if (one := entries.whole_factor(quantity, index)) is not None]
+    is_shared = len(factors) == len(wrong) and len({one.mistake for one in factors}) == 1
+    return factors if is_shared else []
 
 
 def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
@@ -268,7 +266,7 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
         if difference.is_zero:
             continue
         place = index[: len(quantity.truth.shape)]
-        (entry,) = entry_names(quantity, [place])
+        entry = entry_name(quantity.name, place)
         right = truth.of(part)[index]
         slip = entries.slip_between(truth, part, right + difference, right)
         if slip is not None:
@@ -336,10 +334,9 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
             diagnoses.append(plain)
         elif slip is not None:
             diagnoses.append(diagnosis_of_slip(quantity, index, slip))
-        elif difference is not None:
-            candidates[index] = tables_of(truth, quantity).entry(quantity.name, index, difference)
         else:
-            candidates[index] = []
+            tables = tables_of(truth, quantity)
+            candidates[index] = tables.entry(quantity.name, index, difference) if difference is not None else []
     # A single entry proves little: many entries of transforms look alike, and so do those of a confused answer.
     certain = quantity.name in DYNAMICS and all(candidates.values())
     for indices, variants in _fewest(candidates).items():

@@ -20,7 +20,7 @@ from dhkit.grading.mistakes.diagnosis import Variants, variants_of
 from dhkit.grading.mistakes.entries import mirrored, slip_of, slip_of_C
 from dhkit.grading.mistakes.library import UNITS
 from dhkit.grading.mistakes.parameter_variants import lengths_of
-from dhkit.grading.mistakes.wording import diagnosis_of_identity, diagnosis_of_slip
+from dhkit.grading.mistakes.wording import diagnosis_of_slip, diagnosis_of_whole
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
@@ -36,10 +36,9 @@ def in_degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[
     """Find quantities that are right if factors pi/180 or 180/pi are taken off their angles."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        if name != "C" and any(
-            _is_right(quantity, RingReader(truth.arm(name).ring, angle_factor=factor)) for factor in DEGREE_FACTORS
-        ):
-            diagnoses[(name,)] = diagnosis_of_identity("degrees_for_radians", quantity, quantity.wrong_indices, name)
+        readers = [RingReader(truth.arm(name).ring, angle_factor=factor) for factor in DEGREE_FACTORS]
+        if name != "C" and any(_is_right(quantity, reader) for reader in readers):
+            diagnoses[(name,)] = diagnosis_of_whole(quantity, "degrees_for_radians")
     return diagnoses
 
 
@@ -63,7 +62,7 @@ def with_inverted_gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> di
     one = Number(Fraction(1), "1", 0)
     inverse: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
     return {
-        (name,): diagnosis_of_identity("gear_inverted", quantity, quantity.wrong_indices, name)
+        (name,): diagnosis_of_whole(quantity, "gear_inverted")
         for name, quantity in wrong.items()
         if gears
         and name in ("M", "K", "tau")
@@ -105,8 +104,7 @@ def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str])
         if name in following or not quantity.is_zero or any(mirrored(quantity, index) for index in wrong):
             continue
         identity = ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
-        one = diagnosis_of_identity(identity, quantity, wrong, name)
-        diagnoses[(name,)] = replace(one, equivalent=equivalent(truth, quantity))
+        diagnoses[(name,)] = replace(diagnosis_of_whole(quantity, identity), equivalent=equivalent(truth, quantity))
     return diagnoses
 
 
@@ -123,7 +121,7 @@ def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tup
         for identity, factor in UNITS.items():
             values = {p: ring.number(exact_number(truth.description, p) * factor) for p in absent}
             if _has_answers(quantity, substituted(truth.of(name), values, ring)):
-                diagnoses[(name,)] = diagnosis_of_identity(identity, quantity, quantity.wrong_indices, name)
+                diagnoses[(name,)] = diagnosis_of_whole(quantity, identity)
     return diagnoses
 
 
@@ -141,14 +139,14 @@ def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity:
     if name in ("C", "V", "L"):
         return []
     by = Comparison(truth.arm(name), truth.reader(name), MIN_DIGITS)
-    wrong = set(quantity.wrong_indices)
+    wrong = quantity.wrong_indices
     for entry in quantity.given:
         if entry.index in wrong:
             if entry.tree is None or not has_decimals(entry.tree, MIN_DIGITS):
                 return []
             if not equal(entry.tree, quantity.truth[entry.index], by):
                 return []
-    return [diagnosis_of_identity("too_few_digits", quantity, sorted(wrong), name)]
+    return [diagnosis_of_whole(quantity, "too_few_digits")]
 
 
 def equivalent(truth: Truth, quantity: JudgedQuantity) -> tuple[str, ...]:

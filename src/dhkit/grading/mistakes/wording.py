@@ -75,12 +75,12 @@ def _clause(variant: Variant, of_C: bool) -> str:
 
 
 def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Diagnosis:
-    """Return the diagnosis of a slip in a term of one entry."""
-    (entry,) = entry_names(quantity, [index])
-    sentence = sentence_of(slip.identity, "", slip.detail)
+    """Return the diagnosis of a slip in one entry."""
+    entry, sentence = entry_name(quantity.name, index), sentence_of(slip.identity, detail=slip.detail)
     return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
 
 
-def diagnosis_of_identity(identity: str, quantity: JudgedQuantity, indices: Sequence[Index], where: str) -> Diagnosis:
-    """Return the diagnosis of a mistake that is made at no particular link."""
-    return Diagnosis(identity, sentence_of(identity), where, entry_names(quantity, indices), hint_of(identity))
+def diagnosis_of_whole(quantity: JudgedQuantity, identity: str) -> Diagnosis:
+    """Return the diagnosis of a mistake in all wrong entries of a quantity, which is made at no particular link."""
+    entries = entry_names(quantity, quantity.wrong_indices)
+    return Diagnosis(identity, sentence_of(identity), quantity.name, entries, hint_of(identity))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import re
-from xml.etree.ElementTree import Element, ParseError, SubElement, fromstring, tostring
+from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 MAX_CHARACTERS = 4000
 """Longest LaTeX of an answer that is converted: nobody reads a longer equation, and converting it takes seconds."""
@@ -54,8 +54,6 @@ def mathml(latex: str) -> str | None:
     try:
         root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
         return tostring(_copy_harmless(root, None), encoding="unicode", short_empty_elements=False)
-    except (ParseError, RecursionError):
-        return None
     except Exception:  # latex2mathml raises IndexError and others for text that is no LaTeX
         return None
 

@@ -74,12 +74,12 @@ def classify(description: Description) -> Classification:
         family, fit = found
         count = len(fit.branches)
         branches = f"{count} branch{'es' if count > 1 else ''}"
-        met = "" if len(fit.met) == 6 else f"; meets {', '.join(fit.met)}"
-        return Classification(f"{kinds}, {fit.words}: closed form, {branches}{met}", family, fit)
+        met = "" if len(fit.coordinates) == 6 else f"; meets {', '.join(fit.coordinates)}"
+        return Classification(f"{kinds}, {fit.geometry}: closed form, {branches}{met}", family, fit)
     words = f"{kinds}: no closed form known"
     near = _first(Axes.of(description, NEAR_MISS))
     if near is not None:
-        words += f" (nearly one of {kinds} with {near[1].words}, but not to {TOLERANCE:g}: are its angles rounded?)"
+        words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?)"
     return Classification(words, None, None)
 
 

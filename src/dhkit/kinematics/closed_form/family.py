@@ -43,12 +43,12 @@ def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> A
 class Fit:
     """An arm as a member of a family."""
 
-    words: str
-    """How the axes lie, in words."""
+    geometry: str
+    """How the axes lie, as text."""
     parameters: Mapping[str, Parameter]
     """The numbers that the family's formulas work with, by name; ``reach``, m, is required of every family."""
     branches: tuple[str, ...]
-    met: tuple[str, ...]
+    coordinates: tuple[str, ...] = ALL_COORDINATES
     """Coordinates of a pose that the arm can reach: those of ``ALL_COORDINATES``, and yaw for its turn in the plane."""
     structure: str = ""
     """What the formulas depend on besides their parameters, such as the order of the joints."""

@@ -3,7 +3,19 @@
 Two or three parallel revolute joints with or without a slide along them (planar 2R and 3R, SCARA), and one revolute
 joint with a slide across its axis (R-P and P-R).
 
-Coordinates: v along the revolute axes, x and u across, with the origin on the first of them.
+Coordinates: v along the revolute axes, x and u across, with the origin on the first of them. Directions in the plane
+are pairs (cosine, sine) of their angle from x. Parameters of the formulas, all with the joints at zero:
+
+chain
+    upper, fore: from the first revolute axis to the second, and on to the third or to the tool; L2, L3 their lengths;
+    bend: angle from upper to fore; lever: from the third axis to the tool, m; height: v of the tool, m; axis: the
+    tool's axis that is seen best along v, and pointing: its direction; senses: 1 or -1 for each joint, whether it
+    turns or slides as the first axis; up: 1 if v points upwards, else -1.
+polar (R-P)
+    boom: direction of the slide; start: distance of the tool along the slide from the foot of the perpendicular from
+    the revolute axis, m; lift: signed length of that perpendicular, m; height: v of the tool, m.
+slider (P-R)
+    L: distance of the tool from the revolute axis, m; pointing: its direction; height: v of the tool, m.
 """
 
 from __future__ import annotations
@@ -62,7 +74,7 @@ def chain_fit(axes: Axes) -> Fit | None:
     column = int(np.argmax(np.linalg.norm(seen[:2], axis=0)))
     slides = ", a slide along them" if "P" in axes.kinds else ""
     return Fit(
-        words=f"{len(revolute)} parallel revolute axes{slides}",
+        geometry=f"{len(revolute)} parallel revolute axes{slides}",
         parameters={
             "T_plane_world": _frame(R, origin),
             "upper": as_pair(*upper),
@@ -78,7 +90,7 @@ def chain_fit(axes: Axes) -> Fit | None:
             "reach": axes.scale,
         },
         branches=("left", "right"),
-        met=("x", "y", "z", "yaw") if len(revolute) == 3 else ("x", "y", "z"),
+        coordinates=("x", "y", "z", "yaw") if len(revolute) == 3 else ("x", "y", "z"),
         structure=axes.kinds,
     )
 
@@ -120,7 +132,7 @@ def polar_fit(axes: Axes) -> Fit | None:
     R, origin = _across(axes.direction(1)), axes.point(1)
     tool, along = R @ (axes.T_world_tool[:3, 3] - origin), R @ axes.direction(2)
     return Fit(
-        words="a slide at right angles to a revolute axis",
+        geometry="a slide at right angles to a revolute axis",
         parameters={
             "T_plane_world": _frame(R, origin),
             "boom": as_pair(along[0], along[1]),
@@ -130,7 +142,7 @@ def polar_fit(axes: Axes) -> Fit | None:
             "reach": axes.scale,
         },
         branches=("out", "in"),
-        met=("x", "y", "z"),
+        coordinates=("x", "y", "z"),
     )
 
 
@@ -173,7 +185,7 @@ def slider_fit(axes: Axes) -> Fit | None:
     if length <= axes.tolerance * axes.scale:
         return None
     return Fit(
-        words="a revolute axis at right angles to a slide",
+        geometry="a revolute axis at right angles to a slide",
         parameters={
             "T_plane_world": _frame(R, origin),
             "L": length,
@@ -182,7 +194,7 @@ def slider_fit(axes: Axes) -> Fit | None:
             "reach": axes.scale,
         },
         branches=("ahead", "behind"),
-        met=("x", "y", "z"),
+        coordinates=("x", "y", "z"),
     )
 
 

@@ -22,7 +22,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
     ordered_shoulders,
     to_arm_frame,
 )
-from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Fit, PoseSymbols
+from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
     SINGULAR,
@@ -72,10 +72,9 @@ def elbow_fit(axes: Axes) -> Fit | None:
     if links is None:
         return None
     return Fit(
-        words="spherical wrist, axes 2 and 3 parallel",
+        geometry="spherical wrist, axes 2 and 3 parallel",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | links,
         branches=branch_names(links["offset"], ELBOWS, FLIPS),
-        met=ALL_COORDINATES,
         free=3,
     )
 
@@ -118,10 +117,9 @@ def slide_fit(axes: Axes) -> Fit | None:
         "lift": along[0] * lever[1] - along[1] * lever[0],
     }
     return Fit(
-        words="spherical wrist, joint 3 slides at right angles to axis 2",
+        geometry="spherical wrist, joint 3 slides at right angles to axis 2",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | geometry,
         branches=branch_names(geometry["offset"], ("out", "in"), FLIPS),
-        met=ALL_COORDINATES,
         free=3,
     )
 

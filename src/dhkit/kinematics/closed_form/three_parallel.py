@@ -19,7 +19,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
     ordered_shoulders,
     to_arm_frame,
 )
-from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Fit, FramedPose, Parameter, PoseSymbols
+from dhkit.kinematics.closed_form.family import Fit, FramedPose, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     SINGULAR,
     SX,
@@ -72,10 +72,9 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
         "sense4": axes.sense(2, 4),
     }
     return Fit(
-        words="axes 2, 3 and 4 parallel, 5 and 6 meet",
+        geometry="axes 2, 3 and 4 parallel, 5 and 6 meet",
         parameters=wrist_parameters(axes, plane, axes.direction(2), meeting) | links | own,
         branches=branch_names(own["offset"], ELBOWS, FLIPS),
-        met=ALL_COORDINATES,
         free=5,
     )
 

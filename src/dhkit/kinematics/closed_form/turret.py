@@ -43,10 +43,10 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
     if np.linalg.norm(lever) <= axes.tolerance * axes.scale:
         return None
     return Fit(
-        words="pan and tilt: axes 1 and 2 at right angles",
+        geometry="pan and tilt: axes 1 and 2 at right angles",
         parameters=_common(axes, plane) | {"offset": axes.snapped(tool[2]), "a1": second[0], "lever": as_pair(*lever)},
         branches=branch_names(axes.snapped(tool[2])),
-        met=("azimuth", "elevation"),
+        coordinates=("azimuth", "elevation"),
     )
 
 
@@ -78,10 +78,10 @@ def yaw_two_fit(axes: Axes) -> Fit | None:
     if links is None:
         return None
     return Fit(
-        words="a turntable, axes 2 and 3 parallel",
+        geometry="a turntable, axes 2 and 3 parallel",
         parameters=_common(axes, plane) | links,
         branches=branch_names(links["offset"], ELBOWS),
-        met=("x", "y", "z"),
+        coordinates=("x", "y", "z"),
     )
 
 
@@ -114,10 +114,10 @@ def yaw_three_fit(axes: Axes) -> Fit | None:
         "sense4": axes.sense(2, 4),
     }
     return Fit(
-        words="a turntable, axes 2, 3 and 4 parallel",
+        geometry="a turntable, axes 2, 3 and 4 parallel",
         parameters=_common(axes, plane) | links | own,
         branches=branch_names(offset, ELBOWS),
-        met=("x", "y", "z", f"pitch of the tool's {'xyz'[column]} axis"),
+        coordinates=("x", "y", "z", f"pitch of the tool's {'xyz'[column]} axis"),
     )
 
 

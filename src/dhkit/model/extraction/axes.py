@@ -76,7 +76,7 @@ class Axes:
         """The number of joints."""
         return len(self.points)
 
-    def heights(self, i: int, on_axis: Array) -> Array:
+    def start_points(self, i: int, on_axis: Array) -> Array:
         """Return points at whose height a normal may begin on axis i (from 0), shape (k, 3).
 
         They are ``on_axis``, a point on the axis, shape (3,), nearby frames, base, tip, and feet on the axis.
@@ -88,7 +88,7 @@ class Axes:
             [on_axis[None], self.points[max(i - 1, 0) : i + 3], np.zeros((1, 3)), self.T_base_tip[None, :3, 3], feet]
         )
 
-    def lines(self, i: int, on_previous_axis: Array | None) -> Array:
+    def axis_points(self, i: int, on_previous_axis: Array | None) -> Array:
         """Return points through which the axis of a prismatic joint i (from 0) may go, shape (k, 3).
 
         ``on_previous_axis`` is a point on the axis before, shape (3,), if there is one.
@@ -191,7 +191,7 @@ def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Calla
         From the last normal to the choice of the last row's theta and d (standard: of a and alpha too), with its cost.
     """
     # A prismatic first axis may be any line parallel to itself.
-    lines = axes.lines(0, None) if axes.prismatic[0] else axes.points[:1]
+    lines = axes.axis_points(0, None) if axes.prismatic[0] else axes.points[:1]
     paths = []
     for normal in (normal for point in lines for normal in _normals_after(axes, 0, point, None)):
         cost, start = begin(normal)
@@ -257,7 +257,7 @@ def _normals_after(axes: Axes, i: int, on_axis: Array, previous: Array | None) -
         The unit vector of the previous normal, if there is one.
     """
     z, z_next = axes.directions[i], axes.directions[i + 1]
-    lines = axes.lines(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
+    lines = axes.axis_points(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
     if sine <= axes.parallel_below:
@@ -292,7 +292,7 @@ def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous:
         gap = np.zeros(3)
         parts = axes.perpendicular(i, previous)
         directions = _distinct(np.vstack([parts, -parts]))
-    heights = (axes.heights(i, on_axis) - on_axis) @ z
+    heights = (axes.start_points(i, on_axis) - on_axis) @ z
     heights[0] = 0.0  # on_axis itself, without rounding
     _, places = np.unique(np.round(heights, 10), return_index=True)
     starts = [on_axis + heights[place] * z for place in np.sort(places)]

@@ -134,7 +134,7 @@ def _single_joint_paths(axes: Axes, convention: Convention) -> Iterator[Path]:
     """Yield tables of one joint: a normal of length zero at a known point's height, in a known direction."""
     z, parts = axes.directions[0], axes.perpendicular(0, None)
     for x in (*parts, *-parts):
-        for point in axes.heights(0, axes.points[0]):
+        for point in axes.start_points(0, axes.points[0]):
             origin = point if axes.prismatic[0] else axes.points[0] + ((point - axes.points[0]) @ z) * z
             normal = Normal(x, origin, origin)
             start_cost, start = first_row(convention, normal, z)

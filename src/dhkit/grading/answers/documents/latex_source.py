@@ -16,7 +16,7 @@ from dhkit.grading.answers.documents.latex_statements import (
     latex_statements,
 )
 from dhkit.grading.answers.documents.statements import Statement
-from dhkit.grading.answers.latex import DOTS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, STYLE_MACROS, SYMBOL_MACROS
+from dhkit.grading.answers.latex import DOT_MACROS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, STYLE_MACROS, SYMBOL_MACROS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
 MAX_STATEMENTS = 5_000
@@ -43,7 +43,7 @@ CHANGES = re.compile(
 """Commands that may change the meaning of anything behind them, and definitions, also of macros that are no letters."""
 
 READ_MACROS = frozenset(
-    {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *SYMBOL_MACROS, *DOTS, *STYLE_MACROS, *SIZES, *SPACE_NAMES}
+    {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *SYMBOL_MACROS, *DOT_MACROS, *STYLE_MACROS, *SIZES, *SPACE_NAMES}
     | {"sqrt", "over", "partial", "top", "begin", "end", "label", "tag", "equiv", "approx", "pm", "mp", "mbox"}
 )
 """Macros that have a meaning, which no document should change."""

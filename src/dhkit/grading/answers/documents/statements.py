@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 from dhkit.grading.answers.latex import GREEK
 from dhkit.grading.answers.sheet import ALIASES
@@ -113,7 +114,8 @@ def left_hand_name(side: str) -> str:
     below = match["one"] or match["below"] or ""
     rest = text[match.end() :]
     if rest.startswith("("):
-        end = _closing_parenthesis(rest)
+        depths = accumulate((character == "(") - (character == ")") for character in rest)
+        end = next((k for k, depth in enumerate(depths) if depth == 0), -1)
         arguments = rest[1:end].split(",")
         if end < 0:
             return ""
@@ -130,13 +132,3 @@ def left_hand_name(side: str) -> str:
     if pair := re.fullmatch(r"(\d+),(\d+)", below):
         below = "".join(pair.groups()) if len(below) == 3 else "_".join(pair.groups())
     return plain_name(letters) + below.replace(",", "")
-
-
-def _closing_parenthesis(text: str) -> int:
-    """Return where the parenthesis closes with which a text begins; -1 where it does not."""
-    depth = 0
-    for k, character in enumerate(text):
-        depth += (character == "(") - (character == ")")
-        if depth == 0:
-            return k
-    return -1

@@ -270,10 +270,8 @@ class Definitions:
         if owner is None or resolution.definition is not None or resolution.entries:
             raise UnreliableError(f"{read.name}.{read.member} is not read")
         parameters = self.names.quantities.parameters
-        parameter = parameters.get(plain_name(read.member), "")
-        if not parameter:
-            cleaned = {re.sub(r"\W", "_", name, flags=re.ASCII): name for name in parameters.values()}
-            parameter = cleaned.get(read.member, "")
+        cleaned = {re.sub(r"\W", "_", name, flags=re.ASCII): name for name in parameters.values()}
+        parameter = parameters.get(plain_name(read.member)) or cleaned.get(read.member)
         if not parameter:
             raise UnreliableError(f"{read.name}.{read.member[:40]} is no parameter of the robot")
         field_name = f"{read.name}.{read.member}"
@@ -295,7 +293,7 @@ class Definitions:
         if read.index is None:
             if formula.is_matrix:
                 raise UnreliableError(f"{read.name} is the matrix of {binding.line}; write out its entries")
-            return Definition(read.name, None, owner, ((formula, binding.order),), binding.line)
+            return definition_of(owner, read.name, [binding])
         entries, index = formula.entries or {}, read.index
         choices = [index] if len(index) > 1 else [index, (*index, 0), (0, *index)]
         entry = next((entries[choice] for choice in choices if choice in entries), None)
@@ -320,7 +318,7 @@ class Definitions:
             raise UnreliableError(f"an entry of {read.name} is read that is not assigned")
         if owner is scope and order <= bindings[-1].order:
             raise UnreliableError(f"{read.name} is used before it is assigned, in {bindings[-1].line}")
-        return definition_of_entry(owner, read.name, bindings)
+        return definition_of(owner, read.name, bindings)
 
     def _usual_name(self, scope: Scope, owner: Scope | None, read: Read) -> str | None:
         """Return the name that the notation has for an entry of a vector; None for a name that stays as typed."""
@@ -376,7 +374,7 @@ class Definitions:
             )
 
 
-def definition_of_entry(scope: Scope, name: str, bindings: Sequence[Binding]) -> Definition:
-    """Return the definition of an entry by its assignment and what is added to it later."""
+def definition_of(scope: Scope, name: str, bindings: Sequence[Binding]) -> Definition:
+    """Return the definition of a name, or of an entry, by its assignment and what is added to it later."""
     terms = tuple((binding.formula, binding.order) for binding in bindings if binding.formula is not None)
     return Definition(name, bindings[0].index, scope, terms, bindings[0].line)

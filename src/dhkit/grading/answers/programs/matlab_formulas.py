@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import accumulate
 
 from dhkit.grading.answers.programs.bindings import (
     MAX_ENTRIES,
@@ -312,12 +313,9 @@ def _number(tokens: Tokens) -> float | None:
 
 
 def _first_argument(tokens: Tokens) -> Tokens:
-    depth = 0
-    for k, token in enumerate(tokens):
-        if depth == 0 and token.is_sign(","):
-            return tokens[:k]
-        depth += token.nesting
-    return tokens
+    depths = accumulate(token.nesting for token in tokens)
+    commas = (k for k, depth in enumerate(depths) if depth == 0 and tokens[k].is_sign(","))
+    return tokens[: next(commas, len(tokens))]
 
 
 def _text(tokens: Tokens) -> str:

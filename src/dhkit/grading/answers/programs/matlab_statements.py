@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
@@ -309,9 +310,6 @@ def _takes_words(rest: str) -> bool:
 
 def _behind_words(rest: str) -> str:
     """Return what follows a command's words in its line."""
-    depth = 0
-    for k, character in enumerate(rest):
-        depth += (character in OPENING) - (character in CLOSING)
-        if (character in ";," and depth <= 0) or character in "%#":
-            return rest[k:]
-    return ""
+    depths = accumulate((character in OPENING) - (character in CLOSING) for character in rest)
+    ends = (k for k, depth in enumerate(depths) if rest[k] in "%#" or (rest[k] in ";," and depth <= 0))
+    return rest[next(ends, len(rest)) :]

@@ -226,15 +226,18 @@ class NameResolver:
             return ""
         assignment = f"{name} = {formula.text[:40]}"
         if self.quantities.is_parameter(name) and formula.number is not None:
-            value = self.parameter_value(name)
-            if is_same_number(value, formula.number):
-                return f"{binding.line}: {assignment} is the file's own number"
-            raise UnreliableError(
-                f"{name} has the default {formula.text[:40]} in {binding.line}; the robot's file has {value}"
-            )
+            self._refuse_another_number(name, "has the default", formula, binding)
+            return f"{binding.line}: {assignment} is the file's own number"
         if has_fields:
             return ""
         raise UnreliableError(f"an argument has the default {assignment} in {binding.line}")
+
+    def _refuse_another_number(self, name: str, verb: str, formula: Formula, binding: Binding) -> None:
+        """Refuse a number for a parameter that is not the one in the robot's file."""
+        value = self.parameter_value(name)
+        if not is_same_number(value, formula.number):
+            text = f"{verb} {formula.text[:40]} in {binding.line}"
+            raise UnreliableError(f"{name} {text}; the robot's file has {value}")
 
     def _is_field(self, scope: Scope, name: str, formula: Formula) -> bool:
         """Whether a formula is the field of this name of a structure: m1 = p.m1."""
@@ -270,12 +273,8 @@ class NameResolver:
         if formula.is_matrix and self.quantities.quantity(name):
             return False
         if self.quantities.is_parameter(name) and formula.number is not None:
-            value = self.parameter_value(name)
-            if is_same_number(value, formula.number):
-                return True
-            raise UnreliableError(
-                f"{name} is set to {formula.text[:40]} in {binding.line}; the robot's file has {value}"
-            )
+            self._refuse_another_number(name, "is set to", formula, binding)
+            return True
         if not self.is_reserved(name):
             return False
         if formula.problem:

@@ -18,7 +18,7 @@ from dhkit.grading.answers.programs.bindings import (
     Scope,
     Use,
 )
-from dhkit.grading.answers.programs.definitions import Definition, Definitions, definition_of_entry
+from dhkit.grading.answers.programs.definitions import Definition, Definitions, definition_of
 from dhkit.grading.answers.programs.name_resolution import NameResolver, Resolution
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal, source_sheet
@@ -105,7 +105,9 @@ class _ProgramAnswers:
         """Quantities of which entries that are not assigned are zero."""
 
     def sheet(self, file: str) -> AnswerSheet:
-        candidates = [*self._given_by_main(), *self._returned_by_functions()]
+        main = self.program.main
+        candidates = [one for name in main.bindings for one in self._given_by_name(main, name, name)]
+        candidates += self._returned_by_functions()
         candidates = self._refuse_rebound([*candidates, *self._local_to_functions(candidates)])
         candidates = self._without_aliases(candidates)
         answers: dict[str, str | Entries | Refusal] = {}
@@ -117,10 +119,6 @@ class _ProgramAnswers:
         return source_sheet(file, self.quantities.n, answers, self.definitions.parameters, notes, self.left_out)
 
     # What the program gives
-
-    def _given_by_main(self) -> Iterator[_Candidate]:
-        for name in self.program.main.bindings:
-            yield from self._given_by_name(self.program.main, name, name)
 
     def _returned_by_functions(self) -> Iterator[_Candidate]:
         for scope in self.program.functions:
@@ -195,7 +193,7 @@ class _ProgramAnswers:
         elif resolution.problem:
             yield _Candidate(entries[0], line, problem=resolution.problem, name=name, is_named_entry=True)
         elif not resolution.has_usual_meaning:
-            yield _Candidate(entries[0], line, _definition(scope, name, scalars[0]), name=name, is_named_entry=True)
+            yield _Candidate(entries[0], line, definition_of(scope, name, scalars[:1]), name=name, is_named_entry=True)
 
     def _given_whole(
         self, scope: Scope, name: str, called: str, quantity: str, resolution: Resolution
@@ -224,9 +222,9 @@ class _ProgramAnswers:
         if is_fitting:
             if formula.is_zeros:
                 zeros = Formula(_zeros(self.quantities.shape(quantity)))
-                yield replace(whole, definition=_definition(scope, name, replace(binding, value=zeros)))
+                yield replace(whole, definition=definition_of(scope, name, [replace(binding, value=zeros)]))
             else:
-                yield replace(whole, definition=followed or _definition(scope, name, binding))
+                yield replace(whole, definition=followed or definition_of(scope, name, [binding]))
         elif followed is not None and not self.quantities.is_scalar(quantity):
             yield replace(whole, definition=followed)
         elif quantity not in ("T", "L") or formula.problem:
@@ -243,7 +241,7 @@ class _ProgramAnswers:
             inside = self.quantities.index_in(quantity, index)
             if inside is not None:
                 target = Target(quantity, inside) if self.quantities.shape(quantity) else Target(quantity)
-                yield replace(one, target=target, definition=definition_of_entry(scope, whole.name, bindings))
+                yield replace(one, target=target, definition=definition_of(scope, whole.name, bindings))
             elif len(resolution.entries) > 1 or not whole.is_alias:
                 place = ", ".join(str(k + 1) for k in index)
                 yield one.refuse(f"{whole.name} has no entry ({place}), which {one.line} assigns")
@@ -275,7 +273,7 @@ class _ProgramAnswers:
             if resolution.problem or definition is None or definition.order >= binding.order:
                 return None
             if definition.formula is not None and definition.formula.entries is not None:
-                return _definition(owner, read.name, definition)
+                return definition_of(owner, read.name, [definition])
             scope, binding = owner, definition
         return None
 
@@ -431,11 +429,6 @@ class _ProgramAnswers:
         if quantity in self.zero_quantities:
             texts = dict.fromkeys(product(*map(range, self.quantities.shape(quantity))), "0") | texts
         return Entries(dict(sorted(texts.items())))
-
-
-def _definition(scope: Scope, name: str, binding: Binding) -> Definition:
-    formula = binding.formula or Formula("")
-    return Definition(name, None, scope, ((formula, binding.order),), binding.line)
 
 
 def _whole_bindings(scope: Scope, name: str) -> list[Binding]:
