@@ -1019,7 +1019,7 @@ class Arm:
 
     def __repr__(self) -> str:
         described = f"{self._description.kinds}, {self._description.convention.value} DH"
-        return repr_line(f"Arm {self.name}", said=", ".join([described, *self._description.tool_texts]))
+        return repr_line(f"Arm {self.name}", summary=", ".join([described, *self._description.tool_texts]))
 
     def _repr_html_(self) -> str:
         return self._description._repr_html_()

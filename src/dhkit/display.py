@@ -55,17 +55,17 @@ def counted(count: float, noun: str) -> str:
     return f"{number} {noun}" if count == 1 else f"{number} {noun}{'es' if noun.endswith(('ch', 'sh')) else 's'}"
 
 
-def repr_line(kind: str, of: str = "", said: str = "") -> str:
-    """Return ``<kind of name: what is said>`` in 120 characters; a long name is shortened first.
+def repr_line(kind: str, name: str = "", summary: str = "") -> str:
+    """Return ``<kind of name: summary>`` in 120 characters; a long name is shortened first.
 
     Examples
     --------
     >>> repr_line("Samples", "puma560", "500 from 0 to 2 s")
     '<Samples of puma560: 500 from 0 to 2 s>'
     """
-    room = LONGEST_LINE - len(f"<{kind} of : {said}>")
-    name = f" of {plain(of, max(room, SHORTEST_NAME))}" if of else ""
-    return f"<{plain(kind + name + (f': {said}' if said else ''), LONGEST_LINE - 2)}>"
+    room = LONGEST_LINE - len(f"<{kind} of : {summary}>")
+    of = f" of {plain(name, max(room, SHORTEST_NAME))}" if name else ""
+    return f"<{plain(kind + of + (f': {summary}' if summary else ''), LONGEST_LINE - 2)}>"
 
 
 def value_line(value: Any) -> str:

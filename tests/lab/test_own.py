@@ -8,6 +8,7 @@ import pytest
 
 from dhkit import Arm
 from dhkit.lab import Lab
+from dhkit.lab.control_panel import CONTROL_RATE, FRAME_RATE
 from dhkit.viewer.session import Slot
 from lab.test_requests import states, wait_for
 from programs.puma_solutions import solution
@@ -101,6 +102,18 @@ def test_its_controller_is_in_the_list_and_drives_the_arm(beside):
     lab.answer("control.start", {"controller": "own"})
     wait_for(lambda: states(lab)["control"]["error"])
     assert "line 2: ZeroDivisionError" in states(lab)["control"]["error"]
+    assert lab.view._ghosts == ()
+
+
+def test_the_simulated_time_is_that_of_the_frames(open_lab, monkeypatch):
+    lab, steps = open_lab("planar2r"), []
+    simulate = lab._control._simulate_frame
+    monkeypatch.setattr(lab._control, "_simulate_frame", lambda live, n: steps.append(n) or simulate(live, n))
+    lab.answer("control.start", {"reference": "hold", "controller": "pd-gravity"})
+    wait_for(lambda: len(steps) > 40)
+    lab.answer("control.stop", {})
+    simulated = np.cumsum(steps) / CONTROL_RATE
+    assert np.abs(simulated - np.arange(1, len(steps) + 1) / FRAME_RATE).max() <= 0.5 / CONTROL_RATE
 
 
 def test_without_one_there_is_nothing_of_it(open_lab):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from dhkit.description import Convention, from_dh, library_robot, world_to_frames
 from dhkit.errors import ModelError
@@ -99,6 +100,15 @@ def test_an_assembly_is_measured_in_the_pose_of_its_export():
     assert CadPart("a", box(1.0)).in_metres("mm", "m").size == pytest.approx(1e-3 * np.sqrt(3))
     assert simplified(box(1.0), 1000, "box").faces is not None
     assert "g/cm^3" in StatedMasses.of(6, 2.7, None, ()).notes[0]
+
+
+def test_parts_of_an_array_of_structs_are_numbered_by_their_place(tmp_path):
+    fields = [("F1", object), ("V1", object), ("F2", object), ("V2", object)]
+    part = (np.array([[1.0, 2, 3]]), np.eye(3))
+    savemat(tmp_path / "one.mat", {"s": np.array([part, part], dtype=fields[:2])})
+    savemat(tmp_path / "two.mat", {"s": np.array([part * 2, part * 2], dtype=fields)})
+    assert list(mat_parts(tmp_path / "one.mat")) == ["s1", "s2"]
+    assert list(mat_parts(tmp_path / "two.mat")) == ["s1_1", "s1_2", "s2_1", "s2_2"]
 
 
 def test_other_files_are_refused(tmp_path):

@@ -495,6 +495,10 @@ BAD_MATS = {
     "words": (cell(s1=TRIANGLE | {"V1": "vertices"}), "no matrix of real numbers"),
     "cells": (cell(s1=TRIANGLE | {"V1": np.array([[1, "a"]], dtype=object)}), "no matrix of real numbers"),
     "complex": (cell(s1=TRIANGLE | {"V1": 1j * np.eye(3)}), "no matrix of real numbers"),
+    "two parts of one name": (
+        cell(s=TRIANGLE | {"F2": [[1, 2, 3]], "V2": np.eye(3)}, s1=TRIANGLE),
+        "s1: two parts of this name",
+    ),
     "flat vertices": (cell(s1=TRIANGLE | {"V1": np.eye(2)}), r"shape \(2, 2\)"),
     "a bomb": (
         lambda path: savemat(path, {"s1": {"V1": np.zeros((6000, 10000))}}, do_compression=True),

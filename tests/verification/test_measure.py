@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from dhkit.description import library_robot
+from dhkit.verification import VerificationReport
 from dhkit.verification.measure import Floors, forward_tolerance, relative_error
+from dhkit.verification.report import Agreement
 
 
 def test_differences_are_relative_to_the_largest_entry_or_the_floor():
@@ -32,3 +34,11 @@ def test_floors_and_tolerance():
     assert floors.tau == pytest.approx(floors.g + floors.h + [10.0, 5.0])
     assert floors.qdd == pytest.approx([8.0, 8e8])
     assert forward_tolerance(M) == pytest.approx([1e-12, 4 * np.finfo(float).eps * 1e8])
+
+
+def test_a_report_prints_errors_that_are_not_finite():
+    agreements = tuple(Agreement(name, error, 1e-12, (0.0,)) for name, error in (("M", np.inf), ("g", np.nan)))
+    report = VerificationReport("planar2r", "Pinocchio", 1, 0, agreements)
+    assert not report.ok
+    assert r"\infty" in report.latex() and r"\mathrm{NaN}" in report.latex()
+    assert "inf" in report.markdown() and "DISAGREES" in repr(report)

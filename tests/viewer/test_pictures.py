@@ -6,6 +6,7 @@ from PIL import Image
 
 from dhkit import Arm, robots
 from dhkit.control import PDGravity
+from dhkit.description import library_robot
 from dhkit.viewer import View
 from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs
 from dhkit.viewer.pictures import GROUND_COLOR, Ghost, _rasterize, picture, pictures
@@ -103,6 +104,24 @@ def test_what_cannot_be_drawn_is_said(call, complaint, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=complaint):
         call(Arm.load("planar2r").description)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("rate", [15.0, 40.0, 7.0])
+def test_a_gif_lasts_as_long_as_its_motion_though_its_times_are_whole_hundredths(tmp_path, rate):
+    arm = library_robot("planar2r")
+    times = np.linspace(0, 1.0, 101)
+    path = write_motion_gif(
+        arm, (times, np.stack([times, -times], axis=1)), tmp_path / "a.gif", rate=rate, size=(64, 48)
+    )
+    with Image.open(path) as gif:
+        shown = [gif.seek(k) or gif.info["duration"] for k in range(gif.n_frames)]
+    assert sum(shown) == pytest.approx(1000 * (round(rate) + 1) / rate, abs=10)
+
+
+def test_a_motion_shorter_than_a_picture_has_two(tmp_path):
+    path = write_motion_gif(library_robot("planar2r"), ([0, 0.01], [[0, 0], [1, 1]]), tmp_path / "a.gif", size=(64, 48))
+    with Image.open(path) as gif:
+        assert gif.n_frames == 2
 
 
 def test_a_gif_plays_the_motion_in_real_time(tmp_path):

@@ -13,8 +13,8 @@ from dhkit.description import Array
 from dhkit.display import value_line
 
 TOLERANCE = 1e-9
-"""Largest error of answers that agree, m or rotation entry: a nanometre, far above any rounding. Errors of dynamics are
-relative to the largest entry if that is above 1."""
+"""Largest error of answers that agree. Errors of ik are in m or rotation entries; all others are divided by the largest
+entry of dhkit's results over the compared items, if that is above 1."""
 CHECKED_ITEMS = 32
 """Items that are compared: enough to meet every branch, few enough for a solver that takes 50 ms."""
 
@@ -26,9 +26,10 @@ class Verdict:
     Attributes
     ----------
     error
-        The largest difference of an entry: of poses, of Jacobians, or of the pose that a solution leads to from the
-        pose asked for (its position alone if inverse kinematics of the arm do not meet whole poses); None if nothing
-        finite could be compared.
+        Largest difference of an entry, divided by dhkit's largest entry if that is above 1; for ``ik`` the largest
+        difference, m or rotation entry, between the pose asked for and the pose that a solution reaches (its position
+        alone if the arm's closed form does not reach whole poses). None if there is no answer, or if a compared entry
+        is not finite.
     solutions
         Mean number of solutions that lead to the pose, for ``ik``; None for other quantities.
     """

@@ -59,7 +59,11 @@ class Workload:
 
     @classmethod
     def of(cls, arm: Arm, batch: int, threads: int, seed: int) -> Workload:
-        """Return N = ``batch`` random states, of full turns and strokes within the limits."""
+        """Return ``batch`` random states.
+
+        Revolute joints are over a full turn whatever their limits, prismatic ones within their limits, rates and
+        accelerations from -1 to 1 in rad, m and s.
+        """
         q = random_states(arm.description, batch, seed)
         rng = np.random.default_rng(seed + 1)
         return cls(arm, q, rng.uniform(-1, 1, q.shape), rng.uniform(-1, 1, q.shape), threads)
@@ -135,7 +139,7 @@ class Contender:
     own: bool = False
 
     def __repr__(self) -> str:
-        return repr_line("Contender", said=f"{self.quantity} by {self.name}, {self.mode.value}")
+        return repr_line("Contender", summary=f"{self.quantity} by {self.name}, {self.mode.value}")
 
 
 def import_peer(module: str) -> Any:

@@ -83,7 +83,7 @@ class Machine:
         )
 
     def __repr__(self) -> str:
-        return repr_line("Machine", said=f"{self.processor}, {self.cores} cores, {self.python}")
+        return repr_line("Machine", summary=f"{self.processor}, {self.cores} cores, {self.python}")
 
 
 def cores() -> int:

@@ -134,7 +134,7 @@ class Outcome:
         return f"{self.quantity}: {self.ending.value}{cause}"
 
     def __repr__(self) -> str:
-        return repr_line("Outcome", said=str(self))
+        return repr_line("Outcome", summary=str(self))
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Requirement:
 
     def __repr__(self) -> str:
         what, required, measured, verdict = self.cells
-        return repr_line("Requirement", said=", ".join(filter(None, (what, required, measured, verdict))))
+        return repr_line("Requirement", summary=", ".join(filter(None, (what, required, measured, verdict))))
 
 
 @dataclass(frozen=True)

@@ -146,10 +146,10 @@ class BatchResult:
         return path
 
     def __repr__(self) -> str:
-        said, unit = [span_text(self.t)], joint_unit(self.arms[0].numbers.prismatic)
+        summary, unit = [span_text(self.t)], joint_unit(self.arms[0].numbers.prismatic)
         if self.peak_error is not None:
-            said.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
-        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*said, *self._remarks]))
+            summary.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
+        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*summary, *self._remarks]))
 
     def _repr_html_(self) -> str:
         known = {"peak error": self.peak_error, "RMS": self.rms_error, "at the end": self.final_error}

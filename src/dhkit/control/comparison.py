@@ -128,10 +128,10 @@ class Comparison:
     def __repr__(self) -> str:
         peaks = {name: float(result.peak_error.max(initial=0.0)) for name, result in self.results.items()}
         best = min(peaks, key=peaks.__getitem__, default=None)
-        said = [] if best is None else [f"least error {peaks[best]:.2g} {self._unit} by {best}"]
-        said += [f"{len(self.failures)} failed"] if self.failures else []
+        summary = [] if best is None else [f"least error {peaks[best]:.2g} {self._unit} by {best}"]
+        summary += [f"{len(self.failures)} failed"] if self.failures else []
         count = len(self.results) + len(self.failures)
-        return repr_line("Comparison", counted(count, "controller"), ", ".join(said))
+        return repr_line("Comparison", counted(count, "controller"), ", ".join(summary))
 
     def _repr_html_(self) -> str:
         headings, rows = self.rows()

@@ -140,7 +140,7 @@ class PID:
         return tau
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, said=gains_text(kp=self.kp, ki=self.ki, kd=self.kd))
+        return repr_line(type(self).__name__, summary=gains_text(kp=self.kp, ki=self.ki, kd=self.kd))
 
     def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
         return self.kp * error + self.ki * integral + self.kd * rate

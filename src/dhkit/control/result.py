@@ -51,8 +51,8 @@ class EnergyAudit:
         return abs(self.remains) / self.turnover if self.turnover != 0 else float("inf")
 
     def __repr__(self) -> str:
-        said = f"{self.turnover:.4g} J turned over, {self.remains:.1e} J without account"
-        return repr_line("EnergyAudit", said=said)
+        summary = f"{self.turnover:.4g} J turned over, {self.remains:.1e} J without account"
+        return repr_line("EnergyAudit", summary=summary)
 
     def _repr_html_(self) -> str:
         names = ("change", "drives", "pushes", "friction", "impacts", "remains", "turnover")

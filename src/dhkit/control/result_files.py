@@ -176,13 +176,13 @@ def _csv_values(text: str, n: int) -> dict[str, Any]:
 def _comment_values(text: str) -> dict[str, Array]:
     """Return the named numbers in the comments at the head of a table."""
     lines = takewhile(lambda line: line.startswith("#"), text[:COMMENTS_LENGTH].splitlines())
-    said = {name: numbers for name, _, numbers in (line.removeprefix("# ").partition(":") for line in lines)}
+    stated = {name: numbers for name, _, numbers in (line.removeprefix("# ").partition(":") for line in lines)}
     values = {}
     for name in (name for name in SIMULATION.arrays if name not in ("t", POSES, *ROWS)):
-        if name not in said:
+        if name not in stated:
             raise DescriptionError(f"no comment '# {name}: ...'; expected a simulation that dhkit saved")
         try:
-            values[name] = np.array([float(word) for word in said[name].split()])
+            values[name] = np.array([float(word) for word in stated[name].split()])
         except ValueError:
-            raise DescriptionError(f"{name} is {said[name].strip()[:40]!r}; expected numbers") from None
+            raise DescriptionError(f"{name} is {stated[name].strip()[:40]!r}; expected numbers") from None
     return values

@@ -36,7 +36,7 @@ class Budget:
         _ACTIVE.reset(self._tokens.pop())
 
     def __repr__(self) -> str:
-        return repr_line("Budget", said=f"{self.left} term products and sums left")
+        return repr_line("Budget", summary=f"{self.left} term products and sums left")
 
 
 _ACTIVE: ContextVar[Budget | None] = ContextVar("budget", default=None)

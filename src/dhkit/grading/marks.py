@@ -51,7 +51,7 @@ class Marks:
         return replace(self, entries=tuple(replace(mark, rule="") for mark in self.entries))
 
     def __repr__(self) -> str:
-        return repr_line("Marks", said=self._points)
+        return repr_line("Marks", summary=self._points)
 
     def _repr_html_(self) -> str:
         rows = [(mark.name, f"{mark.points:.4g}", f"{mark.most:.4g}", mark.rule) for mark in self.quantities]

@@ -57,7 +57,7 @@ class Witness:
     def __repr__(self) -> str:
         answer, truth = ("no value" if value is None else f"{value:.6g}" for value in (self.answer, self.truth))
         state = ", ".join(f"{name} = {value:.4g}" for name, value in self.state.items())
-        return repr_line("Witness", said=f"answer {answer}, truth {truth}{f' at {state}' if state else ''}")
+        return repr_line("Witness", summary=f"answer {answer}, truth {truth}{f' at {state}' if state else ''}")
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ class Note:
 
     def __repr__(self) -> str:
         about = f" about {self.quantity}" if self.quantity else ""
-        return repr_line(f"Note {self.kind.value}{about}", said=", ".join(self.values))
+        return repr_line(f"Note {self.kind.value}{about}", summary=", ".join(self.values))
 
 
 @dataclass(frozen=True)

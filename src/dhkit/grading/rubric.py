@@ -141,7 +141,7 @@ class Rubric:
 
     def __repr__(self) -> str:
         weights = ", ".join(f"{name} {weight:g}" for name, weight in self.weights.items()) or "all alike"
-        return repr_line("Rubric", said=f"{self.points:g} points, feedback {self.feedback}, weights {weights}")
+        return repr_line("Rubric", summary=f"{self.points:g} points, feedback {self.feedback}, weights {weights}")
 
 
 def _entry_name(name: str) -> str | None:

@@ -105,7 +105,7 @@ class Kernel:
                 self._compile()
 
     def __repr__(self) -> str:
-        return repr_line(f"Kernel {self.name}", said="interpreted" if self._function is None else "compiled")
+        return repr_line(f"Kernel {self.name}", summary="interpreted" if self._function is None else "compiled")
 
     def _function_for(self, count: int) -> CompiledFunction | None:
         """Return the machine code for a batch; None if the batch is to be interpreted.

@@ -44,8 +44,8 @@ class Ellipsoid:
     def __repr__(self) -> str:
         shape = self.lengths.shape[:-1]
         if shape:
-            return repr_line("Ellipsoid", said=f"a batch of shape {shape}")
-        return repr_line("Ellipsoid", said=f"half axes {listed(self.lengths)} about {listed(self.center)} m")
+            return repr_line("Ellipsoid", summary=f"a batch of shape {shape}")
+        return repr_line("Ellipsoid", summary=f"half axes {listed(self.lengths)} about {listed(self.center)} m")
 
 
 @takes_robot

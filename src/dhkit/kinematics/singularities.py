@@ -72,7 +72,7 @@ class Singularities:
         return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
 
     def __repr__(self) -> str:
-        return repr_line("Singularities", said=", ".join(self.kinds))
+        return repr_line("Singularities", summary=", ".join(self.kinds))
 
     def _repr_html_(self) -> str:
         return html_table(("singular", "where"), list(self.words.items()), longest=MAX_WORDS_LENGTH)

@@ -47,7 +47,7 @@ class Estimate:
         return f"{self.value:.{digits}f} ± {self.margin:.{digits}f} {unit}"
 
     def __repr__(self) -> str:
-        return repr_line("Estimate", said=str(self))
+        return repr_line("Estimate", summary=str(self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +77,8 @@ class Grid:
 
     def __repr__(self) -> str:
         cells = " x ".join(map(str, self.counts.shape))
-        said = f"{cells} of {self.edge:.3g} m, {np.count_nonzero(self.counts)} with points"
-        return repr_line("Grid", counted(self.counts.size, "cell"), said)
+        summary = f"{cells} of {self.edge:.3g} m, {np.count_nonzero(self.counts)} with points"
+        return repr_line("Grid", counted(self.counts.size, "cell"), summary)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -150,7 +150,7 @@ class Goal:
     condition: Condition
 
     def __repr__(self) -> str:
-        return repr_line("Goal", said=f"{counted(self.points, 'point')}, {self.text}")
+        return repr_line("Goal", summary=f"{counted(self.points, 'point')}, {self.text}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ class Step:
     goals: tuple[Goal, ...]
 
     def __repr__(self) -> str:
-        return repr_line(f"Step {plain(self.title, 80)}", said=counted(len(self.goals), "goal"))
+        return repr_line(f"Step {plain(self.title, 80)}", summary=counted(len(self.goals), "goal"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +267,7 @@ class Assignment:
 
     def __repr__(self) -> str:
         content = f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
-        return repr_line(f"Assignment {plain(self.title, 60)}", said=content)
+        return repr_line(f"Assignment {plain(self.title, 60)}", summary=content)
 
     def _repr_html_(self) -> str:
         rows = [(step.title, f"{goal.points:g}", goal.text) for step in self.steps for goal in step.goals]

@@ -173,7 +173,7 @@ class ControlPanel(Panel):
 
     @answers("bodies.assume")
     def assume_bodies(self, _: Fields) -> None:
-        """Give an arm without bodies uniform links."""
+        """Replace all bodies of an arm with a link without body by thin uniform rods."""
         if has_bodies(self.desk.arm):
             raise ValueError("bodies.assume: every link has a mass; expected one without")
         self._end_run()
@@ -227,8 +227,9 @@ class ControlPanel(Panel):
     # The run
 
     def _run(self, live: Live, stop: threading.Event) -> None:
-        """Simulate and show frame after frame; with more than MAX_FRAMES_BEHIND, begin to count frames anew."""
+        """Simulate and show frames at FRAME_RATE; if more than MAX_FRAMES_BEHIND late, drop the delay."""
         begin, frame, published = time.monotonic(), 0, 0.0
+        shown, ratio = 0, CONTROL_RATE / FRAME_RATE
         columns = self._columns()
         self.desk.view.append(Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True))
         try:
@@ -244,8 +245,9 @@ class ControlPanel(Panel):
                     speed = frame / FRAME_RATE / max(time.monotonic() - begin, 1e-9)
                     self._speed = 0.8 * self._speed + 0.2 * speed
                     begin, frame = time.monotonic(), 0
-                self._simulate_frame(live)
-                frame += 1
+                # A frame lasts no whole number of steps: rounding alike each time would change the speed.
+                self._simulate_frame(live, round((shown + 1) * ratio) - round(shown * ratio))
+                frame, shown = frame + 1, shown + 1
                 if frame / FRAME_RATE >= 1.0 and delay <= MAX_FRAMES_BEHIND / FRAME_RATE:
                     self._speed = min(1.0, 0.8 * self._speed + 0.2)
                 if time.monotonic() - published > PUBLISH_PERIOD:
@@ -257,10 +259,10 @@ class ControlPanel(Panel):
             log.exception("the simulation failed")
             self._report_failure(live, stop, f"{type(error).__name__}: Python's log says more")
 
-    def _simulate_frame(self, live: Live) -> None:
+    def _simulate_frame(self, live: Live, steps: int) -> None:
         with self._lock:
             error = tau = np.zeros(len(self.free))
-            for _ in range(round(CONTROL_RATE / FRAME_RATE)):
+            for _ in range(steps):
                 error, tau = live.advance()
             q, reference, t = self._whole_arm(live.q), self._whole_arm(live.setpoint_q), live.t
         self.desk.show(q)
@@ -274,9 +276,10 @@ class ControlPanel(Panel):
         return ("t", *(f"{name}{i + 1}" for name in ("e", "tau") for i in self.free), "tool")
 
     def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
-        """Publish why a run failed, unless it was ended meanwhile, and its pages with it."""
+        """Publish why a run failed, unless the run was stopped or replaced in the meantime."""
         if not stop.is_set() and live is self._live and not self._stop.is_set():
             self._error, self._thread, self.desk.running = error, None, False
+            self.desk.view.ghosts(None)
             self.publish()
 
     def _end_run(self) -> None:

@@ -16,9 +16,9 @@ from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
 
 TOKEN_LENGTH = 22
-"""Length of a token, characters."""
+"""Smallest length of a token, characters: 16 random bytes in base64."""
 MAX_TOKEN_LENGTH = 100
-"""Characters that are read of a token's file."""
+"""Number of bytes at the beginning of a token file that are used; the rest is ignored."""
 
 
 def serve(
@@ -64,7 +64,7 @@ def serve(
     DescriptionError
         The assignment cannot be read, or is about another robot.
     ValueError
-        The port is not one of those for programs of users.
+        The port is not from 1024 to 65535.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def kept_token(port: int) -> str:
     Raises
     ------
     ModelError
-        The folder of tokens is not this user's alone, or cannot be written.
+        The folder of tokens belongs to another user, others can write to it, or it cannot be written.
     """
     home = os.environ.get("XDG_STATE_HOME")
     folder = (Path(home) if home else Path.home() / ".local" / "state") / "dhkit"
@@ -109,7 +109,9 @@ def kept_token(port: int) -> str:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if os.name == "posix" and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022):
-            raise ModelError(f"{folder} can be written by others; expected a folder of this user's alone")
+            raise ModelError(
+                f"{folder} can be written by others; expected a folder that this user owns and nobody else can write to"
+            )
         if _is_private(path):
             token = path.read_bytes()[:MAX_TOKEN_LENGTH].decode("ascii", errors="replace").strip()
             if len(token) >= TOKEN_LENGTH and token.replace("-", "").replace("_", "").isalnum() and token.isascii():

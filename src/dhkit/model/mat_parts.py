@@ -1,8 +1,8 @@
 """Parts of an assembly from a MAT file of faces, vertices and colours, as the course's Robot_CAD2MAT stores them.
 
-A struct a part, ``s1`` with fields F1, V1, C1, or one struct ``s`` with fields F1, V1, C1, F2 ..., or an array of
-structs ``s`` with fields F, V, C; or faces, vertices, facevertexcdata as MATLAB's patch has them. Vertices are (k, 3),
-or (k, 4) with a column of ones; faces count vertices from 1.
+One struct for each part (``s1`` with fields F1, V1, C1), one struct for several parts (``s`` with F1, V1, C1, F2, ...)
+or an array of structs ``s`` with fields F, V, C; or the field names of MATLAB's patch. Vertices have 3 columns, or 4,
+of which the last is ignored. Faces number vertices from 1.
 """
 
 from __future__ import annotations
@@ -43,7 +43,11 @@ def mat_parts(path: Path) -> dict[str, TriangleMesh]:
     content = read_bounded(path, MAX_FILE_BYTES, "a MAT file", ModelError)
     try:
         variables = read_mat(content, MAX_UNPACKED_BYTES, advice=EXPORT_ADVICE)
-        parts = dict(_parts(variables))
+        parts: dict[str, TriangleMesh] = {}
+        for name, mesh in _parts(variables):
+            if name in parts:
+                raise ModelError(f"{name}: two parts of this name")
+            parts[name] = mesh
     except DhkitError as error:
         raise ModelError(f"{path}: {error}") from None
     if not parts:
@@ -69,9 +73,10 @@ def _parts(variables: Mapping[str, MatVariable]) -> Iterator[tuple[str, Triangle
                 count += 1
                 if count > MAX_PARTS:
                     raise ModelError(f"more than {MAX_PARTS} parts")
-                # A struct of several parts numbers its fields; parts of an array are numbered by their place.
-                has_several = len(numbers) > 1 or len(records) > 1
-                part = f"{name}{number or k}" if has_several else name
+                # Parts of an array are numbered by their place, those of one struct by the numbers of its fields.
+                part = f"{name}{k}" if len(records) > 1 else name
+                if len(numbers) > 1:
+                    part = f"{name}{number}" if len(records) == 1 else f"{part}_{number}"
                 yield part, _mesh(part, fields[f"F{number}"], fields[f"V{number}"], fields.get(f"C{number}"))
 
 
@@ -90,7 +95,7 @@ def _mesh(
         raise ModelError(f"{part}: vertices of shape {vertices.shape}; expected (k, 3) or (k, 4)")
     points = np.array(vertices[:, :3], dtype=np.float64)
     if not 3 <= faces.shape[1] <= MAX_POLYGON_CORNERS:
-        raise ModelError(f"{part}: faces of shape {faces.shape}; expected (m, 3)")
+        raise ModelError(f"{part}: faces of shape {faces.shape}; expected 3 to {MAX_POLYGON_CORNERS} columns")
     is_missing = np.isnan(faces)  # patch fills the rows of smaller polygons with NaN
     indices = faces[~is_missing]
     if np.any(indices != np.round(indices)) or np.any(is_missing[:, :3]):
@@ -110,7 +115,7 @@ def _matrix(field: MatVariable | None) -> Array | None:
 
 
 def _colours(field: MatVariable | None, count: int) -> NDArray[np.uint8] | None:
-    """Return the mean of a patch's colours, 0 to 1, for all triangles, shape (count, 3); None without colours."""
+    """Return a part's mean colour for each triangle, 0 to 255, shape (count, 3), from colours 0 to 1; None for none."""
     colours = _matrix(field)
     if colours is None or colours.shape[1] != 3 or not np.isfinite(colours).all():
         return None

@@ -39,7 +39,7 @@ class ElementName(NamedTuple):
 
 
 class UrdfWarning(NamedTuple):
-    """An unusual element of a URDF, and how it was read; prints as one line."""
+    """An unusual element of a URDF, and how it was read; the text follows the element's name directly."""
 
     element: ElementName
     text: str
@@ -66,7 +66,7 @@ class UrdfShape:
     geometry
         Sizes in m; the path of a mesh is the URDF's file name or URI.
     T_link_shape
-        Shape (4, 4), m.
+        Pose of the shape in the link's frame, shape (4, 4), m.
     color
         ``#rrggbb``, or None.
     """
@@ -95,13 +95,13 @@ class UrdfJoint:
     T_parent_joint
         Shape (4, 4), m: the pose of the joint, and of the child link with the joint at zero, in the parent link.
     axis
-        Unit vector, shape (3,), in the joint's frame; of moving joints.
+        Unit vector in the joint's frame, shape (3,); without meaning for fixed, floating and planar joints.
     limits
         Lowest and highest value, rad or m; None: unlimited.
     velocity, effort
         Largest speed, rad/s or m/s, and torque or force, N m or N; None: unlimited.
     damping, friction
-        N m s/rad and N m, or N s/m and N.
+        Viscous damping, N m s/rad or N s/m, and Coulomb friction, N m or N.
     mimics
         The joint that this one follows, or None.
     """
@@ -154,7 +154,7 @@ class UrdfTree:
     warnings
         Unusual elements, and how they were read.
     changes
-        Numbers that ``as_designed`` read differently from how they are written.
+        Numbers that :func:`read_urdf` rounded to their intended values (``as_designed=True``), one sentence each.
     """
 
     path: Path

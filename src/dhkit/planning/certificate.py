@@ -81,7 +81,7 @@ class Certificate:
         return max(self.checks, key=lambda check: check.excess, default=None)
 
     def __repr__(self) -> str:
-        return repr_line("Certificate", said=self._summary)
+        return repr_line("Certificate", summary=self._summary)
 
     def _repr_html_(self) -> str:
         rows = [

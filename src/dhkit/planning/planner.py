@@ -132,7 +132,7 @@ class Planner:
 
     def __repr__(self) -> str:
         return repr_line(
-            f"Planner of {self.description.name}", said=f"least {self.objective}, {self.intervals} intervals"
+            f"Planner of {self.description.name}", summary=f"least {self.objective}, {self.intervals} intervals"
         )
 
     def solve(

@@ -29,7 +29,7 @@ class BranchReport:
         return f"{self.branch}: {'no motion: ' if self.reason else ''}{_duration_text(self)}"
 
     def __repr__(self) -> str:
-        return repr_line("BranchReport", said=str(self))
+        return repr_line("BranchReport", summary=str(self))
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class PlanReport:
         return sorted(named, key=lambda item: -item[1])
 
     def __repr__(self) -> str:
-        return repr_line("PlanReport", said=f"{self.duration:.4f} s, least {self.objective}, {self._certified}")
+        return repr_line("PlanReport", summary=f"{self.duration:.4f} s, least {self.objective}, {self._certified}")
 
     def _repr_html_(self) -> str:
         facts = [("duration", f"{self.duration:.4f} s"), (f"cost ({self.objective})", f"{self.cost:.6g}")]

@@ -167,7 +167,7 @@ class Program:
         self.close()
 
     def __repr__(self) -> str:
-        return repr_line(f"Program {self.name}", said=", ".join(self.functions) or "not started")
+        return repr_line(f"Program {self.name}", summary=", ".join(self.functions) or "not started")
 
     def _running_process(self) -> Process:
         if self._closed:

@@ -100,5 +100,5 @@ class CheckReport:
 
 
 def share_within(value: float, bound: float) -> float:
-    """Return the share of points of a value with an upper bound: 1 within the bound, 0 at ten times the bound."""
+    """Return the share of points, 0 to 1, of a value: 1 up to the bound, falling with log10 to 0 at ten times it."""
     return float(np.clip(1 - np.log10(max(value, 1e-12) / bound), 0.0, 1.0))

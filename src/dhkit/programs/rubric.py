@@ -142,4 +142,4 @@ class CheckRubric:
     def __repr__(self) -> str:
         functions = self.scored_functions(("fk", "ik", "controller"))
         points = ", ".join(f"{function} {sum(self.points(function).values()):g}" for function in functions)
-        return repr_line("CheckRubric", said=f"points of {points}")
+        return repr_line("CheckRubric", summary=f"points of {points}")

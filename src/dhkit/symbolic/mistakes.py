@@ -54,7 +54,7 @@ class Mistake:
         return self.sentence
 
     def __repr__(self) -> str:
-        return repr_line(f"Mistake {self.identity}", said=self.sentence)
+        return repr_line(f"Mistake {self.identity}", summary=self.sentence)
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ class Pieces:
 
     def __repr__(self) -> str:
         pieces, powers, columns = self.coefficients.shape
-        return repr_line("Pieces", said=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
+        return repr_line("Pieces", summary=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
 
 
 def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:

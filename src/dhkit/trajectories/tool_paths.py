@@ -52,7 +52,7 @@ class ToolLine:
 
     def __repr__(self) -> str:
         length, angle = np.linalg.norm(self.way), np.linalg.norm(self.turn)
-        return repr_line("ToolLine", said=f"{length:.4g} m, turned by {angle:.4g} rad")
+        return repr_line("ToolLine", summary=f"{length:.4g} m, turned by {angle:.4g} rad")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class ToolCircle:
         angle = float(np.linalg.norm(self.turn))
         radius = float(np.linalg.norm(np.cross(self.turn, self.T0[:3, 3] - self.centre))) / (angle or 1.0)
         tool = "turning with it" if self.turning else "keeping its orientation"
-        return repr_line("ToolCircle", said=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}")
+        return repr_line("ToolCircle", summary=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}")
 
     def _radii(self, s: Array) -> Array:
         radii: Array = np.einsum("kij,j->ki", _rotations(s[:, None] * self.turn), self.T0[:3, 3] - self.centre)

@@ -12,7 +12,7 @@ from dhkit.description import Array, Description, takes_robot
 from dhkit.errors import DescriptionError
 from dhkit.model import pinocchio_model
 from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error
-from dhkit.verification.reference import Reference
+from dhkit.verification.reference import PinocchioResults
 from dhkit.verification.report import Agreement, VerificationReport
 from dhkit.verification.states import JointStates, random_motions
 
@@ -61,7 +61,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
         ``samples`` is below 1.
     """
     motion = random_motions(description, samples, seed)
-    reference = Reference(pinocchio_model(description), motion)
+    reference = PinocchioResults(pinocchio_model(description), motion)
     comparisons = list(_kinematics(description, reference))
     notes: list[str] = []
     missing = [joint.name for joint in description.joints if not joint.bodies]
@@ -90,7 +90,7 @@ def worst(comparison: Comparison, motion: JointStates) -> Agreement:
     return Agreement(quantity, float(errors[k]), float(tolerances[k]), *state)
 
 
-def _kinematics(description: Description, reference: Reference) -> Iterator[Comparison]:
+def _kinematics(description: Description, reference: PinocchioResults) -> Iterator[Comparison]:
     q, reach = reference.motion.q, max(1.0, description.reach)
     ours = np.concatenate(
         [kinematics.frames(description, q), kinematics.forward_kinematics(description, q)[:, None]], axis=1
@@ -105,7 +105,7 @@ def _kinematics(description: Description, reference: Reference) -> Iterator[Comp
         yield Comparison(f"Jacobian ({frame})", error, JACOBIAN_TOLERANCE)
 
 
-def _dynamics(description: Description, reference: Reference, notes: list[str]) -> Iterator[Comparison]:
+def _dynamics(description: Description, reference: PinocchioResults, notes: list[str]) -> Iterator[Comparison]:
     q, qd, qdd = reference.motion
     M, C, g, tau = (
         reference.mass_matrix(),

@@ -16,7 +16,7 @@ from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, re
 from dhkit.verification.comparison import Comparison, largest, worst
 from dhkit.verification.differences import differences
 from dhkit.verification.measure import Floors, relative_error
-from dhkit.verification.reference import Reference
+from dhkit.verification.reference import PinocchioResults
 from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
@@ -99,7 +99,7 @@ def verify_urdf(
     model.gravity.linear = np.array(description.numbers.gravity)
     model.armature = np.array(description.numbers.armature)
     motion = random_motions(description, samples, seed)
-    reference = Reference(model, motion)
+    reference = PinocchioResults(model, motion)
     notes = [f"joints in order: {', '.join(chain.names)}; tool: {chain.tip}", *chain.notes]
     notes += _limits(description, chain)
     comparisons, offsets = _tool(description, reference, tolerance)
@@ -123,7 +123,7 @@ def verify_urdf(
 
 
 def _tool(
-    description: Description, reference: Reference, tolerance: float
+    description: Description, reference: PinocchioResults, tolerance: float
 ) -> tuple[list[Comparison], list[ConstantOffset]]:
     """Return the comparisons of the tool's pose, and the constant transforms that explain a difference."""
     ours = kinematics.forward_kinematics(description, reference.motion.q)
@@ -136,7 +136,7 @@ def _tool(
     return comparisons, list(_constant_offsets(ours, theirs)) if differs else []
 
 
-def _tools(reference: Reference) -> Array:
+def _tools(reference: PinocchioResults) -> Array:
     """Return the URDF's tip in its base, shape (N, 4, 4)."""
     frames = reference.frames([BASE_FRAME, TIP_FRAME])
     return np.asarray(np.linalg.inv(frames[:, 0]) @ frames[:, 1])
@@ -150,7 +150,7 @@ def _constant_offsets(ours: Array, theirs: Array) -> Iterator[ConstantOffset]:
             yield ConstantOffset(frame, offsets[0])
 
 
-def _dynamics(description: Description, reference: Reference, tolerance: float) -> Iterator[Comparison]:
+def _dynamics(description: Description, reference: PinocchioResults, tolerance: float) -> Iterator[Comparison]:
     q, qd, qdd = reference.motion
     M = dynamics.mass_matrix(description, q)
     g, tau = dynamics.gravity_torque(description, q), dynamics.inverse_dynamics(description, q, qd, qdd)

@@ -11,8 +11,8 @@ from dhkit.model import PinocchioModel
 from dhkit.verification.states import JointStates
 
 
-class Reference:
-    """A Pinocchio model evaluated at many states, which are the first axis of every result."""
+class PinocchioResults:
+    """Pinocchio's results for a model at N joint states; N is the first axis of every array."""
 
     def __init__(self, model: PinocchioModel, motion: JointStates) -> None:
         self.model = model
@@ -32,7 +32,7 @@ class Reference:
         return self._each(placements, (len(ids), 4, 4))
 
     def jacobian(self, name: str, *, in_world: bool) -> Array:
-        """Return a frame's Jacobian at its origin, in the world's axes or its own, shape (N, 6, n)."""
+        """Return a frame's Jacobian at its origin, linear rows (m) first, in world or own axes, shape (N, 6, n)."""
         import pinocchio as pin
 
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED if in_world else pin.ReferenceFrame.LOCAL
@@ -42,7 +42,7 @@ class Reference:
         )
 
     def mass_matrix(self) -> Array:
-        """Return M, shape (N, n, n)."""
+        """Return joint-space mass matrices M(q), shape (N, n, n), kg m^2, kg m and kg."""
         import pinocchio as pin
 
         M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
@@ -51,44 +51,44 @@ class Reference:
         return symmetric
 
     def coriolis_matrix(self) -> Array:
-        """Return the Christoffel C, shape (N, n, n)."""
+        """Return Coriolis matrices C(q, qd) of Christoffel symbols, shape (N, n, n); C qd is in N m and N."""
         import pinocchio as pin
 
         return self._each(lambda q, qd, qdd: pin.computeCoriolisMatrix(self.model, self._data, q, qd), (self.n, self.n))
 
     def gravity_torque(self) -> Array:
-        """Return g, shape (N, n)."""
+        """Return gravity torques g(q), shape (N, n), N m and N."""
         import pinocchio as pin
 
         return self._each(lambda q, qd, qdd: pin.computeGeneralizedGravity(self.model, self._data, q), (self.n,))
 
     def inverse_dynamics(self) -> Array:
-        """Return tau, shape (N, n)."""
+        """Return joint torques of the states' accelerations, without friction, shape (N, n), N m and N."""
         import pinocchio as pin
 
         return self._each(lambda q, qd, qdd: pin.rnea(self.model, self._data, q, qd, qdd), (self.n,))
 
     def forward_dynamics(self, tau: Array) -> Array:
-        """Return the accelerations that torques (N, n) cause, shape (N, n)."""
+        """Return accelerations under joint torques, shape (N, n), N m and N; rad/s^2 and m/s^2, shape (N, n)."""
         import pinocchio as pin
 
         torques = iter(tau)
         return self._each(lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,))
 
     def kinetic_energy(self) -> Array:
-        """Return K, shape (N,)."""
+        """Return kinetic energies, shape (N,), J."""
         import pinocchio as pin
 
         return self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
 
     def potential_energy(self) -> Array:
-        """Return V, shape (N,)."""
+        """Return potential energies, shape (N,), J."""
         import pinocchio as pin
 
         return self._each(lambda q, qd, qdd: pin.computePotentialEnergy(self.model, self._data, q), ())
 
     def regressor(self) -> Array:
-        """Return the torques' regressor in the parameters of each DH frame, shape (N, n, 10 n).
+        """Return Y with tau = Y p, p the 10 inertial parameters of each link in its DH frame, shape (N, n, 10 n).
 
         Pinocchio's parameters are those of its own joint frames, in its own order.
         """
@@ -132,4 +132,4 @@ class Reference:
 
 
 PINOCCHIO_ORDER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Pinocchio's order of second moments."""
+"""Row and column of Pinocchio's inertia parameters, in its order: Ixx, Ixy, Iyy, Ixz, Iyz, Izz."""

@@ -10,10 +10,10 @@ from dhkit.display import html_block, html_lines, html_table, repr_line
 MAX_SHOWN = 20
 """Largest number of quantities that a notebook shows; an arm's own report has fewer."""
 MEASURE = (
-    "Errors are largest differences of an entry at one state: of positions and linear Jacobians over the arm's reach "
-    "(1 m at least), of rotations as they are, of all else over the reference's largest entry, or where that is small "
-    "over what the quantity is made of (of torques: the links' weights times the reach, and the largest entries of M "
-    "times those of the accelerations and of the products of rates)."
+    "Each error is the largest difference of an entry at one state. Positions and linear rows of Jacobians are divided "
+    "by the arm's reach (at least 1 m); rotations are not scaled. All other quantities are divided by the largest "
+    "entry of the reference, or by a natural size where that is larger (for torques: weight of all links times reach, "
+    "plus the largest entry of M times those of the accelerations and of the squared rates)."
 )
 
 
@@ -26,7 +26,7 @@ class Agreement:
     quantity
         The quantity that was compared.
     error
-        Largest error over the samples; NaN if a value was missing or not finite.
+        Error at the sample where error / tolerance is largest; NaN if a value there is NaN, inf if one is infinite.
     tolerance
         Largest error that counts as agreement at that state.
     q, qd, qdd
@@ -47,7 +47,7 @@ class Agreement:
 
     @property
     def state(self) -> str:
-        """The state in words, six digits."""
+        """The state as text, such as ``q = [0.1, 0.2]``, with six significant digits; empty vectors are left out."""
         named = (("q", self.q), ("qd", self.qd), ("qdd", self.qdd))
         return ", ".join(f"{name} = {[float(f'{x:.6g}') for x in vector]}" for name, vector in named if vector)
 
@@ -58,7 +58,7 @@ class Agreement:
 
 @dataclass(frozen=True)
 class VerificationReport:
-    """Our own numbers against Pinocchio's, over random states.
+    """Errors of dhkit's kinematics and dynamics relative to a reference, Pinocchio or a URDF, at random states.
 
     Attributes
     ----------
@@ -100,8 +100,8 @@ class VerificationReport:
 
     def __repr__(self) -> str:
         wrong = [agreement.quantity for agreement in self.agreements if not agreement.ok]
-        said = f"DISAGREES in {', '.join(wrong)}" if wrong else f"{len(self.agreements)} quantities agree"
-        return repr_line("VerificationReport", self.robot, f"{said}, {self.samples} states")
+        summary = f"DISAGREES in {', '.join(wrong)}" if wrong else f"{len(self.agreements)} quantities agree"
+        return repr_line("VerificationReport", self.robot, f"{summary}, {self.samples} states")
 
     def _repr_html_(self) -> str:
         # Disagreements first, because the table is bounded.
@@ -203,7 +203,7 @@ def _escaped(text: str) -> str:
 def _power(number: float) -> str:
     if number != number:
         return "\\mathrm{NaN}"
-    if number == 0:
-        return "0"
+    if number in (0.0, float("inf")):
+        return "0" if number == 0 else "\\infty"
     mantissa, exponent = f"{number:.1e}".split("e")
     return f"{mantissa} \\times 10^{{{int(exponent)}}}"

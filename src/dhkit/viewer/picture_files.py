@@ -38,9 +38,17 @@ def write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path:
     first, *others = images
     palette = first.quantize(GIF_COLORS, dither=Image.Dither.NONE)
     frames = [palette, *(image.quantize(GIF_COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
+    # Times of a GIF are whole hundredths of a second: rounded one by one, they would add up to another duration.
+    durations = 10 * np.diff(np.rint(100 / rate * np.arange(len(frames) + 1))).astype(int)
     content = io.BytesIO()
     palette.save(
-        content, format="GIF", save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0, disposal=1
+        content,
+        format="GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=durations.tolist(),
+        loop=0,
+        disposal=1,
     )
     write_atomically(Path(path), content.getvalue())
     return Path(path)
@@ -77,12 +85,12 @@ def write_motion_gif(
     Raises
     ------
     ValueError
-        The rate is not from 1 to 50, or there are more than 900 pictures.
+        The rate is not from 1 to 50 Hz, or the motion needs more than 900 pictures.
     """
     if not 1 <= rate <= 50:
         raise ValueError(f"rate is {rate:g}; expected 1 to 50 pictures a second")
     duration = float(played_motion(description, motion).times[-1])
-    count = round(duration * rate) + 1
+    count = max(2, round(duration * rate) + 1)
     if count > MAX_PICTURES:
         raise ValueError(
             f"{duration:g} s at {rate:g} pictures a second are {count} pictures; expected at most {MAX_PICTURES}: "

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EVEN_SAMPLES = 401
-"""Samples of a motion at equal steps, beside those at both sides of breaks, where accelerations jump."""
+"""Number of samples of a motion at equal steps, and largest number of breaks (jumps of acceleration) that are sampled
+on both sides as well."""
 TICK_MARGIN = 0.06
 """Room beside the tool's path for its tick labels, as a share of its width."""
 MAX_PERCENT = 112.0
@@ -35,11 +36,11 @@ MAX_PERCENT = 112.0
 
 @plot.register(Trajectory)
 def plot_trajectory(trajectory: Trajectory) -> Figure:
-    """Return joint values, rates and torques over time beside the tool's path.
+    """Return a figure of joint values, rates and torques over time, beside the tool's path.
 
-    Limits near the curves are dashed, in the joint's colour. Torques are drawn as shares of their limits if all joints
-    have one; so are rates, if the arm has turning and sliding joints. Torques are left out for an arm with a link
-    without body.
+    Limits near the curves are dashed, in the joint's colour, or in grey where several joints share the limit. Torques
+    are drawn as shares of their limits if all joints have one; rates, if all joints have a speed limit and the arm has
+    both revolute and prismatic joints. Torques are left out for an arm with a link without body.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     Parameters
     ----------
     motions
-        Motions by name, of an arm whose links all have a body, a speed limit and a torque limit.
+        Motions by name, all of one arm; each link has a body, each joint a speed limit and a torque limit.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
 
 
 def _samples(trajectory: Trajectory) -> Samples:
-    """Return samples of a motion, with both sides of every break, so that jumps are drawn upright."""
+    """Return samples of a motion; up to EVEN_SAMPLES breaks are sampled on both sides, so that jumps are vertical."""
     inside = trajectory.breaks[1:-1] if len(trajectory.breaks) <= EVEN_SAMPLES else np.zeros(0)
     even = np.setdiff1d(np.linspace(0.0, trajectory.duration, EVEN_SAMPLES), inside)
     times = np.concatenate([even, inside, inside])

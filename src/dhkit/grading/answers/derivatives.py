@@ -11,7 +11,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
 
 MAX_NODES = 2_000
-"""Largest number of nodes of a derivative: products of many factors grow by their number."""
+"""Largest number of nodes of a derivative: a product of k factors becomes up to k products of k factors."""
 
 
 def number(value: int, at: int) -> Number:
@@ -51,7 +51,7 @@ def time_derivative(tree: Tree) -> Tree:
     Raises
     ------
     AnswerError
-        An acceleration, a function whose derivative is not read, or more than :data:`MAX_NODES` nodes.
+        An acceleration, a changing exponent, a function without a rule here, or more than :data:`MAX_NODES` nodes.
     """
     derivative = _derivative(tree)
     if derivative is None:
@@ -122,5 +122,7 @@ def _derivative_of_call(function: str, arguments: tuple[Tree, ...], at: int) -> 
         case "sqrt":
             outer = quotient(number(1, at), number(2, at), Call("sqrt", arguments[:1], at))
         case _:
-            raise AnswerError(f"a time derivative of {function}() at position {at + 1}, which is not read")
+            raise AnswerError(
+                f"a time derivative of {function}() at position {at + 1}; expected sin, cos, tan, exp or sqrt"
+            )
     return None if changes[0] is None else product(outer, changes[0])

@@ -127,7 +127,7 @@ class Obstacle:
 
     def __repr__(self) -> str:
         kind = type(self.geometry).__name__.lower()
-        return repr_line(f"Obstacle {self.name[:60]}", said=f"{kind} about {listed(self.centre)} m")
+        return repr_line(f"Obstacle {self.name[:60]}", summary=f"{kind} about {listed(self.centre)} m")
 
     @classmethod
     def _placed(cls, geometry: Solid, T_world_obstacle: Array, name: str) -> Obstacle:

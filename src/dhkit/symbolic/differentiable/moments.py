@@ -110,7 +110,7 @@ class Moments:
 
     def __repr__(self) -> str:
         numbers = all(isinstance(entry, int | float | Fraction) for entry in self.entries)
-        return repr_line("Moments", said=f"mass {float(self.mass):.4g} kg" if numbers else "of symbols")
+        return repr_line("Moments", summary=f"mass {float(self.mass):.4g} kg" if numbers else "of symbols")
 
 
 def regroup(links: Iterable[Moments], rows: Sequence[JointRow]) -> tuple[Moments, list[Moments]]:

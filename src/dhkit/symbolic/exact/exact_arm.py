@@ -162,8 +162,8 @@ class ExactArm:
         return numbers.reshape((*batch, *shape))
 
     def __repr__(self) -> str:
-        said = f"{counted(self.n, 'joint')}, {', '.join(self.ring.constants) or 'in numbers'}"
-        return repr_line("ExactArm", self.description.name, said)
+        summary = f"{counted(self.n, 'joint')}, {', '.join(self.ring.constants) or 'in numbers'}"
+        return repr_line("ExactArm", self.description.name, summary)
 
 
 @lru_cache(maxsize=32)

@@ -55,7 +55,7 @@ class Proof:
         return all(element.is_zero for element in self.difference.flat)
 
     def __repr__(self) -> str:
-        return repr_line("Proof", said=f"{'proved' if self else 'NOT TRUE'}: {self.statement}")
+        return repr_line("Proof", summary=f"{'proved' if self else 'NOT TRUE'}: {self.statement}")
 
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:

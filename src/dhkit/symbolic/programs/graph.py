@@ -195,7 +195,7 @@ class Graph:
 
     def __repr__(self) -> str:
         inputs, outputs = (", ".join(variable.name for variable in x) for x in (self.inputs, self.outputs))
-        return repr_line(f"Graph {self.name}", said=f"{counted(len(self.nodes), 'node')}, ({inputs}) -> ({outputs})")
+        return repr_line(f"Graph {self.name}", summary=f"{counted(len(self.nodes), 'node')}, ({inputs}) -> ({outputs})")
 
 
 class _Builder:

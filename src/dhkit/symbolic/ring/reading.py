@@ -27,8 +27,8 @@ class Reader:
     ring
         The ring of the elements that are returned.
     units
-        Angles whose cosine and sine are constants of the ring, by the monomial (pi, a parameter, 1) that they are
-        multiples of; the multiples are listed.
+        Rational factors u by monomial (pi, a parameter or 1): the ring has constants cos(u monomial) and
+        sin(u monomial), from which those of whole multiples are computed.
     """
 
     ring: PolynomialRing

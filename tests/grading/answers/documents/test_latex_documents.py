@@ -4,6 +4,7 @@ Modules: latex_document, latex_rows, latex_source, latex_statements, entry_state
 """
 
 import re
+import time
 
 import pytest
 
@@ -215,6 +216,7 @@ def test_products_of_matrices_are_left_out_and_told(read):
         (r"\[ V = A > 0 \]", "another relation"),
         (r"\[ V = A \neq 0 \]", "another relation"),
         (r"\[ V = (A \]", "do not close"),
+        (r"\[ V = \pm A \]", r"a sign \\pm, which stands for two values"),
         (r"\[ V = A \] \[ V = B \]", "assigned twice"),
         (r"$V = A$ and $V = 2 A$", "assigned twice"),
         (r"\[ V = \begin{cases} A & q_1 > 0 \\ B & q_1 < 0 \end{cases} \]", "row|relation"),
@@ -536,3 +538,11 @@ def test_marks_that_refer_to_nothing(graded, rows):
     except AnswerError:
         return
     assert "unreadable" in verdicts
+
+
+@pytest.mark.parametrize("word", ["m", "Nm", "kg m^2", "mm/", "rad deg"])
+def test_a_unit_without_end_takes_no_time(read, word):
+    begin = time.process_time()
+    answer = read(rf"\[ V = 3 \text{{{word * 2000}!}} q_1 \]").answers["V"]
+    assert isinstance(answer, Refusal)
+    assert time.process_time() - begin < 5

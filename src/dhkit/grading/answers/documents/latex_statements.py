@@ -18,9 +18,12 @@ OTHER_RELATIONS = re.compile(
     r"\\(?:neq|ne|leq|le|geq|ge|ll|gg|in|subset|propto|sim|to|rightarrow|mapsto|succ|prec|perp|mid|pm|mp)(?![A-Za-z])"
     r"|[<>]"
 )
-THEREFORE = re.compile(
+"""Other relations, and signs with two values: a statement with one outside all brackets is not graded."""
+TWO_VALUED = re.compile(r"\\(?:pm|mp)(?![A-Za-z])")
+CONNECTIVES = re.compile(
     r"\\(?:Rightarrow|implies|iff|Leftrightarrow|therefore|Longrightarrow|because|land|wedge|and)(?![A-Za-z])"
 )
+"""Logical signs between two statements: implication, equivalence, therefore, because, and."""
 WORDS = re.compile(
     r"\\(?:text|textrm|mbox|textit|textbf|intertext|shortintertext|textnormal)\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
 )
@@ -43,11 +46,11 @@ STARTS = re.compile(
     rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast)(?![A-Za-z])"
     rf"|\\bigr|\\Bigr|\\biggr|\\Biggr|{EQUAL.pattern})"
 )
-"""How a row begins that goes on with the formula of the row before."""
+"""Beginning of a row that continues the formula of the row before."""
 
 STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:{EQUAL.pattern})")
 ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
-"""How a row ends whose formula the next row goes on with."""
+"""End of a row whose formula the next row continues."""
 
 BRACKET = re.compile(
     r"\\begin\s*\{(?P<begin>\w+)\*?\}|\\end\s*\{(?P<end>\w+)\*?\}"
@@ -57,7 +60,8 @@ BRACKET = re.compile(
 OPENING, CLOSING = ("(", "[", "{", r"\{"), (")", "]", "}", r"\}")
 
 SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
-UNIT = re.compile(r"(?:[/ .*]*(?:kg|m|s|N|J|W|rad|cm|mm|g|deg|Nm)(?:\^?-?\d)?)+", re.ASCII)
+UNIT = re.compile(r"(?:[/ .*]*+(?>kg|mm|cm|Nm|rad|deg|[msNJWg])(?:\^?-?\d)?+)++", re.ASCII)
+"""A unit such as kg m^2 or N m/rad. Groups are atomic: "mm" reads two ways, and all of them take exponential time."""
 PROSE_WORDS = word_set("and or for if as so let we now is at on in by of to the not all are")
 
 DOUBTFUL = re.compile(
@@ -72,21 +76,23 @@ DOUBTFUL = re.compile(
 PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
 
 MAX_ENDING = 200
-"""Length of the end of a row in which marks of its end are looked for, in characters."""
+"""Number of characters at the end of a row that are searched for an operator or punctuation: bounds the time."""
 
 
 def latex_statements(text: str, line: int) -> Iterator[Statement]:
-    """Yield the statements of one display: rows that go on belong together.
+    """Yield the statements of one display; a row that continues the formula of the row before is joined to it.
 
     Parameters
     ----------
     text
         The inside of a display, environments included, without comments.
     line
-        Its first line, from 1.
+        Line number of the display's first line in the document, from 1.
     """
     held: list[Row] = []
-    same: list[Statement] = []  # begun in the row in which what is held begins
+    # Finished statements of the current row of the display; they are yielded together, since a later row may make them
+    # ambiguous.
+    row_statements: list[Statement] = []
     problem, depth, is_new_row = "", 0, True
     for row in rows_of(text, line):
         is_new_row = is_new_row or row.is_first
@@ -99,7 +105,7 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
             problem = "a row that begins with a sign and has an = of its own"
         if goes_on and held[0].column > row.column:
             problem = "a row that may go on with either of two equations"
-            same = [replace(statement, problem=statement.problem or problem) for statement in same]
+            row_statements = [replace(statement, problem=statement.problem or problem) for statement in row_statements]
         if held and not goes_on:
             is_aside = _ends_statement(held[-1].text) and bool(_places(plain, OTHER_RELATIONS))
             if not has_relation(plain) and not is_aside:
@@ -107,17 +113,17 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
             else:
                 statements = _statements_of_rows(held, problem)
                 if is_new_row:
-                    yield from same
+                    yield from row_statements
                     yield from statements
-                    same = []
+                    row_statements = []
                 else:
-                    same += statements
+                    row_statements += statements
                 held, problem, depth = [], "", 0
         held.append(row)
         depth += sum(map(_nesting, BRACKET.finditer(plain)))
         is_new_row = False
     if held:
-        yield from same
+        yield from row_statements
         yield from _statements_of_rows(held, problem)
 
 
@@ -185,11 +191,12 @@ def _bare(text: str) -> str:
 
 
 def _goes_on(last: str, depth: int, row: Row) -> bool:
-    """Whether a row goes on with the formula of the row before, which ends inside brackets of some depth."""
-    is_statement = re.search(r"[A-Za-z\d]", row.before) is not None or row.before.isspace()
+    """Whether a row continues the formula of the row before, ``last``, at whose end ``depth`` brackets are open."""
+    # Text, or an empty cell of a later pair of columns, before the &.
+    has_own_left_side = re.search(r"[A-Za-z\d]", row.before) is not None or row.before.isspace()
     if STARTS_WITH_RELATION.match(row.text):
         return True
-    if STARTS.match(row.text) and not (is_statement and has_relation(row.text)):
+    if STARTS.match(row.text) and not (has_own_left_side and has_relation(row.text)):
         return True
     return depth > 0 or ENDS.search(last[-MAX_ENDING:]) is not None
 
@@ -234,7 +241,7 @@ def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
 
 
 def has_relation(text: str) -> bool:
-    """Whether an = stands in a text outside all brackets."""
+    r"""Whether a sign of equality (=, :=, \equiv, \approx ...) stands outside all brackets of a text."""
     return bool(_places(text, EQUAL))
 
 
@@ -245,10 +252,10 @@ def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
     """Return the statements of rows that belong together: separated by words, arrows, and commas between equations."""
     line, text = rows[0].line, re.sub(r"\s+", " ", " ".join(row.text for row in rows))
     statements: list[Statement] = []
-    words = "words, or an arrow, and something of a formula that is no equation: "
-    refused = 0  # statements that have a problem for what follows them
-    alone = ""  # what stands alone in front of words
-    for part in _split(text, _places(text, THEREFORE)):
+    words = "words or an arrow next to a part of a formula that is no equation: "
+    refused = 0  # number of statements already refused because a part that is no equation follows them
+    alone = ""  # the part before a connective if it is no equation: the next statement is refused because of it
+    for part in _split(text, _places(text, CONNECTIVES)):
         bare_part = _bare(part)
         if not bare_part:
             continue
@@ -264,7 +271,7 @@ def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
 
 
 def _equations(text: str) -> list[str]:
-    """Return the equations that commas separate."""
+    """Return the equations that commas or semicolons separate; other pieces stay with the equation before them."""
     first, *parts = _split(text, _places(text, re.compile(r"(?<!\\)[,;]")))
     equations = [first]
     for part in parts:
@@ -287,6 +294,8 @@ def _statement(text: str, line: int, problem: str) -> Statement:
         problem = "brackets that do not close"
     if not problem and doubtful:
         problem = f"text that may change what is stated: {doubtful[0][:60]}"
+    if len(sides) > 1 and not problem and (signs := _places(text, TWO_VALUED)):
+        problem = f"a sign {text[slice(*signs[0])]}, which stands for two values"
     if len(sides) > 1 and not problem and _places(text, OTHER_RELATIONS):
         problem = "another relation than ="
     if len(sides) > 1 and not problem and not all(sides):
