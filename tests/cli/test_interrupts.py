@@ -10,6 +10,7 @@ PLANNING = """
 import os, signal, sys, threading
 from dhkit import Arm
 arm = Arm.load("puma560")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore it
 try:
     threading.Timer(float(sys.argv[1]), lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     arm.plan("ready", "nominal", intervals=96)
@@ -23,6 +24,7 @@ except KeyboardInterrupt:
 COMMAND = """
 import os, signal, sys, threading
 from dhkit.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore it
 timer = threading.Timer(float(sys.argv[1]), lambda: os.kill(os.getpid(), signal.SIGINT))
 timer.daemon = True
 timer.start()
