@@ -191,5 +191,4 @@ def world_to_tool(description: Description, q: ArrayLike) -> Array:
     q
         Joint values, shape (..., n), rad and m.
     """
-    tool: Array = world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool
-    return tool
+    return world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool

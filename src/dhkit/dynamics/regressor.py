@@ -80,8 +80,7 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
 
 def _relative_acceleration(omega: Array, rate: Array, lever: Array) -> Array:
     """Return the acceleration of a point of a link relative to another, which is at -``lever`` from it."""
-    swung: Array = np.cross(rate, lever) + np.cross(omega, np.cross(omega, lever))
-    return swung
+    return np.cross(rate, lever) + np.cross(omega, np.cross(omega, lever))
 
 
 def _force_and_moment(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:

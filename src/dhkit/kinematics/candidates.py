@@ -79,8 +79,7 @@ def orthonormal(T: Array) -> Array:
 def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
     """Return joint values q (..., n), rad and m, with angles of the marked joints (n,) reduced to (-pi, pi]."""
     inside = (q > -np.pi) & (q <= np.pi)
-    wound: Array = np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
-    return wound
+    return np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
 
 
 def _outside(description: Description, q: Array) -> NDArray[np.bool_]:

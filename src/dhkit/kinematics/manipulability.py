@@ -234,5 +234,4 @@ def _volume(J: Array, rank: int) -> Array:
             continue
         for k in range(j + 1, n):
             squares += np.sum(normal * columns[k], axis=-1) ** 2
-    volume: Array = np.sqrt(squares)
-    return volume
+    return np.sqrt(squares)

@@ -49,8 +49,7 @@ class Newton:
     @property
     def endless(self) -> NDArray[np.bool_]:
         """Whether a joint's range is at least 2 pi rad, so that it never stops at a limit, shape (n,)."""
-        endless: NDArray[np.bool_] = ~self.description.numbers.prismatic & (self.upper - self.lower >= math.tau)
-        return endless
+        return ~self.description.numbers.prismatic & (self.upper - self.lower >= math.tau)
 
     @property
     def middle(self) -> Array:

@@ -199,8 +199,7 @@ class Search:
         gaps = np.sum(theirs**2, axis=1) - 2 * self._coordinates(goals) @ theirs.T
         nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
         order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
-        starts: Array = q[np.take_along_axis(nearest, order, axis=1)]
-        return starts
+        return q[np.take_along_axis(nearest, order, axis=1)]
 
     def _coordinates(self, poses: Array) -> Array:
         """Return points (N, 12) with about the distances of poses (N, 16): lengths over the reach, angles."""

@@ -89,8 +89,7 @@ class IKSolutions:
     @property
     def status(self) -> NDArray[np.str_]:
         """Names of the status of the poses, without unit, shape (...): ok, singular, out_of_reach or not_a_pose."""
-        names: NDArray[np.str_] = np.array([status.name for status in IKStatus])[self.status_code]
-        return names
+        return np.array([status.name for status in IKStatus])[self.status_code]
 
     @property
     def allowed(self) -> NDArray[np.bool_]:

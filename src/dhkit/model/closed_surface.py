@@ -115,8 +115,7 @@ def _digest(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Return well mixed 64-bit digests (the finalizer of splitmix64: Steele, Lea, Flood 2014)."""
     mixed = (keys ^ (keys >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    digest: NDArray[np.uint64] = mixed ^ (mixed >> np.uint64(31))
-    return digest
+    return mixed ^ (mixed >> np.uint64(31))
 
 
 def signed_volume(mesh: TriangleMesh) -> float:

@@ -29,8 +29,7 @@ def binary_corners(content: bytes) -> Array:
     """
     if len(content) < HEADER_LENGTH or (len(content) - HEADER_LENGTH) % FACET.itemsize:
         raise ModelError(f"{len(content)} bytes; expected a header of {HEADER_LENGTH} and facets of {FACET.itemsize}")
-    corners: Array = np.frombuffer(content, dtype=FACET, offset=HEADER_LENGTH)["corners"].astype(np.float64)
-    return corners
+    return np.frombuffer(content, dtype=FACET, offset=HEADER_LENGTH)["corners"].astype(np.float64)
 
 
 def ascii_corners(content: bytes) -> Array:

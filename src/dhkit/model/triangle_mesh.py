@@ -47,8 +47,7 @@ class TriangleMesh:
     @property
     def corners(self) -> Array:
         """The three vertices of each triangle, shape (m, 3, 3), in the unit of the vertices."""
-        corners: Array = self.vertices[self.faces]
-        return corners
+        return self.vertices[self.faces]
 
     def corners_about(self, origin: Array) -> tuple[Array, Array, Array]:
         """Return the first, second and third vertices of all triangles relative to an origin, shape (3,).
@@ -132,8 +131,7 @@ def area_vectors(corners: Array) -> Array:
 
     Shape (m, 3), in the squared unit of the corners, such as m^2.
     """
-    vectors: Array = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return vectors
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def unit_normals(corners: Array) -> Array:

@@ -153,8 +153,7 @@ class _Follower:
 
     def _jacobian(self, q: Array) -> Array:
         """Return Jacobians, shape (N, size, n), lengths over the reach."""
-        J: Array = self._rows * jacobian(self.newton.description, q)[:, : self.newton.size] * self.newton.units
-        return J
+        return self._rows * jacobian(self.newton.description, q)[:, : self.newton.size] * self.newton.units
 
     def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return joint values on the path, (N, n), from nearby ones q, and whether each was reached without a jump."""

@@ -47,8 +47,7 @@ class PinocchioResults:
 
         M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
         upper = np.triu(M)
-        symmetric: Array = upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill only the upper triangle
-        return symmetric
+        return upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill only the upper triangle
 
     def coriolis_matrix(self) -> Array:
         """Return Coriolis matrices C(q, qd) of Christoffel symbols, shape (N, n, n); C qd is in N m and N."""

@@ -155,8 +155,7 @@ def _product(parts: Consistency, *links: Elements) -> Elements:
     T = parts.truth.kinematics.base
     for A in links:
         T = T @ A
-    pose: Elements = T @ parts.truth.kinematics.tool
-    return pose
+    return T @ parts.truth.kinematics.tool
 
 
 def _jacobian(parts: Consistency, T: Elements) -> Elements:

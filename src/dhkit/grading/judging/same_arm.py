@@ -46,8 +46,7 @@ class Overlay:
     def differences(self) -> Array:
         """Poses of the answer's frames in the truth's, shape (n + 1, 4, 4), m."""
         own = self.truth.frames(self.offsets)
-        D: Array = np.linalg.inv(own) @ self.B @ self.answer.frames(np.zeros(self.answer.n))
-        return D
+        return np.linalg.inv(own) @ self.B @ self.answer.frames(np.zeros(self.answer.n))
 
     def holds(self) -> bool:
         """Whether both arms move alike at joint values that were not used to find the relation."""
@@ -113,8 +112,7 @@ class Overlay:
 def _free(answer: TableArm, truth: TableArm) -> NDArray[np.bool_]:
     """Return which joints may have another zero, shape (n,): all but sliding ones that keep the file's own d."""
     slides = np.array([kind != "R" for kind in truth.kinds])
-    free: NDArray[np.bool_] = ~slides | (np.abs(answer.entries[:, 1] - truth.entries[:, 1]) > SAME)
-    return free
+    return ~slides | (np.abs(answer.entries[:, 1] - truth.entries[:, 1]) > SAME)
 
 
 def overlaid(answer: TableArm, truth: TableArm, strict: bool) -> Overlay | None:
@@ -310,8 +308,7 @@ def _joint_travel(screw: Array, start: Array, end: Array, scale: float) -> float
 
 def _perpendicular_part(axis: Array, vector: Array) -> Array:
     """Return the part of a vector at right angles to a unit axis, shape (3,)."""
-    part: Array = vector - (axis @ vector) * axis
-    return part
+    return vector - (axis @ vector) * axis
 
 
 def _invariants(screws: Array) -> Array:

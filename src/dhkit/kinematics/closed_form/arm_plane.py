@@ -63,8 +63,7 @@ class ArmPlane:
 
     def coordinates(self, point: Array) -> Array:
         """Return the coordinates (x, u, v) of a point of the world, shape (3,), m."""
-        place: Array = self.R @ (point - self.origin)
-        return place
+        return self.R @ (point - self.origin)
 
     @property
     def T(self) -> Array:

@@ -52,8 +52,7 @@ def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
     import casadi
 
     qd = casadi.SX.sym("qd", table.n)
-    M: casadi.SX = casadi.hessian(kinetic_energy(table, q, qd), qd)[0]
-    return M
+    return casadi.hessian(kinetic_energy(table, q, qd), qd)[0]
 
 
 def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
@@ -66,23 +65,20 @@ def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) 
     M = lagrange_mass_matrix(table, q)
     rate = casadi.reshape(casadi.jtimes(casadi.vec(M), q, qd), table.n, table.n)
     A = casadi.jacobian(M @ qd, q)
-    C: casadi.SX = (rate + A - A.T) / 2
-    return C
+    return (rate + A - A.T) / 2
 
 
 def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
     """Return g = dV/dq, n x 1, N m and N."""
     import casadi
 
-    g: casadi.SX = casadi.gradient(potential_energy(table, q), q)
-    return g
+    return casadi.gradient(potential_energy(table, q), q)
 
 
 def lagrange_inverse_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
     """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices."""
     M, C = lagrange_mass_matrix(table, q), lagrange_coriolis_matrix(table, q, qd)
-    tau: casadi.SX = M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
-    return tau
+    return M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
 
 
 def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
@@ -92,5 +88,4 @@ def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casa
     L = kinetic_energy(table, q, qd) - potential_energy(table, q)
     momentum = casadi.gradient(L, qd)
     along = casadi.vertcat(qd, qdd)
-    tau: casadi.SX = casadi.jtimes(momentum, casadi.vertcat(q, qd), along) - casadi.gradient(L, q)
-    return tau
+    return casadi.jtimes(momentum, casadi.vertcat(q, qd), along) - casadi.gradient(L, q)

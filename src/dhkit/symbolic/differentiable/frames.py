@@ -159,8 +159,7 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
     if frame == "world":
         return J
     R_tool_world = tool[:3, :3].T
-    resolved: casadi.SX = casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
-    return resolved
+    return casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
 
 
 def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:

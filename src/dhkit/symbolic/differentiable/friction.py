@@ -83,5 +83,4 @@ def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> ca
         positive, negative = parameters[n + 2 * i], parameters[n + 2 * i + 1]
         dry = (positive - negative) / 2 * s + (positive + negative) / 2 * (s * s)
         torques.append(parameters[i] * speed + dry)
-    stacked: casadi.SX = casadi.vertcat(*torques)
-    return stacked
+    return casadi.vertcat(*torques)

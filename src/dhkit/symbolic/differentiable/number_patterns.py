@@ -50,8 +50,7 @@ class NumberPattern:
     @property
     def parameters(self) -> Array:
         """Values of the symbols, shape (arms, symbols), in SI units."""
-        values: Array = self.numbers[:, self.is_symbol]
-        return values
+        return self.numbers[:, self.is_symbol]
 
     def entries(self) -> tuple[list[Any], casadi.SX]:
         """Return the N entries of an expression (constants and symbols), and the symbols (symbols x 1, SI units)."""

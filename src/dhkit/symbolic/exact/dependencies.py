@@ -97,8 +97,7 @@ class _Regressor:
 
     def column(self, name: str) -> Array:
         """Return a parameter's column of :attr:`numbers`, shape (rows,)."""
-        column: Array = self.numbers[:, self.names.index(name)]
-        return column
+        return self.numbers[:, self.names.index(name)]
 
     def grouping(self, name: str, kept: Sequence[str]) -> dict[str, Element]:
         """Return the exact factors with which a dependent parameter is added to earlier ones.
