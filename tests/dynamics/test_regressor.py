@@ -15,7 +15,7 @@ from dhkit.model import pinocchio_model
 from dhkit.symbolic import lagrangian
 from dhkit.symbolic.exact.regressor import regressor as exact_regressor
 from dhkit.verification.measure import relative_error
-from dhkit.verification.reference import Reference
+from dhkit.verification.reference import PinocchioResults
 from dhkit.verification.states import random_motions
 from random_arms import arms
 
@@ -27,7 +27,7 @@ def test_torques_are_linear_in_the_parameters(law, description):
     tau = Y @ inertial_parameters(description) + description.numbers.armature * motion.qdd
     size = np.einsum("nij,j->ni", np.abs(Y), np.abs(inertial_parameters(description))).max()
     assert np.abs(tau - inverse_dynamics(description, *motion)).max() <= 1e-12 * size
-    reference = Reference(pinocchio_model(description), motion).regressor()
+    reference = PinocchioResults(pinocchio_model(description), motion).regressor()
     falling = float(np.linalg.norm(description.numbers.gravity))
     law.holds("regressor against Pinocchio's", float(relative_error(Y, reference, falling).max()), 1e-12)
 
