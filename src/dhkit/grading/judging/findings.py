@@ -316,13 +316,16 @@ def _first_difference(
         try:
             for constant in constants if k % STATES_PER_SET == 0 else ():
                 enclosed(constant, nodes, state.names, sampling.MIN_SIZE)
-            tolerance = sampling.TOLERANCE / 10 * max(abs(right), sampling.MIN_SIZE)
+            # The error of the state that sets the zero is that of all states after it, however small their values.
+            sets_zero = by.up_to_constant and k % STATES_PER_SET == 0
+            size = sampling.MIN_SIZE if sets_zero else max(abs(right), sampling.MIN_SIZE)
+            tolerance = sampling.TOLERANCE / 10 * size
             value, digits = enclosed(tree, nodes, state.names, tolerance, relative=not by.up_to_constant)
         except (TooLargeError, LostDigitsError):
             raise
         except AnswerError as error:
             return differs(state, None, right, f"{error} there")
-        if by.up_to_constant and k % STATES_PER_SET == 0:
+        if sets_zero:
             shift = value - right
         if sampling.differ(value - shift, right):
             return differs(state, value - shift, right, f"outside the exact ring ({reason})")
