@@ -35,7 +35,7 @@ from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
 from dhkit.planning.search import PlannedMotion, Program, Search, coarser
-from dhkit.planning.solver import ProgressCall
+from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curve_for
 from dhkit.symbolic import Friction
@@ -253,6 +253,7 @@ class Planner:
 
     # Programs
 
+    @delayed_interrupts()
     def program(self, task: PlanTask, intervals: int | None = None) -> tuple[Program, float]:
         """Return the program for a task, and the time for building it now, s."""
         intervals = self.intervals_for(task) if intervals is None else intervals

@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -83,11 +84,8 @@ class Solver:
             "show_eval_warnings": False,
             "ipopt": {**OPTIONS, "tol": tolerance},
         }
-        with _KeptInterrupt() as interrupt:
-            options["iteration_callback"] = self._watch = _watch(nx, ng, np_, legs)
-            self._function = casadi.nlpsol("plan", "ipopt", program, options)
-        if interrupt.raised is not None:
-            raise interrupt.raised
+        options["iteration_callback"] = self._watch = _watch(nx, ng, np_, legs)
+        self._function = casadi.nlpsol("plan", "ipopt", program, options)
         self._turn = threading.Lock()
 
     def __call__(
@@ -111,15 +109,14 @@ class Solver:
         Stopped
             The deadline has passed.
         """
-        with self._turn:
-            with _KeptInterrupt() as interrupt:
-                self._watch.begin(g_bounds, deadline, progress, interrupt)
-                found = self._function(
-                    x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
-                )
-                raised = self._watch.end()
+        with self._turn, delayed_interrupts() as interrupts:
+            self._watch.begin(g_bounds, deadline, progress, interrupts)
+            found = self._function(
+                x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
+            )
+            raised = self._watch.end()
             stats = self._function.stats()
-        if raised := interrupt.raised or raised:
+        if raised is not None:
             raise raised
         x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
         misses = max(_outside(x, *x_bounds), _outside(g, *g_bounds))
@@ -127,28 +124,32 @@ class Solver:
         return Solution(x, g, success, status, iterations, misses, float(found["f"]))
 
 
-class _KeptInterrupt:
-    """Delays KeyboardInterrupt until CasADi returns: raised during a callback or an evaluation, it would be lost."""
+@contextmanager
+def delayed_interrupts() -> Iterator[list[BaseException]]:
+    """Delay KeyboardInterrupt until the end of the block; the block can look at the list of those that arrived.
 
-    raised: BaseException | None = None
+    CasADi discards exceptions: those in callbacks, and those in the properties of its Python classes, which its
+    operators read. A KeyboardInterrupt that is raised there is lost.
+    """
+    arrived: list[BaseException] = []
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield arrived
+        return
 
-    def __enter__(self) -> _KeptInterrupt:
-        self._handler = signal.getsignal(signal.SIGINT)
-        self._takes_turn = threading.current_thread() is threading.main_thread() and callable(self._handler)
-        if self._takes_turn:
-            signal.signal(signal.SIGINT, self._keep)
-        return self
-
-    def __exit__(self, *about: object) -> None:
-        if self._takes_turn:
-            signal.signal(signal.SIGINT, self._handler)
-
-    def _keep(self, number: int, frame: FrameType | None) -> None:
+    def keep(number: int, frame: FrameType | None) -> None:
         try:
-            if callable(self._handler):
-                self._handler(number, frame)
+            handler(number, frame)
         except BaseException as error:
-            self.raised = error
+            arrived.append(error)
+
+    signal.signal(signal.SIGINT, keep)
+    try:
+        yield arrived
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if arrived:
+            raise arrived[0]
 
 
 def _outside(values: Array, low: Array, high: Array) -> float:
@@ -172,9 +173,9 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             bounds: tuple[Array, Array],
             deadline: float,
             progress: ProgressCall | None,
-            interrupt: _KeptInterrupt,
+            interrupts: list[BaseException],
         ) -> None:
-            self.bounds, self.deadline, self.progress, self.interrupt = bounds, deadline, progress, interrupt
+            self.bounds, self.deadline, self.progress, self.interrupts = bounds, deadline, progress, interrupts
             self.started, self.iteration, self.raised = time.perf_counter(), 0, None
 
         def end(self) -> BaseException | None:
@@ -197,7 +198,7 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             try:
                 if now > self.deadline:
                     raise Stopped
-                if self.interrupt.raised is not None:
+                if self.interrupts:
                     return [1]
                 if self.progress is not None:
                     values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))

@@ -14,7 +14,7 @@ from dhkit.planning.along.path_states import PathStates
 from dhkit.planning.along.rows import TimingRows
 from dhkit.planning.along.terms import Terms
 from dhkit.planning.objectives import Time
-from dhkit.planning.solver import Solver
+from dhkit.planning.solver import Solver, delayed_interrupts
 
 MIN_SQUARED_SPEED = 1e-7
 """Smallest b at inner knots, relative to about the path's mean: Ipopt relaxes bounds by a tenth of it."""
@@ -85,6 +85,7 @@ class TimingProgram:
 
 
 @lru_cache(maxsize=16)
+@delayed_interrupts()
 def timing_program(intervals: int, rows: int, terms: Terms | None) -> TimingProgram:
     """Return the program of these sizes, built on first use."""
     return TimingProgram(intervals, rows, terms)
