@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Json
+from dhkit.cli.options import Json, Seed
 from dhkit.cli.output import print_json, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
@@ -28,7 +28,7 @@ def bench(
     batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of items of a batch.")] = 100_000,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Number of threads that batch calls may use.")] = 1,
     repeats: Annotated[int, typer.Option(min=1, max=1000, help="Number of interleaved rounds.")] = 9,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    seed: Seed = 0,
     probes: Annotated[bool, typer.Option(help="Measure thread scaling, memory and first calls too.")] = True,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
     json: Json = False,

@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.arguments import OutsideLimits, option_values, target, with_long_options
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Degrees, Json, Robot
+from dhkit.cli.options import Degrees, EulerAngles, EulerOrder, Json, Robot
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
@@ -108,10 +108,8 @@ class ReachedPose:
 def ik(
     robot: Robot,
     xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
-    euler: Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")] = "0 0 0",
-    order: Annotated[
-        str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
-    ] = "XYZ",
+    euler: EulerAngles = "0 0 0",
+    order: EulerOrder = "XYZ",
     matrix: Annotated[
         str | None, typer.Option(metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them.")
     ] = None,

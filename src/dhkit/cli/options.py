@@ -35,6 +35,11 @@ Columns = Annotated[
         "--columns", metavar="OURS=THEIRS ...", help='Columns of a file of another program, such as "t=tout q=yout".'
     ),
 ]
+EulerAngles = Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")]
+EulerOrder = Annotated[
+    str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the random states.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 

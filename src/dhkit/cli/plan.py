@@ -22,7 +22,7 @@ from dhkit.cli.arguments import (
     with_long_options,
 )
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Degrees, Json, Robot, Uniform, load_arm
+from dhkit.cli.options import Degrees, EulerAngles, EulerOrder, Json, Robot, Uniform, load_arm
 from dhkit.cli.output import MotionFiles, print_json, print_table, say, say_written
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
@@ -60,10 +60,8 @@ def plan(
         str | None, typer.Option(metavar="Q ...", help="Joint values at the goal, or the name of a configuration.")
     ] = None,
     xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Tool position at the goal, m.")] = None,
-    euler: Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")] = "0 0 0",
-    order: Annotated[
-        str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
-    ] = "XYZ",
+    euler: EulerAngles = "0 0 0",
+    order: EulerOrder = "XYZ",
     matrix: Annotated[
         str | None,
         typer.Option(metavar="M11 ... M44", help="Tool pose at the goal by row, 16 or 12 numbers; or a file of them."),

@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
-from dhkit.cli.options import Json, Robot, Uniform, load_arm
+from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
@@ -27,7 +27,7 @@ app = typer.Typer(rich_markup_mode=None)
 def verify(
     robot: Robot,
     samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of random states.")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    seed: Seed = 0,
     urdf: Annotated[str | None, typer.Option(help="A URDF to compare with the robot's table.")] = None,
     base: Annotated[str | None, typer.Option(help="Link of that URDF that is the world; default: the root.")] = None,
     tip: Annotated[

@@ -10,7 +10,7 @@ import typer
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
-from dhkit.cli.options import Json, Robot
+from dhkit.cli.options import Json, Robot, Seed
 from dhkit.cli.output import output_folder, print_json, print_table, say, say_written, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
@@ -30,7 +30,7 @@ app = typer.Typer(rich_markup_mode=None)
 def workspace(
     robot: Robot,
     samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of random states.")] = 100_000,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    seed: Seed = 0,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")] = None,
     json: Json = False,
 ) -> None:
