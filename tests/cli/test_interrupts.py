@@ -3,8 +3,12 @@
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
+
+from dhkit.cli import _reliable_interrupts
+from dhkit.planning.solver import delayed_interrupts
 
 PLANNING = """
 import os, signal, sys, threading
@@ -55,3 +59,40 @@ def test_planning_is_interrupted_while_programs_are_made_and_solved(seconds):
         [sys.executable, "-c", PLANNING, str(seconds)], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.stdout == "interrupted\n", done.stderr
+
+
+@pytest.fixture
+def interrupted_in_casadi():
+    """Return a function that gets SIGINT in a frame of CasADi's module, which discards exceptions."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    space = {"__name__": "casadi.casadi", "call": lambda: None, "signal": signal}
+    exec("def interrupted():\n    signal.raise_signal(signal.SIGINT)\n    call()", space)
+    yield space["interrupted"]
+    signal.signal(signal.SIGINT, before)
+
+
+def wait(seconds):
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        pass
+
+
+def test_an_interrupt_is_raised_where_casadi_does_not_discard_it(interrupted_in_casadi):
+    with _reliable_interrupts():
+        interrupted_in_casadi()
+        with pytest.raises(KeyboardInterrupt):
+            wait(2.0)
+
+
+@pytest.mark.parametrize("begin_inside", [True, False])
+def test_an_interrupt_waits_for_the_end_of_a_solution(interrupted_in_casadi, begin_inside):
+    passed = []
+    with _reliable_interrupts(), pytest.raises(KeyboardInterrupt):
+        if not begin_inside:
+            interrupted_in_casadi()
+        with delayed_interrupts() as arrived:
+            if begin_inside:
+                interrupted_in_casadi()
+            wait(0.05)
+            passed.append(len(arrived))
+    assert passed == [1]

@@ -49,13 +49,19 @@ def _reliable_interrupts() -> Iterator[None]:
         else:
             signal.default_int_handler(number, frame)
 
-    handlers = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGALRM)}
+    def retry(number: int, frame: FrameType | None) -> None:
+        handler = signal.getsignal(signal.SIGINT)  # planning replaces it while CasADi's solver runs
+        if callable(handler):
+            handler(signal.SIGINT, frame)
+
+    signal.signal(signal.SIGINT, interrupt)
+    before = signal.signal(signal.SIGALRM, retry)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+        signal.signal(signal.SIGALRM, before)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _discards_exceptions(frame: FrameType | None) -> bool:

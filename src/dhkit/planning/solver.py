@@ -139,7 +139,7 @@ def delayed_interrupts() -> Iterator[list[BaseException]]:
 
     def keep(number: int, frame: FrameType | None) -> None:
         try:
-            handler(number, frame)
+            handler(number, None)  # without the frame: wherever it is, what the handler raises is not lost
         except BaseException as error:
             arrived.append(error)
 
