@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -42,13 +43,13 @@ def check_urdf() -> str:
 @pytest.fixture
 def compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every batch, single states too, is computed by compiled kernels."""
-    monkeypatch.setenv("DHKIT_KERNELS", "on")
+    monkeypatch.setattr(import_module("dhkit.kernels.kernel"), "kernel_mode", lambda: "on")
 
 
 @pytest.fixture
 def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every batch is computed by CasADi's virtual machine."""
-    monkeypatch.setenv("DHKIT_KERNELS", "off")
+    monkeypatch.setattr(import_module("dhkit.kernels.kernel"), "kernel_mode", lambda: "off")
 
 
 def require(program: str, hint: str) -> str:

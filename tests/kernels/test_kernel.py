@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from functools import partial
+from importlib import import_module
 
 import casadi
 import numpy as np
@@ -17,7 +18,7 @@ import dhkit
 from dhkit.description import library_robot, robots, world_to_tool
 from dhkit.errors import DhkitError
 from dhkit.kernels import Kernel, kernel, machine_code
-from dhkit.kernels.kernel import COMPILE_AFTER, MIN_ITEMS_PER_THREAD, SMALL_BATCH
+from dhkit.kernels.kernel import COMPILE_AFTER, MIN_ITEMS_PER_THREAD, SMALL_BATCH, kernel_mode
 from dhkit.kernels.llvm_source import BLOCK, llvm_source
 from dhkit.kernels.threads import all_in_threads, in_threads
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, jacobian
@@ -47,6 +48,12 @@ def run_product(run, x, threads=1):
     return y[:, 0], bits[:, 0]
 
 
+def set_mode(monkeypatch, mode):
+    """Set the mode, which a process reads from the environment once."""
+    # dhkit.kernels.kernel is the function of this name, not its module.
+    monkeypatch.setattr(import_module("dhkit.kernels.kernel"), "kernel_mode", lambda: mode)
+
+
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     """An empty cache, in each mode that a test does not choose itself."""
@@ -56,7 +63,7 @@ def cache(tmp_path, monkeypatch):
 @pytest.mark.parametrize("mode", ["auto", "on", "off"])
 @pytest.mark.parametrize("count", [0, 1, 7, 16, 17, 63, 64, 65, 100, 200, 2 * MIN_ITEMS_PER_THREAD + 5])
 def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkeypatch):
-    monkeypatch.setenv("DHKIT_KERNELS", mode)
+    set_mode(monkeypatch, mode)
     x = np.random.default_rng(count).normal(size=(count, 3))
     run = product_kernel()
     for threads in (1, 2, 5):
@@ -69,7 +76,7 @@ def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkey
 @pytest.mark.parametrize("mode", ["on", "off"])
 def test_nothing_is_written_beside_the_results(mode, monkeypatch):
     """Machine code trusts its pointers: what lies before and behind a result keeps its value, of no items too."""
-    monkeypatch.setenv("DHKIT_KERNELS", mode)
+    set_mode(monkeypatch, mode)
     run = product_kernel()
     for count in (*range(140), 1000):
         x = np.random.default_rng(count).normal(size=(count, 3))
@@ -123,16 +130,17 @@ def test_a_large_batch_is_compiled_for_at_once():
 
 def test_on_and_off(monkeypatch):
     run = product_kernel()
-    monkeypatch.setenv("DHKIT_KERNELS", "off")
+    set_mode(monkeypatch, "off")
     run_product(run, np.ones((COMPILE_AFTER, 3)))
     assert not is_compiled(run)
-    monkeypatch.setenv("DHKIT_KERNELS", "on")
+    set_mode(monkeypatch, "on")
     run_product(run, np.ones((1, 3)))
     assert is_compiled(run)
 
 
 def test_another_mode_is_refused(monkeypatch):
     monkeypatch.setenv("DHKIT_KERNELS", "fast")
+    kernel_mode.cache_clear()
     with pytest.raises(DhkitError, match="DHKIT_KERNELS is 'fast'; expected auto, on or off"):
         dhkit.Arm.load("planar2r").fk([0, 0])
 
@@ -144,7 +152,7 @@ def test_an_arm_compiles_all_it_has(name, monkeypatch):
     arm = dhkit.Arm.load(name).with_base(np.diag([1.0, 1.0, 1.0, 1.0]))
     arm.compile(lambda done, total: seen.append((done, total)))
     assert seen == [(k + 1, len(seen)) for k in range(len(seen))]
-    monkeypatch.setenv("DHKIT_KERNELS", "on")
+    set_mode(monkeypatch, "on")
     monkeypatch.setattr(Kernel, "_program", lambda self: pytest.fail(f"{self.name} is derived"))
     q = np.zeros((2, arm.n))
     T = arm.fk(q)
@@ -178,7 +186,7 @@ def test_a_machine_that_cannot_compile_interprets(monkeypatch, caplog):
 def both(monkeypatch, call):
     results = []
     for mode in ("on", "off"):
-        monkeypatch.setenv("DHKIT_KERNELS", mode)
+        set_mode(monkeypatch, mode)
         results.append(call())
     return results
 
@@ -229,7 +237,7 @@ def test_tiers_give_the_same_inverse_kinematics_bit_for_bit(name, monkeypatch):
 @pytest.mark.parametrize("mode", ["on", "off"])
 @pytest.mark.parametrize("name", ["puma560", "panda"])
 def test_with_one_tier_a_batch_is_its_items_bit_for_bit(name, mode, monkeypatch):
-    monkeypatch.setenv("DHKIT_KERNELS", mode)
+    set_mode(monkeypatch, mode)
     arm = dhkit.Arm.load(name)
     q = states(arm.description, 200)
     for f, x in ((arm.fk, (q,)), (arm.jacobian, (q,)), (arm.inverse_dynamics, (q, q, q))):
@@ -310,7 +318,7 @@ def test_kinematics_agree_with_matrices_multiplied_in_numpy(compiled):
 @pytest.mark.parametrize("mode", ["auto", "on", "off"])
 @pytest.mark.parametrize("count", [1, 63])
 def test_a_signal_handler_that_calls_the_same_kernel_changes_nothing(count, mode, monkeypatch):
-    monkeypatch.setenv("DHKIT_KERNELS", mode)
+    set_mode(monkeypatch, mode)
     arm = dhkit.Arm.load("puma560")
     q = np.linspace(0.1, 0.6, 6) + np.zeros((count, 6))
     expected, calls = arm.fk(q), []

@@ -32,6 +32,7 @@ from dhkit.planning import (
     ToolSpeed,
     TorqueSpeedLine,
 )
+from dhkit.planning.certificate import Checker
 from dhkit.planning.constraints import Constraint
 from dhkit.trajectories import Limits
 from planning_reference import grids, slide, worst_excess
@@ -211,11 +212,49 @@ def test_a_constraint_of_ones_own_is_kept_and_certified():
         assert bool(constraints) == ("wall of the tool" in dict(motion.report.active_limits()))
 
 
-def test_a_constraint_with_bounds_that_no_certificate_checks_is_refused():
-    with pytest.raises(TypeError, match=r"Band: bounds are 0\.2 and 1; expected -inf or -1, and 1"):
+@pytest.mark.parametrize(
+    ("changed", "error", "message"),
+    [
+        ({"measured": lambda self, s, p: np.where(abs(s.qd) > 0.5, np.nan, s.qd)}, PlanningError, "is not a number at"),
+        ({"measured": lambda self, s, p: s.qd[:, 0]}, ValueError, r"shape \(288,\); expected \(288, k\)"),
+        ({"measured": lambda self, s, p: None}, TypeError, "Own.measured: found NoneType"),
+        ({"measured": lambda self, s, p: s.qd > 2}, TypeError, "Own.measured: found"),
+        ({"measured": lambda self, s, p: s.qd * 1j}, TypeError, "Own.measured: found complex numbers"),
+        ({"measured": Constraint.measured}, NotImplementedError, "Own has no method measured"),
+        ({"rows": lambda self, p, x: 5}, TypeError, r"Own.rows returned int; expected casadi.SX of shape \(k, 1\)"),
+        ({"rows": lambda self, p, x: p.qd.T}, TypeError, r"Own.rows returned \(1, 2\); expected"),
+        ({"what": Constraint.what}, NotImplementedError, "Own has no property what"),
+    ],
+)
+def test_a_constraint_of_ones_own_that_cannot_be_certified_is_refused(changed, error, message):
+    members = {
+        "what": "own",
+        "rows": lambda self, point, parameters: point.qd / 20,
+        "measured": lambda self, states, parameters: states.qd / 20,
+    }
+    own = type("Own", (Constraint,), members | changed)()
+    with pytest.raises(error, match=message):
+        Planner(library_robot("planar2r"), constraints=[own], intervals=12).solve([0, 0], [0.6, -0.5])
 
-        class Band(Wall):
-            low = 0.2
+
+def test_both_sides_of_a_constraint_are_certified():
+    class Rate(Constraint):
+        two_sided = True
+        what = "rate"
+
+        def rows(self, point, parameters):
+            return point.qd / 2
+
+        def measured(self, states, parameters):
+            return states.qd / 2
+
+    arm = library_robot("planar2r")
+    motion = Planner(arm, constraints=[Rate()], intervals=12).solve([0, 0], [0.6, -0.5])
+    limits = Limits.of(arm)
+    assert Checker(arm, limits, (Rate(),), (np.zeros(0),)).check(motion).ok
+    faster = motion.slowed(0.9)
+    checks = Checker(arm, limits, (Rate(),), (np.zeros(0),)).check(faster).checks
+    assert next(check.excess for check in checks if check.what == "rate") == pytest.approx(1 / 0.9 - 1, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -40,7 +40,8 @@ def fill(
     ValueError
         The batch axes do not broadcast, ``out`` has another shape, type or layout, or ``threads`` is below 1.
     """
-    check_whole("threads", threads, 1)
+    if threads != 1:
+        check_whole("threads", threads, 1)
     batch = _batch(states)
     result = result_array((*batch, *tail), out)
     if not result.size:
@@ -55,12 +56,11 @@ def fill(
 def _batch(states: Sequence[Array]) -> tuple[int, ...]:
     """Return the batch axes that all states broadcast to."""
     first = states[0].shape[:-1]
-    for state in states:
-        if state.shape[:-1] != first:
-            break
-    else:
+    if len(states) == 1:
         return first
     shapes = [state.shape[:-1] for state in states]
+    if shapes.count(first) == len(shapes):
+        return first
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:

@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -37,8 +38,9 @@ MAX_KERNELS = 2_048
 """Largest number of kernels that a process keeps; the oldest is dropped first."""
 
 
+@cache
 def kernel_mode() -> str:
-    """Return the value of ``DHKIT_KERNELS``: ``auto``, ``on`` (always compile) or ``off`` (never).
+    """Return the value of ``DHKIT_KERNELS`` at the first call: ``auto``, ``on`` (always compile) or ``off`` (never).
 
     Raises
     ------
@@ -115,8 +117,9 @@ class Kernel:
         mode = kernel_mode()
         if mode == "off":
             return None
-        counts = count >= SMALL_BATCH and not _uncounted.depth
-        if self._function is None and not self._failed and (mode == "on" or counts):
+        if self._function is not None or self._failed:
+            return self._function
+        if mode == "on" or (count >= SMALL_BATCH and not _uncounted.depth):
             self._items += count
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()

@@ -27,11 +27,11 @@ class Stage:
     def work(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Write the outputs (items, ...) of parameters (p,) and inputs (items, ...), in the units of the program."""
         self.parameters[...] = parameters
-        for staged, array in zip(self.inputs, inputs, strict=True):
-            staged[...] = array
+        for k, staged in enumerate(self.inputs):  # for single items, zip(strict=True) would take as long as a copy
+            staged[...] = inputs[k]
         self.run()
-        for array, staged in zip(outputs, self.outputs, strict=True):
-            array[...] = staged
+        for k, staged in enumerate(self.outputs):
+            outputs[k][...] = staged
 
 
 class Stages(threading.local):
@@ -46,11 +46,12 @@ class Stages(threading.local):
 
     def work(self, items: int, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
         """Compute ``items`` items; see :meth:`Stage.work`."""
-        stage = self._idle.pop(items, None) or self._made(items)
+        idle = self._idle
+        stage = idle.pop(items, None) or self._made(items)
         try:
             stage.work(parameters, inputs, outputs)
         finally:
-            self._idle[items] = stage
+            idle[items] = stage
 
 
 def aligned(size: int, alignment: int) -> Array:

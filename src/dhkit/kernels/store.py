@@ -20,7 +20,7 @@ from dhkit.kernels.machine_code import processor
 
 log = logging.getLogger(__name__)
 
-PACKAGES = ("description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
+PACKAGES = ("control", "description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
 """Packages of dhkit whose sources determine what a kernel computes."""
 VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""

@@ -192,8 +192,7 @@ class Checker:
         if np.isfinite(limits.torque).any():
             found.append(("torque", np.abs(states.tau) / limits.torque))
         for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
-            values = constraint.measured(states, parameters)
-            found.append((constraint.what, np.abs(values) if constraint.is_two_sided else values))
+            found.append((constraint.what, constraint.use(states, parameters)))
         if self.avoidance:
             short = self.avoidance.clearance - self.avoidance.gaps(self.description, states.q)
             found.append(("clearance", 1 + short[:, None] / max(self.description.reach, MIN_REACH)))

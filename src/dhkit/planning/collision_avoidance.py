@@ -30,8 +30,6 @@ class ClearanceConstraint(Constraint):
 
     slots: SceneSlots
     moving = False
-    low = 1.0
-    high = math.inf
 
     @property
     def what(self) -> str:
@@ -44,7 +42,7 @@ class ClearanceConstraint(Constraint):
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
         """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
-        return clearances(point.description, point.q, parameters, self.slots)
+        return 2 - clearances(point.description, point.q, parameters, self.slots)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ Pinocchio's kinematics and dynamics, for the certificate. Both are scaled so tha
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array, Description
 from dhkit.description.arrays import number_array
 from dhkit.display import value_line
+from dhkit.errors import PlanningError
 from dhkit.planning.point import Point
 from dhkit.planning.states import States
 
@@ -25,45 +25,65 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A quantity that must stay below 1, or between -1 and 1, in every state of a motion.
-
-    Raises
-    ------
-    TypeError
-        A subclass with other bounds: the certificate checks none.
-    """
+    """A quantity that must stay below 1, or between -1 and 1, in every state of a motion."""
 
     moving: ClassVar[bool] = True
     """Whether the quantity depends on velocity, so that a motion keeps the constraint if it is slow enough."""
-    low: ClassVar[float] = -math.inf
-    high: ClassVar[float] = 1.0
+    two_sided: ClassVar[bool] = False
+    """Whether the quantity must stay between -1 and 1, not only below 1."""
     needs_torque: ClassVar[bool] = False
-
-    def __init_subclass__(cls) -> None:
-        if cls.measured is not Constraint.measured and (cls.low, cls.high) not in ((-math.inf, 1.0), (-1.0, 1.0)):
-            raise TypeError(f"{cls.__name__}: bounds are {cls.low:g} and {cls.high:g}; expected -inf or -1, and 1")
-
-    @property
-    def is_two_sided(self) -> bool:
-        """Whether the bounds are -1 and 1, which margins tighten alike."""
-        return self.low == -self.high
 
     @property
     def what(self) -> str:
         """Name of the limited quantity."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no property what, the name of the limited quantity")
 
     def use_text(self, use: float) -> str:
         """Return a use of the limit (1 at the limit) as text."""
         return f"{100 * use:.4g} % of its limit"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit, which must stay between ``low`` and ``high``."""
-        raise NotImplementedError
+        """Return the limited expressions, k x 1, without unit, 1 at the limit."""
+        raise NotImplementedError(f"{type(self).__name__} has no method rows, the expressions for the optimizer")
 
     def measured(self, states: States, parameters: Array) -> Array:
         """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no method measured, the numbers for the certificate")
+
+    def checked_rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
+        """Return ``rows``, checked.
+
+        Raises
+        ------
+        TypeError
+            They are no column of CasADi's symbols.
+        """
+        import casadi
+
+        rows: object = self.rows(point, parameters)
+        if not isinstance(rows, casadi.SX) or rows.shape[1] != 1:
+            kind = getattr(rows, "shape", type(rows).__name__)
+            raise TypeError(f"{type(self).__name__}.rows returned {kind}; expected casadi.SX of shape (k, 1)")
+        return rows
+
+    def use(self, states: States, parameters: Array) -> Array:
+        """Return the use of the limit at samples, shape (N, k), 1 at the limit: ``measured``, checked.
+
+        Raises
+        ------
+        ValueError, TypeError
+            ``measured`` returned another shape, or no real numbers.
+        PlanningError
+            It returned NaN: whether the limit is kept cannot be decided.
+        """
+        name = f"{type(self).__name__}.measured"
+        values = number_array(self.measured(states, parameters), name, "(N, k)")
+        if values.ndim != 2 or len(values) != len(states.times) or not values.size:
+            raise ValueError(f"{name} has shape {values.shape}; expected ({len(states.times)}, k)")
+        if np.isnan(values).any():
+            t = states.times[int(np.isnan(values).any(axis=1).argmax())]
+            raise PlanningError(f"{self.what} is not a number at {t:.3g} s, so that no motion can be certified")
+        return np.abs(values) if self.two_sided else values
 
     def size(self, description: Description) -> int:
         """Return the number of parameters."""
@@ -79,7 +99,7 @@ class MotorPower(Constraint):
     """Limit of the mechanical power |tau qd| of each joint, W."""
 
     watts: float | tuple[float, ...]
-    low = -1.0
+    two_sided = True
     needs_torque = True
 
     def __post_init__(self) -> None:
@@ -109,7 +129,7 @@ class TorqueSpeedLine(Constraint):
     """Stall torque at the joint, N m or N: one number, or one for each joint."""
     no_load_speed: float | tuple[float, ...]
     """No-load speed at the joint, rad/s or m/s, likewise."""
-    low = -1.0
+    two_sided = True
     needs_torque = True
 
     def __post_init__(self) -> None:

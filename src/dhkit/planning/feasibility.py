@@ -92,7 +92,7 @@ def require_kept(description: Description, constraints: Sequence[Constraint], T_
     if place.T is not None:
         states = states.with_tool(place.T[None])
     for constraint in constraints:
-        use = float(constraint.measured(states, constraint.values(description, T_start)).max())
+        use = float(constraint.use(states, constraint.values(description, T_start)).max())
         if use > 1 + CONSTRAINT_ROUNDING:
             raise PlanningError(f"{place.name}: its {constraint.what} is not allowed: {constraint.use_text(use)}")
 

@@ -165,7 +165,7 @@ class Problem:
             values = self._place_function.map("places", "serial", places.shape[1], [1], [])(places, p)
             begin = 0
             for constraint, count in zip(self._places, self._place_counts, strict=True):
-                add(constraint.what, values[begin : begin + count, :], constraint.low, constraint.high)
+                add(constraint.what, values[begin : begin + count, :], -1.0 if constraint.two_sided else -np.inf, 1.0)
                 begin += count
         f = self._cost(D, motion, integrals, A, p)
         x = casadi.vertcat(D, casadi.vec(Q), casadi.vec(V), casadi.vec(A))
@@ -231,14 +231,16 @@ class Problem:
 
     def _rows_of(self, *, moving: bool) -> list[casadi.SX]:
         given = zip(self.constraints, self._parameter_symbols[1:], strict=False)
-        return [constraint.rows(self.point, symbols) for constraint, symbols in given if constraint.moving == moving]
+        return [
+            constraint.checked_rows(self.point, symbols) for constraint, symbols in given if constraint.moving == moving
+        ]
 
     @cached_property
     def _state_rows(self) -> list[tuple[str, int, Any, Any]]:
         made = [("torque", self.n, -np.inf, np.inf)] if self.with_torque else []
         moving = [constraint for constraint in self.constraints if constraint.moving]
         for constraint, rows in zip(moving, self._rows_of(moving=True), strict=True):
-            made.append((constraint.what, int(rows.numel()), constraint.low, constraint.high))
+            made.append((constraint.what, int(rows.numel()), -1.0 if constraint.two_sided else -np.inf, 1.0))
         return made
 
     @cached_property

@@ -79,7 +79,7 @@ class Terms:
         """The rows of each constraint, k x 1 each, without unit."""
         import casadi
 
-        return [constraint.rows(self.point, casadi.SX(0, 1)) for constraint in self.constraints]
+        return [constraint.checked_rows(self.point, casadi.SX(0, 1)) for constraint in self.constraints]
 
     @property
     def counts(self) -> tuple[int, ...]:

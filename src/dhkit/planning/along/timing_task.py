@@ -139,7 +139,7 @@ class TimingTask:
             for constraint, count in zip(self.terms.constraints, self.terms.counts, strict=True):
                 most = np.tile(1 - self.shares(reserved, constraint.what, count), (2, 1, 1))
                 high.append(most)
-                low.append(-most if constraint.is_two_sided else np.full_like(most, constraint.low))
+                low.append(-most if constraint.two_sided else np.full_like(most, -np.inf))
             if high:
                 parts.append([np.concatenate(side, axis=-1).ravel() for side in (low, high)])
         # For least time the intervals may take less than the duration, which keeps the program convex.
