@@ -257,6 +257,23 @@ def test_both_sides_of_a_constraint_are_certified():
     assert next(check.excess for check in checks if check.what == "rate") == pytest.approx(1 / 0.9 - 1, rel=1e-3)
 
 
+def test_a_state_that_is_not_a_number_is_not_certified(monkeypatch):
+    arm = library_robot("planar2r")
+    motion = Planner(arm, intervals=12).solve([0, 0], [0.6, -0.5])
+    peaks = Checker.peaks
+
+    def with_one_unknown(self, states):
+        found = peaks(self, states)
+        found[-1][1][5, 0] = np.nan
+        return found
+
+    assert Checker(arm, Limits.of(arm)).check(motion).ok
+    monkeypatch.setattr(Checker, "peaks", with_one_unknown)
+    certificate = Checker(arm, Limits.of(arm)).check(motion)
+    assert not certificate.ok
+    assert certificate.violation == np.inf
+
+
 @pytest.mark.slow
 def test_motors():
     effort, speed = PUMA.numbers.effort, PUMA.numbers.velocity

@@ -246,7 +246,7 @@ class Checker:
         """
 
         def keeps(c: float) -> bool:
-            return all(np.nanmax(use, initial=0.0) <= 1.0 for _, use in self._velocity_dependent(states.slowed(c)))
+            return all(np.max(use, initial=0.0) <= 1.0 for _, use in self._velocity_dependent(states.slowed(c)))
 
         if keeps(1.0):
             return 1.0
@@ -285,7 +285,8 @@ def _parabola_rises(use: Array, points: int) -> Array:
 
 
 def _check(what: str, excess: Array, times: Array) -> Check:
-    k, i = np.unravel_index(int(np.nanargmax(excess)), excess.shape)
+    excess = np.where(np.isnan(excess), np.inf, excess)  # a limit whose use is not a number is not kept
+    k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     return Check(what, float(excess[k, i]), int(i), float(times[k]))
 
 

@@ -165,7 +165,7 @@ class Problem:
             values = self._place_function.map("places", "serial", places.shape[1], [1], [])(places, p)
             begin = 0
             for constraint, count in zip(self._places, self._place_counts, strict=True):
-                add(constraint.what, values[begin : begin + count, :], -1.0 if constraint.two_sided else -np.inf, 1.0)
+                add(constraint.what, values[begin : begin + count, :], _lower_bound(constraint), 1.0)
                 begin += count
         f = self._cost(D, motion, integrals, A, p)
         x = casadi.vertcat(D, casadi.vec(Q), casadi.vec(V), casadi.vec(A))
@@ -240,7 +240,7 @@ class Problem:
         made = [("torque", self.n, -np.inf, np.inf)] if self.with_torque else []
         moving = [constraint for constraint in self.constraints if constraint.moving]
         for constraint, rows in zip(moving, self._rows_of(moving=True), strict=True):
-            made.append((constraint.what, int(rows.numel()), -1.0 if constraint.two_sided else -np.inf, 1.0))
+            made.append((constraint.what, int(rows.numel()), _lower_bound(constraint), 1.0))
         return made
 
     @cached_property
@@ -260,3 +260,7 @@ class Problem:
 
         inputs = [self.point.q, casadi.vertcat(*self._parameter_symbols)]
         return casadi.Function("place", inputs, [casadi.vertcat(*self._rows_of(moving=False))], {"cse": True})
+
+
+def _lower_bound(constraint: Constraint) -> float:
+    return -1.0 if constraint.two_sided else -np.inf
