@@ -46,16 +46,17 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
     TypeError
         Not numbers.
     """
-    if isinstance(q, str) and not name.startswith(RATE_NAMES):
-        return configuration(description, q, name)
-    if isinstance(q, (list, tuple)) and any(isinstance(row, str) for row in q):
-        rows = [joint_array(description, row, name) for row in q]
-        if any(row.shape != rows[0].shape for row in rows):
-            shapes = ", ".join(str(row.shape) for row in rows)
-            raise ValueError(f"{name} has rows of shapes {shapes}; expected equal ones")
-        return np.stack(rows)
+    if type(q) is not np.ndarray:
+        if isinstance(q, str) and not name.startswith(RATE_NAMES):
+            return configuration(description, q, name)
+        if isinstance(q, (list, tuple)) and any(isinstance(row, str) for row in q):
+            rows = [joint_array(description, row, name) for row in q]
+            if any(row.shape != rows[0].shape for row in rows):
+                shapes = ", ".join(str(row.shape) for row in rows)
+                raise ValueError(f"{name} has rows of shapes {shapes}; expected equal ones")
+            return np.stack(rows)
     array = number_array(q, name, "(..., n)")
-    if array.ndim == 0 or array.shape[-1] != description.n:
+    if array.shape[-1:] != (description.n,):
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
     return array
 

@@ -46,7 +46,7 @@ def fill(
     result = result_array((*batch, *tail), out)
     if not result.size:
         return result
-    rows = [_rows(state, batch) for state in states]
+    rows = [state[None] for state in states] if not batch else [_rows(state, batch) for state in states]
     if out is not None and any(np.may_share_memory(out, row) for row in rows):
         rows = [row.copy() for row in rows]
     kernel(parameters, rows, [result.reshape(len(rows[0]), -1)], threads)
@@ -56,11 +56,12 @@ def fill(
 def _batch(states: Sequence[Array]) -> tuple[int, ...]:
     """Return the batch axes that all states broadcast to."""
     first = states[0].shape[:-1]
-    if len(states) == 1:
+    for state in states[1:]:
+        if state.shape[:-1] != first:
+            break
+    else:
         return first
     shapes = [state.shape[:-1] for state in states]
-    if shapes.count(first) == len(shapes):
-        return first
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
