@@ -1,4 +1,4 @@
-"""Robot arms from their Denavit-Hartenberg table: URDF, Pinocchio model, kinematics, and a view in the browser."""
+"""Robot arms from a Denavit-Hartenberg table: URDF, Pinocchio, kinematics, dynamics, grading, planning, viewer."""
 
 from pkgutil import iter_modules
 

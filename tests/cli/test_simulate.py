@@ -67,7 +67,7 @@ def test_text_names_joints_tool_and_energy(dhkit):
     assert status == 0
     assert "stanford: pid, 1000 Hz" in out and "2.5 s simulated in" in out
     assert len(re.findall(r"[\d.e-]+ +°", out)) == 5 and len(re.findall(r"[\d.e-]+ +m ", out)) == 1
-    assert "tool: largest error" in out and "of what was turned over is without account" in out
+    assert "tool: largest error" in out and "of the energy turned over" in out
     status, out, _ = dhkit(
         "simulate",
         "planar2r",
@@ -210,7 +210,7 @@ def test_a_motion_of_another_arm_or_a_simulation_is_no_motion(dhkit, tmp_path):
     puma = Arm.load("puma560")
     path = puma.quintic(np.zeros(6), np.full(6, 0.1), 1.0).save(tmp_path / "puma.npz")
     status, _, err = dhkit("simulate", "planar2r", "--motion", path)
-    assert status == 2 and "a trajectory of puma560" in err
+    assert status == 2 and "trajectory was made for the robot puma560" in err
     path = ARM.simulate(None, duration=0.01, q0=[0.1, 0.2]).save(tmp_path / "run.npz")
     status, _, err = dhkit("simulate", "planar2r", "--motion", path)
     assert status == 2 and "a dhkit simulation; expected a trajectory" in err

@@ -193,7 +193,7 @@ def test_a_table_of_wrong_lines_is_refused(name, tmp_path):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_another_robots_file_is_refused(suffix, tmp_path):
     path = swinging(library_robot("puma560")).save(tmp_path / f"run{suffix}")
-    refused(path, rf"a simulation of puma560 \(.*\); expected one of planar2r \({ARM.digest}\)", ARM)
+    refused(path, rf"made for the robot puma560 \(.*\); expected one for planar2r \(digest {ARM.digest}\)", ARM)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -105,7 +105,7 @@ def test_an_audit_of_what_failed_is_not_fine():
     assert "1 failed" in repr(batch)
     assert EnergyAudit(100.0, 0, 0, 0, 0, 0).error == np.inf
     assert EnergyAudit(0.0, 0, 0, 0, 0, 0).error == 0
-    assert "without account" in str(EnergyAudit(1.0, 1.0, 0, 0, 0, 1.0))
+    assert "residual" in str(EnergyAudit(1.0, 1.0, 0, 0, 0, 1.0))
 
 
 def test_a_pose_is_not_four_arms():

@@ -200,5 +200,5 @@ def test_a_file_of_ours_is_one_of_its_robot(tmp_path):
     puma, ur5 = library_robot("puma560"), library_robot("ur5")
     path = Trajectory.from_samples(puma, [0, 1], [[0.0] * 6, [0.1] * 6]).save(tmp_path / "puma.csv", rate=10)
     assert Trajectory.read(path, puma).n == 6
-    with pytest.raises(DescriptionError, match=r"a trajectory of puma560 .*; expected one of ur5"):
+    with pytest.raises(DescriptionError, match=r"trajectory was made for the robot puma560 .*; expected one for ur5"):
         Trajectory.read(path, ur5)

@@ -87,8 +87,8 @@ def test_a_gripper_is_locked_and_a_tip_can_be_chosen(tmp_path):
 
 BAD = {
     "entities": ('<!DOCTYPE r [<!ENTITY x "y">]><robot name="&x;"/>', "document type or entities"),
-    "no xml": ("hello", "no XML"),
-    "truncated": (simple()[:200], "no XML"),
+    "no xml": ("hello", "not well-formed XML"),
+    "truncated": (simple()[:200], "not well-formed XML"),
     "another root": ("<sdf/>", "found <sdf>; expected <robot>"),
     "deep": ("<robot>" + "<a>" * 100 + "</a>" * 100 + "</robot>", "nested more than 64 deep"),
     "two parents": (

@@ -151,8 +151,11 @@ def target(
         There is no such order of Euler angles, or the matrix is no pose.
     """
     if sum(given is not None for given in (xyz, matrix, like)) != 1:
-        raise DescriptionError("where to? expected one of --xyz, --matrix and --like")
-    T = pose(euler=numbers([euler], "--euler", [3]), order=order, degrees=degrees)
+        raise DescriptionError("no single pose; expected one of --xyz, --matrix and --like")
+    angles = numbers([euler], "--euler", [3])
+    if hint := max((degrees_hint(x, slides=False) for x in angles), key=len):
+        sys.stderr.write(f"dhkit: warning: --euler: an angle is in rad{hint}\n")
+    T = pose(euler=angles, order=order, degrees=degrees)
     if matrix is not None:
         return _matrix(matrix)
     if like is not None:

@@ -15,14 +15,7 @@ from dhkit.cli.output import print_json, report_files
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
-from dhkit.symbolic import (
-    Lagrangian,
-    SymbolicKinematics,
-    Symbols,
-    base_parameters,
-    lagrangian,
-    symbolic_kinematics,
-)
+from dhkit.symbolic import Lagrangian, SymbolicKinematics, Symbols, base_parameters, lagrangian, symbolic_kinematics
 from dhkit.symbolic.equations import (
     Quantity,
     equations_c,

@@ -54,7 +54,7 @@ app = typer.Typer(rich_markup_mode=None)
 def plan(
     robot: Robot,
     start: Annotated[
-        str, typer.Option("--from", metavar="Q ...", help="Joint values, or the name of a configuration.")
+        str, typer.Option("--from", metavar="Q ...", help="Joint values at the start, or a configuration's name.")
     ] = "ready",
     to: Annotated[
         str | None, typer.Option(metavar="Q ...", help="Joint values at the goal, or the name of a configuration.")
@@ -137,7 +137,7 @@ def plan(
     arm = load_arm(robot, uniform)
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
     if sum(given is not None for given in (to, *pose.values())) != 1:
-        raise DescriptionError("where to? expected one of --to, --xyz, --matrix and --like")
+        raise DescriptionError("no single goal; expected one of --to, --xyz, --matrix and --like")
     begin_q = option_values(arm, start, "--from", degrees)
     if to is None:
         goal = target(arm, **pose, euler=euler, order=order, degrees=degrees)
@@ -243,12 +243,12 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     if report.unlimited:
         say(f"not limited: {', '.join(report.unlimited)}")
     if report.slow_down > 1:
-        say(f"slowed down by {100 * (report.slow_down - 1):.3f} % to keep its limits between knots")
+        say(f"slowed down by {100 * (report.slow_down - 1):.2g} % to keep its limits between knots")
     if report.tightened:
         say(f"solved again with tightened limits: {', '.join(report.tightened)}")
     if report.coarse is not None and report.sensitivity is not None:
         excess = 100 * report.sensitivity
-        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.2f} % more")
+        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.2g} % more")
     say(
         f"search: {report.solves} program{'s' * (report.solves != 1)}, {report.iterations} iterations, "
         f"{report.solve_seconds:.2f} s, and {report.build_seconds:.2f} s to make them"

@@ -34,7 +34,7 @@ from dhkit.errors import SimulationError
 from dhkit.trajectories import Trajectory
 
 MAX_ENERGY_ERROR = 1e-6
-"""Largest share of the energy that is turned over which may be without account; above it the steps are too long."""
+"""Largest residual of the energy balance, as a share of the energy turned over; above it the steps are too long."""
 SUFFIXES = (".npz", ".mat", ".csv")
 
 app = typer.Typer(rich_markup_mode=None)
@@ -51,7 +51,7 @@ Start = Annotated[
     typer.Option(
         "--from",
         metavar="Q ...",
-        help="Start of a motion in place of a file: joint values, or the name of a configuration.",
+        help="Start of a motion in place of a file: joint values or a configuration's name; default: nominal, or zero.",
     ),
 ]
 Goal = Annotated[
@@ -59,10 +59,13 @@ Goal = Annotated[
     typer.Option(
         "--to",
         metavar="Q ...",
-        help="Goal of a motion in place of a file: joint values, or the name of a configuration.",
+        help="Goal of a motion in place of a file; default: every joint moved by 1 rad or less from the default start.",
     ),
 ]
-Duration = Annotated[float | None, typer.Option(help="Duration of a motion between configurations, s.")]
+Duration = Annotated[
+    float | None,
+    typer.Option(help="Duration of a motion between configurations, s; default: twice the least, 2 at least."),
+]
 Bandwidth = Annotated[float, typer.Option(help="Bandwidth that gains are tuned for, rad/s.")]
 Damping = Annotated[float, typer.Option(help="Damping ratio that gains are tuned for.")]
 Rate = Annotated[float, typer.Option(help="Sampling rate of the controller, Hz.")]
@@ -218,7 +221,7 @@ def _print(result: SimulationResult, *, degrees: bool) -> None:
     audit = result.audit
     say(
         f"energy: drives {audit.drives:.4g} J, pushes {audit.pushes:.4g} J, friction {audit.friction:.4g} J, impacts "
-        f"{audit.impacts:.4g} J; {audit.error:.1e} of what was turned over is without account"
+        f"{audit.impacts:.4g} J; residual of the balance: {audit.error:.1e} of the energy turned over"
     )
     if not audit.error <= MAX_ENERGY_ERROR:
         say("the integration's steps are too long for this motion: give a larger --plant-rate")

@@ -38,7 +38,7 @@ def verify(
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
-    """Hold our kinematics and dynamics against Pinocchio's; exit status 1 where they disagree.
+    """Compare dhkit's kinematics and dynamics with Pinocchio's; exit status 1 where they disagree.
 
     With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.
     """

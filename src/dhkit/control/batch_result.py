@@ -34,7 +34,7 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class BatchResult:
-    """B simulated runs of N steps. Arms whose state became NaN stay NaN; the others do not feel it."""
+    """B simulated runs of N steps. A run whose state became NaN stays NaN; the other runs are not affected."""
 
     arms: tuple[Description, ...]
     """The arm that moved in all runs, or one arm for each run."""

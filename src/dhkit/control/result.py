@@ -41,7 +41,7 @@ class EnergyAudit:
     def __str__(self) -> str:
         parts = "change {change:.4g}, drives {drives:.4g}, pushes {pushes:.4g}, friction {friction:.4g}, impacts"
         parts += " {impacts:.4g}"
-        return f"{parts.format(**vars(self))} J; {self.remains:.1e} J without account, {self.error:.1e} of the turnover"
+        return f"{parts.format(**vars(self))} J; residual {self.remains:.1e} J, {self.error:.1e} of the turnover"
 
     @property
     def error(self) -> float:
@@ -51,7 +51,7 @@ class EnergyAudit:
         return abs(self.remains) / self.turnover if self.turnover != 0 else float("inf")
 
     def __repr__(self) -> str:
-        summary = f"{self.turnover:.4g} J turned over, {self.remains:.1e} J without account"
+        summary = f"{self.turnover:.4g} J turned over, residual {self.remains:.1e} J"
         return repr_line("EnergyAudit", summary=summary)
 
     def _repr_html_(self) -> str:

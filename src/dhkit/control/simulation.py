@@ -15,14 +15,7 @@ from dhkit.control.references import Held, Reference, reference_of
 from dhkit.control.result import SimulationResult
 from dhkit.control.runs import ContinuousRun, Progress, SampledRun
 from dhkit.control.sensors import Sensors
-from dhkit.control.timing import (
-    MAX_STEPS,
-    require_positive,
-    row_times,
-    sampled_reference,
-    steps_a_period,
-    substeps,
-)
+from dhkit.control.timing import MAX_STEPS, require_positive, row_times, sampled_reference, steps_a_period, substeps
 from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.trajectories import Trajectory

@@ -142,6 +142,6 @@ def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
         plural, verb = ("s", "have") if len(bare) > 1 else ("", "has")
         raise DescriptionError(
             f"{description.name}: the link{plural} of joint{plural} {', '.join(bare)} {verb} no body, so the dynamics "
-            "are unknown; add [joint.body], or use with_uniform_links (--uniform-links in the command)"
+            "are unknown; add [joint.body], or use with_uniform_links (--uniform-links in commands that have it)"
         )
     return tuple(joint.bodies for joint in description.joints)

@@ -52,6 +52,8 @@ STATES: Mapping[str, tuple[str, ...]] = {
 }
 """The joint vectors that each quantity depends on."""
 
+_pattern_of = lru_cache(maxsize=512)(inertial_pattern)
+
 
 def evaluate(
     quantity: str,
@@ -94,11 +96,6 @@ def dynamics_graph(quantity: str, description: Description) -> Graph:
     symbols = {name: joint_symbols(name, description.n) for name in STATES[quantity]}
     expression = EXPRESSIONS[quantity](table, *symbols.values())
     return Graph.of(quantity, {"parameters": parameters, **symbols}, {"result": expression})
-
-
-@lru_cache(maxsize=512)
-def _pattern_of(description: Description) -> tuple[str, Array]:
-    return inertial_pattern(description)
 
 
 @takes_robot

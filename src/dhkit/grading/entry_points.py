@@ -141,7 +141,7 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     """
     name, place = sheet.robot, f"{sheet.file}: robot"
     if not name:
-        raise AnswerError(f"{place}: found nothing; expected a library name, or a robot file beside the sheet")
+        raise AnswerError(f"{place}: missing; expected a library name, or a robot file beside the sheet")
     if not name.endswith(".toml"):
         try:
             return library_robot(name)

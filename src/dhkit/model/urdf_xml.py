@@ -52,7 +52,9 @@ def parse_urdf(path: Path) -> Element:
         _check_size(text)
         robot = ElementTree.fromstring(text.encode())  # noqa: S314 - no entities, bounded
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise ModelError(f"no XML: {error}{_cause(text, is_unbound='unbound prefix' in str(error))}") from None
+        raise ModelError(
+            f"not well-formed XML: {error}{_cause(text, is_unbound='unbound prefix' in str(error))}"
+        ) from None
     if robot.tag != "robot":
         raise ModelError(f"found <{robot.tag[:40]}>; expected <robot>")
     return robot

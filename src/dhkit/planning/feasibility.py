@@ -116,8 +116,8 @@ def require_bounded(description: Description, limits: Limits, objective: Objecti
     if free.any():
         name = description.joints[int(np.flatnonzero(free)[0])].name
         raise PlanningError(
-            f"joint {name} has neither a torque, nor an acceleration, nor a jerk limit: in least time it would jump; "
-            "give one (effort in the robot file, or limits=)"
+            f"joint {name} has neither a torque, an acceleration nor a jerk limit, so least time has no bound below; "
+            "give one of them (effort in the robot file, or limits=)"
         )
 
 

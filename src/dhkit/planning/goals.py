@@ -122,7 +122,7 @@ def _configurations(
         angles = every
     if not np.isfinite(every).all(axis=-1).any():
         raise UnreachableError(
-            f"{place.name}: no joint values have the tool in the pose: {_position_text(T)} is out of reach"
+            f"{place.name}: no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
         )
     inside = np.atleast_1d(
         ((angles >= limits.lower - SAME_SOLUTION**3) & (angles <= limits.upper + SAME_SOLUTION**3)).all(axis=-1)

@@ -156,8 +156,8 @@ class FileKind:
     def _same_robot(self, name: str, digest: str, description: Description) -> Description:
         if description.digest != digest:
             raise DescriptionError(
-                f"a {self.noun} of {name[:40]} ({digest[:12]}); expected one of {description.name}"
-                f" ({description.digest})"
+                f"this {self.noun} was made for the robot {name[:40]} (digest {digest[:12]}); expected one for"
+                f" {description.name} (digest {description.digest})"
             )
         return description
 

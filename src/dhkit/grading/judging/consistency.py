@@ -145,11 +145,6 @@ def _torques(parts: Consistency, M: Elements, h: Elements, g: Elements) -> Eleme
     return torques + friction
 
 
-def _lagrangian(parts: Consistency, K: Elements, V: Elements) -> Elements:
-    """Return K - V."""
-    return element_array(K[()] - V[()])
-
-
 def _product(parts: Consistency, *links: Elements) -> Elements:
     """Return base A1 ... An tool."""
     T = parts.truth.kinematics.base
@@ -174,7 +169,7 @@ _ROUTES: Mapping[str, tuple[tuple[str, ...], Route]] = {
     "h": (("M",), _velocity_torques),
     "g": (("V",), _gradient),
     "tau": (("M", "C", "h", "g"), _torques),
-    "L": (("K", "V"), _lagrangian),
+    "L": (("K", "V"), lambda _, K, V: element_array(K[()] - V[()])),
     "T": (tuple(f"A{i}" for i in range(1, 33)), _product),
     "J": (("T",), _jacobian),
 }

@@ -184,7 +184,7 @@ class Element:
         return len(self.polynomial)
 
     def __reduce__(self) -> tuple[Any, tuple[PolynomialRing, dict[Monomial, Fraction]]]:
-        return _from_terms, (self.ring, dict(self.terms))
+        return PolynomialRing.from_terms, (self.ring, dict(self.terms))
 
     def __str__(self) -> str:
         return str(format_function("plain_text")(self))
@@ -392,7 +392,3 @@ def _rational(number: Any) -> Fraction:
         return Fraction(number)
     rational = exact(number).rational
     return Fraction(0) if rational is None else rational
-
-
-def _from_terms(ring: PolynomialRing, terms: Mapping[Monomial, Fraction]) -> Element:
-    return ring.from_terms(terms)
