@@ -65,6 +65,13 @@ def test_every_branch_of_every_robot_closes(facts, name):
         assert inside == branch["within_limits"]
 
 
+def test_euler_angles_that_may_be_degrees_are_asked_about(ik):
+    pose_of_degrees = ("puma560", "--xyz", "0.4", "0.1", "0.8", "--euler", "0", "-180", "0")
+    assert "--euler: found -180 rad (28.6 turns; were degrees meant?)" in ik(*pose_of_degrees)[2]
+    for silent in ((*pose_of_degrees, "--degrees"), (*pose_of_degrees[:-2], "180*deg", "0")):
+        assert not ik(*silent)[2]
+
+
 def test_all_ways_to_give_a_pose_agree(facts, tmp_path):
     T = pose((0.4318, -0.1, 0.2), euler=(0, 90, -45), degrees=True)
     numbers = [f"{x:.17g}" for x in T.ravel()]

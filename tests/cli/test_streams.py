@@ -46,7 +46,7 @@ def test_letters_that_a_pipe_lacks_are_replaced(encoding, command, words):
 
 
 def test_letters_become_plain_ones():
-    assert "".join(map(_plain, "θ α Θ → ² ½ é ─│ 関")) == "theta alpha Theta -> 2 12 e -| ?"
+    assert "".join(map(_plain, "θ α Θ → ² ½ é ─│ 90° 関")) == "theta alpha Theta -> 2 12 e -| 90 deg ?"
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")

@@ -153,8 +153,8 @@ def target(
     if sum(given is not None for given in (xyz, matrix, like)) != 1:
         raise DescriptionError("no single pose; expected one of --xyz, --matrix and --like")
     angles = numbers([euler], "--euler", [3])
-    if hint := max((degrees_hint(x, slides=False) for x in angles), key=len):
-        sys.stderr.write(f"dhkit: warning: --euler: an angle is in rad{hint}\n")
+    if found := next((x for x in angles if degrees_hint(x, slides=False)), None):
+        sys.stderr.write(f"dhkit: warning: --euler: found {found:g} rad{degrees_hint(found, slides=False)}\n")
     T = pose(euler=angles, order=order, degrees=degrees)
     if matrix is not None:
         return _matrix(matrix)

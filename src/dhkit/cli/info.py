@@ -68,7 +68,7 @@ def info(robot: Robot, json: Json = False) -> None:
             say(f"link {i}: {', '.join(bodies)}")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")
-    mass = f"total mass {np.nansum(numbers.mass):.4g} kg" if np.isfinite(numbers.mass).any() else "no masses"
+    mass = f"total mass {np.nansum(numbers.mass):.4g} kg" if np.isfinite(numbers.mass).any() else "no link masses"
     say(f"{mass}{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
     for frame, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
         if not np.array_equal(T, np.eye(4)):

@@ -243,12 +243,12 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     if report.unlimited:
         say(f"not limited: {', '.join(report.unlimited)}")
     if report.slow_down > 1:
-        say(f"slowed down by {100 * (report.slow_down - 1):.2g} % to keep its limits between knots")
+        say(f"slowed down by {100 * (report.slow_down - 1):.3g} % to keep its limits between knots")
     if report.tightened:
         say(f"solved again with tightened limits: {', '.join(report.tightened)}")
     if report.coarse is not None and report.sensitivity is not None:
         excess = 100 * report.sensitivity
-        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.2g} % more")
+        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.3g} % more")
     say(
         f"search: {report.solves} program{'s' * (report.solves != 1)}, {report.iterations} iterations, "
         f"{report.solve_seconds:.2f} s, and {report.build_seconds:.2f} s to make them"

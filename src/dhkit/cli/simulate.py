@@ -51,7 +51,8 @@ Start = Annotated[
     typer.Option(
         "--from",
         metavar="Q ...",
-        help="Start of a motion in place of a file: joint values or a configuration's name; default: nominal, or zero.",
+        help="Start of a motion in place of a file: joint values or a configuration's name; default: nominal, ready, "
+        "home, another one, or zero, whichever there is first.",
     ),
 ]
 Goal = Annotated[
@@ -59,7 +60,8 @@ Goal = Annotated[
     typer.Option(
         "--to",
         metavar="Q ...",
-        help="Goal of a motion in place of a file; default: every joint moved by 1 rad or less from the default start.",
+        help="Goal of a motion in place of a file: joint values or a configuration's name; default: each joint of the "
+        "default start moved by 1 rad or less.",
     ),
 ]
 Duration = Annotated[

@@ -40,7 +40,7 @@ def verify(
 ) -> ExitStatus:
     """Compare dhkit's kinematics and dynamics with Pinocchio's; exit status 1 where they disagree.
 
-    With --urdf hold somebody's URDF against the table: tool, mass matrix and torques at equal joint values.
+    With --urdf compare a URDF of another source with the table: tool, mass matrix and torques at equal joint values.
     """
     if output is not None and output.suffix not in (".md", ".tex", ".json"):
         raise DescriptionError(f"{output}: expected a report that ends in .md, .tex or .json")

@@ -85,9 +85,9 @@ class PlanReport:
         if self.unlimited:
             facts.append(("not limited", ", ".join(self.unlimited)))
         if self.slow_down > 1:
-            facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.2g} %"))
+            facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3g} %"))
         if self.coarse is not None:
-            facts.append((f"{self.coarse[0]} intervals cost", f"{100 * (self.sensitivity or 0):.2g} % more"))
+            facts.append((f"{self.coarse[0]} intervals cost", f"{100 * (self.sensitivity or 0):.3g} % more"))
         facts += [(f"{name}, straight joint path", f"{duration:.4f} s") for name, duration in self.classical]
         facts.append(("solved in", f"{self.solve_seconds:.3f} s, {self.iterations} iterations"))
         branches = [
@@ -168,7 +168,7 @@ class PlanReport:
                 f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
             )
         if self.slow_down > 1:
-            lines.append(f"slowed down by {100 * (self.slow_down - 1):.2g} % to keep its limits between knots")
+            lines.append(f"slowed down by {100 * (self.slow_down - 1):.3g} % to keep its limits between knots")
         if self.tightened:
             lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
         active = (
@@ -179,7 +179,7 @@ class PlanReport:
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
         if self.coarse is not None:
-            more = f"{100 * (self.sensitivity or 0):.2g} % more"
+            more = f"{100 * (self.sensitivity or 0):.3g} % more"
             lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")
         for name, duration in self.classical:
             more = f"{100 * (duration / self.duration - 1):.1f} % more"
