@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array
 
@@ -30,6 +33,30 @@ class Curve(Enum):
     def columns(self, intervals: int) -> int:
         """Return the number of acceleration variables of each joint."""
         return (intervals, 2 * intervals, intervals + 1, 2 * intervals + 1)[self.value]
+
+    def columns_of(self, interval: int) -> tuple[int, ...]:
+        """Return the columns of acceleration variables that an interval depends on, in order of time."""
+        k = interval
+        return ((k,), (2 * k, 2 * k + 1), (k, k + 1), (2 * k, 2 * k + 1, 2 * k + 2))[self.value]
+
+    @property
+    def column_weights(self) -> tuple[float, ...]:
+        """Weights of an interval's columns in a sum over all columns, by their shares of time."""
+        return ((1.0,), (1 / 2, 1 / 2), (1 / 2, 1 / 2), (1 / 6, 2 / 3, 1 / 6))[self.value]
+
+    def abc(self, columns: Sequence[Any]) -> tuple[Any, Any, Any]:
+        """Return the accelerations at the beginning, the middle and the end of an interval, from its columns."""
+        if self is Curve.CONSTANT:
+            return columns[0], columns[0], columns[0]
+        if self is Curve.QUADRATIC:
+            return columns[0], columns[1], columns[2]
+        return columns[0], (columns[0] + columns[1]) / 2, columns[1]
+
+    def values(self, qdd: Array) -> tuple[Array, Array, Array]:
+        """Return the same of all intervals, shape (intervals, n) each, from all columns, shape (columns, n)."""
+        step = (1, 2, 1, 2)[self.value]
+        count = (len(qdd) // step) if self in (Curve.CONSTANT, Curve.JUMPING) else (len(qdd) - 1) // step
+        return self.abc([qdd[k : k + step * count : step] for k in range(len(self.columns_of(0)))])
 
 
 @dataclass(frozen=True)
@@ -57,7 +84,7 @@ class Mesh:
         return tuple(np.cumsum(self.legs).tolist())
 
     @property
-    def leg(self) -> Array:
+    def leg(self) -> NDArray[np.int_]:
         """Index of the leg of each interval, without unit, shape (intervals,)."""
         return np.repeat(np.arange(len(self.legs)), self.legs)
 

@@ -203,6 +203,11 @@ class Objective:
         return self.only_time or any(isinstance(term, Energy) for term in self.terms)
 
     @property
+    def has_integral(self) -> bool:
+        """Whether a term is the integral of a function of the state."""
+        return any(isinstance(term, Effort | Energy) for term in self.terms)
+
+    @property
     def needs_torque(self) -> bool:
         """Whether a term depends on torques, so that every link needs a body."""
         return any(isinstance(term, Effort | Energy) for term in self.terms)

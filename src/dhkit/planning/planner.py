@@ -42,9 +42,6 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
 
-MAX_EXPANDED_SIZE = 400
-"""Largest product of joints and intervals up to which a program is expanded into scalar operations: it is then solved
-twice as fast, but takes ten times as long to build."""
 CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}
 """Ipopt's tolerance for each curve: with constant accelerations, the error of the mesh is larger than 1e-6."""
 DEFAULT_INTERVALS = 48
@@ -277,8 +274,7 @@ class Planner:
                 payload=task.is_loaded,
                 jerk_limited=jerk_limited,
             )
-            expand = self.description.n * problem.mesh.intervals <= MAX_EXPANDED_SIZE
-            program = Program.of(problem, CONVERGENCE[curve], expand=expand)
+            program = Program.of(problem, CONVERGENCE[curve])
             self._programs[key] = program
             return program, time.perf_counter() - began
 

@@ -1,4 +1,4 @@
-"""A motion as a nonlinear program: variables at knots, rows of continuity and of limits; built once, solved often.
+"""A motion as a nonlinear program: variables at knots, rows of continuity and of limits.
 
 Acceleration is constant, linear or quadratic inside an interval and integrated exactly, so that a solution is exactly
 a motion; limits can be exceeded only between the points where they are imposed.
@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, Rows
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.integration import MotionPieces
+from dhkit.planning.integration import Interval
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, Time
 from dhkit.planning.point import LOAD, Point
@@ -33,7 +36,7 @@ MIN_LEG_DURATION = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Knots:
-    """A motion on a mesh: the variables of the program."""
+    """A motion on a mesh."""
 
     durations: Array
     """Durations of the legs, shape (legs,), s."""
@@ -44,33 +47,10 @@ class Knots:
     qdd: Array
     """Accelerations, shape (columns, n), rad/s^2 and m/s^2; see :class:`Curve`."""
 
-    @property
-    def vector(self) -> Array:
-        """The variables in the program's order, shape (variables,), SI units."""
-        return np.concatenate([self.durations, self.q.ravel(), self.qd.ravel(), self.qdd.ravel()])
-
-    @classmethod
-    def of(cls, vector: Array, mesh: Mesh, n: int) -> Knots:
-        """Return the knots of a vector of variables, shape (variables,), SI units."""
-        legs, knots, columns = len(mesh.legs), mesh.intervals + 1, mesh.curve.columns(mesh.intervals)
-        parts = np.split(vector, np.cumsum([legs, n * knots, n * knots]))
-        return cls(
-            parts[0], *(part.reshape(count, n) for part, count in zip(parts[1:], (knots, knots, columns), strict=True))
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Rows of one kind, repeated at several points."""
-
-    what: str
-    """Name of the limited quantity, such as ``"torque"``."""
-    count: int
-    """Number of rows at each point."""
-    points: int
-    low: Array
-    """Lower bounds, shape (count,)."""
-    high: Array
+    def intervals(self, mesh: Mesh) -> Interval:
+        """Return all intervals at once, arrays of shape (intervals, n)."""
+        h = (mesh.shares * self.durations[mesh.leg])[:, None]
+        return Interval(h, self.q[:-1], self.qd[:-1], *mesh.curve.values(self.qdd))
 
 
 class Problem:
@@ -99,168 +79,359 @@ class Problem:
             or objective.needs_torque
             or any(constraint.needs_torque for constraint in constraints)
         )
+        self.moving = tuple(constraint for constraint in constraints if constraint.moving)
+        self.places = tuple(constraint for constraint in constraints if not constraint.moving)
 
     @property
     def jerk_counts(self) -> bool:
         """Whether motions begin and end with zero acceleration."""
         return self.jerk_limited or self.objective.has_jerk
 
+    # Variables: of the motion, and its states at the middles of intervals where limits apply there too
+
+    @cached_property
+    def variables(self) -> Variables:
+        """Indices of the program's variables."""
+        curve, has_states = self.mesh.curve, self.with_torque or bool(self.moving)
+        has_middles = has_states and self._states_at_middles
+        return Variables.of(
+            self.n,
+            self.mesh,
+            middles=(
+                has_middles or bool(self.places) or curve is Curve.QUADRATIC,
+                has_middles,
+                has_middles and curve is not Curve.QUADRATIC,
+            ),
+        )
+
+    @property
+    def _states_at_middles(self) -> bool:
+        return self.mesh.curve in (Curve.LINEAR, Curve.QUADRATIC) or (
+            self.mesh.curve is Curve.JUMPING and bool(self.moving)
+        )
+
+    def vector(self, knots: Knots) -> Array:
+        """Return the variables of a motion, shape (variables,), SI units."""
+        at, interval = self.variables, knots.intervals(self.mesh)
+        x = np.empty(at.count)
+        middles = (interval.q_middle, interval.qd_middle, interval.b)
+        given = zip((at.q, at.qd, at.qdd, *at.middles), (knots.q, knots.qd, knots.qdd, *middles), strict=True)
+        x[at.durations] = knots.durations
+        for indices, values in given:
+            x[indices.ravel()] = values.T.ravel() if indices.size else []
+        return x
+
+    def knots(self, x: Array) -> Knots:
+        """Return the motion of variables, shape (variables,), SI units."""
+        at = self.variables
+        return Knots(x[at.durations], x[at.q].T, x[at.qd].T, x[at.qdd].T)
+
     # Arguments
 
     @cached_property
     def parameter_sizes(self) -> tuple[int, ...]:
-        """Lengths of the parameters: payload, each constraint, scale of the cost, scales of accelerations."""
+        """Lengths of the parameters: payload, each constraint, scale of the cost, scales of accelerations, shares."""
         each = (constraint.size(self.description) for constraint in self.constraints)
-        return (LOAD if self.payload else 0, *each, 1, self.n)
+        return (LOAD if self.payload else 0, *each, 1, self.n, self.mesh.intervals, len(self._weights))
 
     def parameters(self, load: Array | None, each: tuple[Array, ...], scale: float, usual: Array) -> Array:
         """Return the program's parameters as one array; ``usual`` are the scales of accelerations, shape (n,)."""
-        return np.concatenate([np.zeros(0) if load is None else load, *each, [scale], 1 / usual])
+        given = [np.zeros(0) if load is None else load, *each, [scale], 1 / usual]
+        return np.concatenate([*given, self.mesh.shares, self._weights])
+
+    @cached_property
+    def _parameter_indices(self) -> list[Indices]:
+        """Indices of each of ``parameter_sizes``."""
+        edges = np.cumsum([0, *self.parameter_sizes])
+        return [np.arange(a, b) for a, b in pairwise(edges)]
 
     # The program
 
     @cached_property
-    def program(self) -> tuple[dict[str, Any], list[Rows]]:
-        """The program's x, p, f and g for Ipopt, and the kinds of its rows."""
+    def program(self) -> BlockProgram:
+        """The program's blocks."""
+        blocks = [self._durations, self._intervals]
+        if self.with_torque or self.moving:
+            blocks.append(self._states)
+        if self.places:
+            blocks.append(self._resting_places)
+        return BlockProgram(self.variables.count, sum(self.parameter_sizes), tuple(blocks))
+
+    @property
+    def _durations(self) -> Block:
+        """The block of the legs' durations."""
         import casadi
 
-        n, mesh = self.n, self.mesh
-        K, legs = mesh.intervals, len(mesh.legs)
-        D = casadi.MX.sym("durations", legs)
-        Q, V = casadi.MX.sym("q", n, K + 1), casadi.MX.sym("qd", n, K + 1)
-        A = casadi.MX.sym("qdd", n, mesh.curve.columns(K))
-        p = casadi.MX.sym("p", sum(self.parameter_sizes))
-        H = casadi.repmat(casadi.DM(mesh.shares).T * casadi.horzcat(*(D[int(leg)] for leg in mesh.leg)), n, 1)
-        dense = any(constraint.moving for constraint in self.constraints)
-        motion = MotionPieces.of(mesh.curve, Q, V, A, H, dense=dense)
-        rows: list[Rows] = []
-        g: list[casadi.MX] = []
+        D, scale = casadi.SX.sym("durations", len(self.mesh.legs)), casadi.SX.sym("scale")
+        total = casadi.sum1(D)
+        weight = sum(term.weight for term in self.objective.terms if isinstance(term, Time))
+        function = LocalFunction(D, scale, total, scale * weight * total)
+        scale_index = self._parameter_indices[-4]
+        return Block(function, self.variables.durations[:, None], scale_index[:, None], (Rows.of("duration", 1),))
 
-        def add(what: str, expression: casadi.MX, low: Any, high: Any) -> None:
-            count, points = expression.shape
-            rows.append(Rows(what, count, points, *(np.broadcast_to(x, count).astype(float) for x in (low, high))))
-            g.append(casadi.vec(expression))
+    @property
+    def _intervals(self) -> Block:
+        """The block of the intervals: continuity, and bounds of what lies inside."""
+        import casadi
 
-        add("joint positions", Q[:, 1:] - motion.q_end, 0.0, 0.0)
-        add("joint velocities", V[:, 1:] - motion.qd_end, 0.0, 0.0)
-        add("position", motion.q_inside, -np.inf, np.inf)
-        if motion.qd_inside is not None:
-            add("velocity", motion.qd_inside, -np.inf, np.inf)
-        if motion.qdd_inside is not None:
-            add("acceleration", motion.qdd_inside, -np.inf, np.inf)
+        n, mesh, at = self.n, self.mesh, self.variables
+        K, curve, symbol = mesh.intervals, mesh.curve, casadi.SX.sym
+        duration, share, scale, usual = symbol("duration"), symbol("share"), symbol("scale"), symbol("usual", n)
+        q, qd, q_next, qd_next = (symbol(name, n) for name in ("q", "qd", "q_next", "qd_next"))
+        accelerations = [symbol(f"qdd{k}", n) for k in range(len(curve.columns_of(0)))]
+        lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
+        interval = Interval(share * duration, q, qd, *curve.abc(accelerations))
+        a, b, c, h = interval.a, interval.b, interval.c, interval.h
+        rows = [
+            (Rows.of("joint positions", n, 0.0, 0.0), q_next - interval.q_end),
+            (Rows.of("joint velocities", n, 0.0, 0.0), qd_next - interval.qd_end),
+        ]
+        for name, symbols, value in zip(
+            ("joint positions", "joint velocities", "joint accelerations"),
+            lifted,
+            (interval.q_middle, interval.qd_middle, b),
+            strict=True,
+        ):
+            if symbols.numel():
+                rows.append((Rows.of(name, n, 0.0, 0.0), symbols - value))
+        # Polynomials are inside the hull of their Bernstein coefficients: of positions, velocities, accelerations.
+        inside: dict[str, list[casadi.SX]] = {"position": [], "velocity": [], "acceleration": [], "jerk": []}
+        match curve:
+            case Curve.CONSTANT:
+                inside["position"] = [q + h / 2 * qd]
+            case Curve.JUMPING | Curve.LINEAR:
+                inside["position"] = [q + h / 3 * qd, q_next - h / 3 * qd_next]
+                inside["velocity"] = [qd + h / 2 * a]
+            case Curve.QUADRATIC:
+                inside["velocity"] = [qd + h / 3 * a, qd_next - h / 3 * c]
+                inside["acceleration"] = [2 * b - (a + c) / 2]
         if self.jerk_limited:
-            add("jerk", motion.jerk, -np.inf, np.inf)
-        add("duration", casadi.sum1(D), -np.inf, np.inf)
-        integrals = []
-        if self.with_torque or any(constraint.moving for constraint in self.constraints):
-            states = self._state_function
-            values = states.map("states", "serial", motion.weights.shape[1], [3], [])(*motion.states, p)
-            begin = 0
-            for what, count, low, high in self._state_rows:
-                add(what, values[0][begin : begin + count, :], low, high)
-                begin += count
-            integrals = [casadi.dot(motion.weights, values[1][k, :]) for k in range(values[1].shape[0])]
-        if any(not constraint.moving for constraint in self.constraints):
-            places = casadi.horzcat(Q[:, 1:-1], motion.q_middle)
-            values = self._place_function.map("places", "serial", places.shape[1], [1], [])(places, p)
-            begin = 0
-            for constraint, count in zip(self._places, self._place_counts, strict=True):
-                add(constraint.what, values[begin : begin + count, :], _lower_bound(constraint), 1.0)
-                begin += count
-        f = self._cost(D, motion, integrals, A, p)
-        x = casadi.vertcat(D, casadi.vec(Q), casadi.vec(V), casadi.vec(A))
-        return {"x": x, "p": p, "f": f, "g": casadi.vertcat(*g)}, rows
-
-    def _cost(
-        self, D: casadi.MX, motion: MotionPieces, integrals: list[casadi.MX], A: casadi.MX, p: casadi.MX
-    ) -> casadi.MX:
-        import casadi
-
-        *_, scale, usual = casadi.vertsplit(p, np.cumsum([0, *self.parameter_sizes]).tolist())
-        cost, waiting = casadi.MX(0), iter(integrals)
-        for term in self.objective.terms:
-            match term:
-                case Time():
-                    cost += term.weight * casadi.sum1(D)
-                case Jerk():
-                    cost += term.weight * motion.squared_jerk
-                case _:
-                    cost += term.weight * next(waiting)
-        cost = scale * cost
+            inside["jerk"] = list(interval.jerks)[: 1 if curve is Curve.LINEAR else 2]
+        rows += [(Rows.of(what, n), value) for what, values in inside.items() for value in values]
+        cost = casadi.SX(1, 1)
         if self.objective.needs_smoothing:
+            weights = curve.column_weights
+            squares = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, accelerations, strict=True))
             # Weighted by shares of time, since meshes are finer at their ends.
-            squares = casadi.sum1((A * casadi.repmat(usual, 1, A.shape[1])) ** 2)
-            cost += (
-                SMOOTHING_WEIGHTS[self.mesh.curve]
-                / (self.n * len(self.mesh.legs))
-                * casadi.dot(casadi.DM(self._column_shares), squares.T)
-            )
-        return cost
-
-    @property
-    def _column_shares(self) -> Array:
-        """The share of time of each acceleration variable."""
-        shares = self.mesh.shares
-        if self.mesh.curve is Curve.CONSTANT:
-            return shares
-        if self.mesh.curve is Curve.JUMPING:
-            return np.repeat(shares / 2, 2)
-        around: Array = (np.append(shares, 0.0) + np.append(0.0, shares)) / 2
-        if self.mesh.curve is Curve.LINEAR:
-            return around
-        both = np.empty(2 * len(shares) + 1)
-        both[0::2], both[1::2] = around / 3, shares * 2 / 3
-        return both
-
-    # Rows at one point
-
-    @property
-    def _places(self) -> tuple[Constraint, ...]:
-        return tuple(constraint for constraint in self.constraints if not constraint.moving)
+            cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * squares
+        first, last = interval.jerks
+        for term in self.objective.terms:
+            if isinstance(term, Jerk):
+                cost += scale * term.weight * h / 3 * casadi.sum1(first * first + first * last + last * last)
+        z = casadi.vertcat(duration, q, qd, q_next, qd_next, *accelerations, *lifted)
+        p = casadi.vertcat(share, scale, usual)
+        columns = np.array([curve.columns_of(k) for k in range(K)])
+        *_, scale_at, usual_at, shares_at, _ = self._parameter_indices
+        variables = [
+            at.durations[mesh.leg][None],
+            *(side for ends in (slice(None, -1), slice(1, None)) for side in (at.q[:, ends], at.qd[:, ends])),
+            *(at.qdd[:, column] for column in columns.T),
+            *(indices for indices in at.middles if indices.size),
+        ]
+        parameters = [shares_at[None], np.tile(np.concatenate([scale_at, usual_at])[:, None], K)]
+        return Block(
+            LocalFunction(z, p, casadi.vertcat(*(value for _, value in rows)), cost),
+            np.vstack(variables),
+            np.vstack(parameters),
+            tuple(kind for kind, _ in rows),
+            np.tile(np.arange(K)[:, None], 2),
+        )
 
     @cached_property
-    def _place_counts(self) -> tuple[int, ...]:
-        return tuple(int(rows.numel()) for rows in self._rows_of(moving=False))
+    def _state_points(self) -> StatePoints:
+        """The points where torques are limited and integrands are summed."""
+        mesh, at = self.mesh, self.variables
+        K, step = mesh.intervals, np.arange(mesh.intervals)
+        columns = np.array([mesh.curve.columns_of(k) for k in range(K)])
+        each = np.stack([step, step], axis=1)
+        if mesh.curve in (Curve.CONSTANT, Curve.JUMPING):
+            ends = StatePoints.of(
+                np.hstack([at.q[:, :-1], at.q[:, 1:]]),
+                np.hstack([at.qd[:, :-1], at.qd[:, 1:]]),
+                np.hstack([at.qdd[:, columns[:, 0]], at.qdd[:, columns[:, -1]]]),
+                np.vstack([each, each]),
+                np.tile(mesh.shares, 2) * (1 / 6 if self._states_at_middles else 1 / 2),
+                np.tile(mesh.leg, 2),
+            )
+        else:
+            # A knot between two legs appears once for each, since its weights depend on both durations.
+            leg, shares = mesh.leg, mesh.shares
+            knots = [(leg[0], 0, 0, 0, shares[0] / 6)]
+            for k in range(1, K):
+                before, after = shares[k - 1] / 6, shares[k] / 6
+                if leg[k] == leg[k - 1]:
+                    knots.append((leg[k], k, k - 1, k, before + after))
+                else:
+                    knots += [(leg[k - 1], k, k - 1, k, before), (leg[k], k, k - 1, k, after)]
+            knots.append((leg[-1], K, K - 1, K - 1, shares[-1] / 6))
+            which = np.array([knot[:4] for knot in knots], dtype=int)
+            at_knot = np.append(columns[:, 0], columns[-1, -1])
+            ends = StatePoints.of(
+                at.q[:, which[:, 1]],
+                at.qd[:, which[:, 1]],
+                at.qdd[:, at_knot[which[:, 1]]],
+                which[:, 2:],
+                np.array([knot[4] for knot in knots]),
+                which[:, 0],
+                np.append(True, np.diff(which[:, 1]) > 0),
+            )
+        if not self._states_at_middles:
+            return ends
+        q, qd, qdd = at.middles
+        qdd = qdd if qdd.size else at.qdd[:, columns[:, 1]]
+        return ends.with_points(StatePoints.of(q, qd, qdd, each, 2 / 3 * mesh.shares, mesh.leg))
+
+    @property
+    def _weights(self) -> Array:
+        """Weights of the states in an integral over time, as shares of their legs' durations."""
+        return self._state_points.weights if self.objective.has_integral else np.zeros(0)
+
+    @property
+    def _states(self) -> Block:
+        """The block of the states: torques, moving constraints, and the integrands of the objective."""
+        import casadi
+
+        point, points, symbols = self.point, self._state_points, self._parameter_symbols
+        rows = [(Rows.of("torque", self.n), point.tau / point.torque_scale)] if self.with_torque else []
+        each = list(zip(self.constraints, symbols[1:], strict=True))
+        rows += [_rows_of(constraint, point, given) for constraint, given in each if constraint.moving]
+        duration, scale, weight = (casadi.SX.sym(name) for name in ("duration", "scale", "weight"))
+        z, p, cost = [point.q, point.qd, point.qdd], list(symbols), None
+        variables: list[Indices] = [points.q, points.qd, points.qdd]
+        parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
+        parameters = np.tile(parameters, points.count)
+        if self.objective.has_integral:
+            integrand = sum(
+                term.weight * term.integrand(point)
+                for term in self.objective.terms
+                if isinstance(term, Effort | Energy)
+            )
+            cost = scale * weight * duration * integrand
+            z.insert(0, duration)
+            variables.insert(0, self.variables.durations[points.leg][None])
+            *_, scale_at, _, _, weights_at = self._parameter_indices
+            parameters = np.vstack([parameters, np.tile(scale_at, points.count)[None], weights_at[None]])
+            p += [scale, weight]
+        return Block(
+            LocalFunction(casadi.vertcat(*z), casadi.vertcat(*p), casadi.vertcat(*(value for _, value in rows)), cost),
+            np.vstack(variables),
+            parameters,
+            tuple(kind for kind, _ in rows),
+            points.intervals,
+            points.is_limited,
+        )
+
+    @property
+    def _resting_places(self) -> Block:
+        """The block of the constraints of positions: at inner knots and at middles."""
+        import casadi
+
+        at, K, symbols = self.variables, self.mesh.intervals, self._parameter_symbols
+        each = [pair for pair in zip(self.constraints, symbols[1:], strict=True) if not pair[0].moving]
+        rows = [_rows_of(constraint, self.point, given) for constraint, given in each]
+        step = np.arange(K)
+        parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
+        return Block(
+            LocalFunction(self.point.q, casadi.vertcat(*symbols), casadi.vertcat(*(value for _, value in rows))),
+            np.hstack([at.q[:, 1:-1], at.middles[0]]),
+            np.tile(parameters, 2 * K - 1),
+            tuple(kind for kind, _ in rows),
+            np.vstack([np.stack([step[:-1], step[1:]], axis=1), np.stack([step, step], axis=1)]),
+        )
 
     @cached_property
     def _parameter_symbols(self) -> list[casadi.SX]:
+        """Symbols of the payload and of each constraint's parameters."""
         import casadi
 
-        sizes = self.parameter_sizes
-        return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes[1:]))]
-
-    def _rows_of(self, *, moving: bool) -> list[casadi.SX]:
-        given = zip(self.constraints, self._parameter_symbols[1:], strict=False)
-        return [
-            constraint.checked_rows(self.point, symbols) for constraint, symbols in given if constraint.moving == moving
-        ]
-
-    @cached_property
-    def _state_rows(self) -> list[tuple[str, int, Any, Any]]:
-        made = [("torque", self.n, -np.inf, np.inf)] if self.with_torque else []
-        moving = [constraint for constraint in self.constraints if constraint.moving]
-        for constraint, rows in zip(moving, self._rows_of(moving=True), strict=True):
-            made.append((constraint.what, int(rows.numel()), _lower_bound(constraint), 1.0))
-        return made
-
-    @cached_property
-    def _state_function(self) -> casadi.Function:
-        import casadi
-
-        point = self.point
-        rows = [point.tau / point.torque_scale] if self.with_torque else []
-        integrands = [term.integrand(point) for term in self.objective.terms if isinstance(term, Effort | Energy)]
-        inputs = [point.q, point.qd, point.qdd, casadi.vertcat(*self._parameter_symbols)]
-        outputs = [casadi.vertcat(*rows, *self._rows_of(moving=True)), casadi.vertcat(*integrands)]
-        return casadi.Function("state", inputs, outputs, {"cse": True})
-
-    @cached_property
-    def _place_function(self) -> casadi.Function:
-        import casadi
-
-        inputs = [self.point.q, casadi.vertcat(*self._parameter_symbols)]
-        return casadi.Function("place", inputs, [casadi.vertcat(*self._rows_of(moving=False))], {"cse": True})
+        sizes = self.parameter_sizes[1 : 1 + len(self.constraints)]
+        return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes))]
 
 
-def _lower_bound(constraint: Constraint) -> float:
-    return -1.0 if constraint.two_sided else -np.inf
+@dataclass(frozen=True, eq=False)
+class Variables:
+    """Indices of a program's variables: a row for each joint, a column for each point; empty where there are none."""
+
+    durations: Indices
+    """Of each leg, shape (legs,)."""
+    q: Indices
+    """At the knots, shape (n, intervals + 1)."""
+    qd: Indices
+    qdd: Indices
+    """Shape (n, columns), see :class:`Curve`."""
+    middles: tuple[Indices, Indices, Indices]
+    """Joint values, rates and accelerations at the middles of intervals, shape (n, intervals) each or empty."""
+
+    @classmethod
+    def of(cls, n: int, mesh: Mesh, middles: tuple[bool, bool, bool]) -> Variables:
+        """Return the indices of variables in the order of the fields, point by point."""
+        K = mesh.intervals
+        counts = (K + 1, K + 1, mesh.curve.columns(K), *(K * is_there for is_there in middles))
+        edges = len(mesh.legs) + n * np.cumsum([0, *counts])
+        q, qd, qdd, *rest = (
+            np.arange(edge, edge + n * count).reshape(n, count, order="F")
+            for edge, count in zip(edges[:-1], counts, strict=True)
+        )
+        return cls(np.arange(len(mesh.legs)), q, qd, qdd, (rest[0], rest[1], rest[2]))
+
+    @property
+    def count(self) -> int:
+        """The number of variables."""
+        rest = (self.q, self.qd, self.qdd, *self.middles)
+        return len(self.durations) + sum(indices.size for indices in rest)
+
+
+@dataclass(frozen=True, eq=False)
+class StatePoints:
+    """Points of a motion: the indices of their variables, their intervals, and their weights in an integral."""
+
+    q: Indices
+    """Shape (n, P)."""
+    qd: Indices
+    qdd: Indices
+    intervals: Indices
+    """First and last interval of each point, shape (P, 2)."""
+    weights: Array
+    """Shape (P,), shares of the leg's duration."""
+    leg: Indices
+    """Shape (P,)."""
+    is_limited: NDArray[np.bool_]
+    """Whether limits apply, shape (P,): a point that appears twice is limited once."""
+
+    @classmethod
+    def of(
+        cls,
+        q: Indices,
+        qd: Indices,
+        qdd: Indices,
+        intervals: Indices,
+        weights: Array,
+        leg: Indices,
+        is_limited: NDArray[np.bool_] | None = None,
+    ) -> StatePoints:
+        """Return points that are all limited, unless told otherwise."""
+        is_limited = np.ones(len(leg), dtype=bool) if is_limited is None else is_limited
+        return cls(q, qd, qdd, intervals, weights, leg, is_limited)
+
+    @property
+    def count(self) -> int:
+        """The number of points."""
+        return len(self.leg)
+
+    def with_points(self, other: StatePoints) -> StatePoints:
+        """Return these points followed by others."""
+        return StatePoints(
+            np.hstack([self.q, other.q]),
+            np.hstack([self.qd, other.qd]),
+            np.hstack([self.qdd, other.qdd]),
+            np.vstack([self.intervals, other.intervals]),
+            np.append(self.weights, other.weights),
+            np.append(self.leg, other.leg),
+            np.append(self.is_limited, other.is_limited),
+        )
+
+
+def _rows_of(constraint: Constraint, point: Point, parameters: casadi.SX) -> tuple[Rows, casadi.SX]:
+    expression = constraint.checked_rows(point, parameters)
+    low = -1.0 if constraint.two_sided else -np.inf
+    return Rows.of(constraint.what, expression.numel(), low, 1.0), expression

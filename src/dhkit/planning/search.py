@@ -16,7 +16,7 @@ from dhkit.planning.collision_avoidance import INFLATION_FACTOR
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
-from dhkit.planning.problem import Knots, Problem, Rows
+from dhkit.planning.problem import Knots, Problem
 from dhkit.planning.report import JOINT_LIMITS
 from dhkit.planning.solver import ProgressCall, Solution, Solver, Stopped
 from dhkit.planning.states import States
@@ -53,14 +53,12 @@ class Program:
     """A problem with its solver."""
 
     problem: Problem
-    rows: list[Rows]
     solver: Solver
 
     @classmethod
-    def of(cls, problem: Problem, tolerance: float, *, expand: bool) -> Program:
+    def of(cls, problem: Problem, tolerance: float) -> Program:
         """Build the solver of a problem."""
-        program, rows = problem.program
-        return cls(problem, rows, Solver(program, len(problem.mesh.legs), tolerance=tolerance, expand=expand))
+        return cls(problem, Solver(problem.program, len(problem.mesh.legs), tolerance=tolerance))
 
     @property
     def mesh(self) -> Mesh:
@@ -249,31 +247,33 @@ class Search:
         PlanningError
             Not converged: names the row with the largest violation.
         """
-        task, problem, mesh = self.task, self.program.problem, self.program.mesh
-        bounds = g_bounds(task, problem, self.program.rows, margins)
+        task, problem = self.task, self.program.problem
+        bounds = g_bounds(task, problem, margins)
         parameters = problem.parameters(
             task.load,
             (*task.parameters, task.avoidance.values(inflation)) if task.avoidance else task.parameters,
             1.0 / self._cost_scale(guess),
             usual_accelerations(task, guess),
         )
-        inside = x_bounds(task, mesh, margins, jerk_counts=problem.jerk_counts)
+        inside = x_bounds(task, problem, margins)
         self.solves += 1
         try:
-            solution = self.program.solver(guess.vector, parameters, inside, bounds, self.deadline, self.progress)
+            solution = self.program.solver(
+                problem.vector(guess), parameters, inside, bounds, self.deadline, self.progress
+            )
         except Stopped:
             raise _TimeLimitReached from None
         self.iterations += solution.iterations
         if solution.converged and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self.value = solution.cost
-            return Knots.of(solution.x, mesh, problem.n)
+            return problem.knots(solution.x)
         raise PlanningError(self._failure_text(solution, bounds))
 
     def _failure_text(self, solution: Solution, bounds: tuple[Array, Array]) -> str:
-        row, which, share, misses = worst_row(solution, self.program.rows, bounds)
+        what, which, share, misses = worst_row(solution, self.program.problem, bounds)
         return (
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
-            f"{self._row_name(row.what, which)} misses its bound by {misses:.2g} at {100 * share:.0f} % of the way"
+            f"{self._row_name(what, which)} misses its bound by {misses:.2g} at {100 * share:.0f} % of the way"
         )
 
     def _row_name(self, what: str, row: int) -> str:
@@ -294,7 +294,7 @@ class _TimeLimitReached(PlanningError):  # noqa: N818 (internal to this file)
 
 
 MIN_COST_SCALE = 1e-9
-JOINT_ROWS = (*JOINT_LIMITS, "joint positions", "joint velocities")
+JOINT_ROWS = (*JOINT_LIMITS, "joint positions", "joint velocities", "joint accelerations")
 """Names of rows that apply to each joint."""
 
 

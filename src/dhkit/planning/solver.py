@@ -15,6 +15,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import value_line
+from dhkit.planning.blocks import BlockProgram
 
 if TYPE_CHECKING:
     import casadi
@@ -73,19 +74,20 @@ class Solution:
 class Solver:
     """Ipopt for one program; calls from several threads take turns."""
 
-    def __init__(self, program: dict[str, Any], legs: int, *, tolerance: float, expand: bool) -> None:
+    def __init__(self, program: BlockProgram, legs: int, *, tolerance: float) -> None:
         import casadi
 
-        nx, ng, np_ = (program[name].numel() for name in ("x", "g", "p"))
+        function, derivatives = program.functions
         options: dict[str, Any] = {
+            **derivatives,
             "print_time": False,
-            "expand": expand,
             "calc_lam_p": False,
             "show_eval_warnings": False,
             "ipopt": {**OPTIONS, "tol": tolerance},
         }
-        options["iteration_callback"] = self._watch = _watch(nx, ng, np_, legs)
-        self._function = casadi.nlpsol("plan", "ipopt", program, options)
+        sizes = program.variables, program.rows, program.parameters
+        options["iteration_callback"] = self._watch = _watch(*sizes, legs)
+        self._function = casadi.nlpsol("plan", "ipopt", function, options)
         self._turn = threading.Lock()
 
     def __call__(

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.planning.blocks import Block, Indices, Rows
 from dhkit.planning.certificate import Checker, position_sizes
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.mesh import Curve, Mesh
-from dhkit.planning.problem import MIN_LEG_DURATION, Problem, Rows
+from dhkit.planning.problem import MIN_LEG_DURATION, Problem
 from dhkit.planning.solver import Solution
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits
@@ -69,22 +70,21 @@ class Margins:
         """Return the margins of a kind in each interval, shape (intervals, count), without unit."""
         return self.shares.get(what, np.zeros((self.mesh.intervals, count)))
 
-    def at_knots(self, what: str, count: int) -> Array:
-        """Return the margins at knots, shape (intervals + 1, count), without unit: the larger of both sides."""
-        shares = self.of(what, count)
-        edge = np.zeros((1, count))
-        return np.maximum(np.vstack([shares, edge]), np.vstack([edge, shares]))
+    def at_points(self, what: str, count: int, intervals: Indices) -> Array:
+        """Return the margins at points, shape (P, count), without unit: the larger of the intervals on both sides.
 
-    def at_points(self, what: str, count: int, points: int) -> Array:
-        """Return the margins at a program's points, shape (points, count).
-
-        Points are one or more in every interval, or the knots (all, or the inner ones) followed by the midpoints.
+        Parameters
+        ----------
+        intervals
+            First and last interval of each point, shape (P, 2).
         """
-        shares, K = self.of(what, count), self.mesh.intervals
-        if points % K == 0:
-            return np.tile(shares, (points // K, 1))
-        knots = self.at_knots(what, count)
-        return np.vstack([knots if points == 2 * K + 1 else knots[1:-1], shares])
+        shares = self.of(what, count)
+        return np.maximum(shares[intervals[:, 0]], shares[intervals[:, 1]])
+
+    def at_knots(self, what: str, count: int) -> Array:
+        """Return the margins at knots, shape (intervals + 1, count), without unit."""
+        k = np.arange(self.mesh.intervals + 1)
+        return self.at_points(what, count, np.stack([np.maximum(k - 1, 0), np.minimum(k, k[-1] - 1)], axis=1))
 
     def raised(self, what: str, excess: Array) -> Margins:
         """Return margins raised by an excess, shape (intervals, rows), without unit (shares of the limit)."""
@@ -92,81 +92,92 @@ class Margins:
         return Margins(self.mesh, {**self.shares, what: wider})
 
 
-def x_bounds(task: PlanTask, mesh: Mesh, margins: Margins, *, jerk_counts: bool) -> tuple[Array, Array]:
+def x_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array, Array]:
     """Return the lower and upper bounds of a program's variables, shape (variables,) each, SI units."""
-    n, K, limits = len(task.start_velocity), mesh.intervals, task.limits
-    room = margins.at_knots("position", n) * position_sizes(limits)
-    q = limits.lower + room, limits.upper - room
-    speed = limits.velocity * (1 - margins.at_knots("velocity", n))
-    qd = -speed, speed.copy()
-    columns = mesh.curve.columns(K)
-    most = np.tile(limits.acceleration, (columns, 1))
-    qdd = -most, most.copy()
+    limits, mesh, at = task.limits, problem.mesh, problem.variables
+    n, low, high = problem.n, np.full(at.count, -np.inf), np.full(at.count, np.inf)
+
+    def set_bounds(indices: Indices, lower: Array, upper: Array) -> None:
+        low[indices], high[indices] = lower, upper
+
+    room = margins.at_knots("position", n).T * position_sizes(limits)[:, None]
+    set_bounds(at.q, limits.lower[:, None] + room, limits.upper[:, None] - room)
+    if at.middles[0].size:
+        room = margins.of("position", n).T * position_sizes(limits)[:, None]
+        set_bounds(at.middles[0], limits.lower[:, None] + room, limits.upper[:, None] - room)
+    speed = limits.velocity[:, None] * (1 - margins.at_knots("velocity", n).T)
+    set_bounds(at.qd, -speed, speed)
+    set_bounds(at.qdd, -limits.acceleration[:, None], limits.acceleration[:, None])
     for k, point in zip((0, *mesh.ends), task.points, strict=True):
-        for bound in q:
-            bound[k] = point
+        set_bounds(at.q[:, k], point, point)
     for k, velocity in ((0, task.start_velocity), (-1, task.goal_velocity)):
-        for bound in qd:
-            bound[k] = velocity
-        if jerk_counts:
-            for bound in qdd:
-                bound[k] = 0.0
-    legs = len(mesh.legs)
-    low, high = (
-        np.concatenate([np.full(legs, first), *(bounds[side].ravel() for bounds in (q, qd, qdd))])
-        for side, first in enumerate((MIN_LEG_DURATION, np.inf))
-    )
-    if task.duration is not None and legs == 1:
-        low[0] = high[0] = task.duration
+        set_bounds(at.qd[:, k], velocity, velocity)
+        if problem.jerk_counts:
+            set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
+    low[at.durations] = MIN_LEG_DURATION
+    if task.duration is not None and len(mesh.legs) == 1:
+        low[at.durations] = high[at.durations] = task.duration
     return low, high
 
 
-def g_bounds(task: PlanTask, problem: Problem, rows: list[Rows], margins: Margins) -> tuple[Array, Array]:
+def g_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array, Array]:
     """Return the lower and upper bounds of a program's rows, shape (rows,) each, in the units of the rows."""
-    limits, low, high = task.limits, [], []
-    for row in rows:
-        shares = margins.at_points(row.what, row.count, row.points) if row.what in margins.shares else 0.0
-        a: Array = np.tile(row.low, (row.points, 1))
-        b: Array = np.tile(row.high, (row.points, 1))
-        match row.what:
-            case "position":
-                room = shares * position_sizes(limits)
-                zeros = np.zeros_like(a)
-                a, b = limits.lower + room + zeros, limits.upper - room + zeros
-            case "velocity":
-                b = limits.velocity * (1 - shares) + np.zeros_like(b)
-                a = -b
-            case "acceleration":
-                b = limits.acceleration + np.zeros_like(b)
-                a = -b
-            case "jerk":
-                b = limits.jerk + np.zeros_like(b)
-                a = -b
-            case "duration":
-                if task.duration is not None:
-                    a = b = np.full_like(a, task.duration)
-            case "torque":
-                b = limits.torque / problem.point.torque_scale * (1 - shares) + np.zeros_like(b)
-                a = -b
-            case _ if row.what in margins.shares:
-                b = b - shares
-                a = np.where(row.low == -row.high, -b, a)
-        low.append(a.ravel())
-        high.append(b.ravel())
-    return np.concatenate(low), np.concatenate(high)
+    lows, highs = [], []
+    for block in problem.program.blocks:
+        each = [_row_bounds(task, problem, margins, block, rows) for rows in block.rows]
+        low, high = (np.concatenate([np.zeros((block.points, 0)), *side], axis=1) for side in zip(*each, strict=True))
+        if block.is_limited is not None:
+            low[~block.is_limited], high[~block.is_limited] = -np.inf, np.inf
+        lows.append(low.ravel())
+        highs.append(high.ravel())
+    return np.concatenate(lows), np.concatenate(highs)
 
 
-def worst_row(solution: Solution, rows: list[Rows], bounds: tuple[Array, Array]) -> tuple[Rows, int, float, float]:
+def _row_bounds(task: PlanTask, problem: Problem, margins: Margins, block: Block, rows: Rows) -> tuple[Array, Array]:
+    """Return the bounds of rows of one kind, shape (P, count) each."""
+    limits, shape = task.limits, (block.points, rows.count)
+    shares = np.zeros(shape)
+    if block.intervals is not None and rows.what in margins.shares:
+        shares = margins.at_points(rows.what, rows.count, block.intervals)
+    low, high = np.broadcast_to(rows.low, shape), np.broadcast_to(rows.high, shape)
+    most: Array
+    match rows.what:
+        case "position":
+            room = shares * position_sizes(limits)
+            return limits.lower + room, limits.upper - room
+        case "duration":
+            least, longest = (-np.inf, np.inf) if task.duration is None else (task.duration, task.duration)
+            return np.full(shape, least), np.full(shape, longest)
+        case "velocity":
+            most = limits.velocity * (1 - shares)
+        case "acceleration":
+            most = limits.acceleration + 0 * shares
+        case "jerk":
+            most = limits.jerk + 0 * shares
+        case "torque":
+            most = limits.torque / problem.point.torque_scale * (1 - shares)
+        case _:
+            high = high - shares
+            return np.where(rows.low == -rows.high, -high, low), high
+    return -most, most
+
+
+def worst_row(solution: Solution, problem: Problem, bounds: tuple[Array, Array]) -> tuple[str, int, float, float]:
     """Return the kind of row with the largest violation of bounds (rows,), its index, place (0 to 1), violation."""
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)
     at, begin = int(np.argmax(misses)), 0
-    for row in rows:
-        size = row.count * row.points
-        if at < begin + size:
-            point, which = divmod(at - begin, row.count)
-            return row, which, point / max(row.points - 1, 1), float(misses[at])
-        begin += size
+    for block in problem.program.blocks:
+        if at < begin + block.count:
+            point, which = divmod(at - begin, block.function.count)
+            share = (
+                1.0 if block.intervals is None else block.intervals[point].mean() / max(problem.mesh.intervals - 1, 1)
+            )
+            for rows in block.rows:
+                if which < rows.count:
+                    return rows.what, which, float(share), float(misses[at])
+                which -= rows.count
+        begin += block.count
     raise AssertionError("a row of none")
 
 

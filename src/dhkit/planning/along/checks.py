@@ -101,10 +101,10 @@ def refuse(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) ->
     require_holdable(task.description, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")
     rows = [(row.what, names[i]) for row in task.rows for i in np.flatnonzero(row.limited)]
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
-    misses = np.where(np.isnan(misses), np.inf, misses)[: 2 * task.intervals * len(rows)]
+    misses = np.where(np.isnan(misses), np.inf, misses)[:-1].reshape(task.intervals, -1)[:, 1 : 1 + 2 * len(rows)]
     where = ""
     if misses.size and misses.max() > FEASIBILITY_TOLERANCE:
-        end, k, i = np.unravel_index(int(np.argmax(misses)), (2, task.intervals, len(rows)))
+        k, end, i = np.unravel_index(int(np.argmax(misses)), (task.intervals, 2, len(rows)))
         what, joint = rows[i]
         where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {states.s[end, k]:.4g}"
     raise PlanningError(f"not converged ({solution.status} after {solution.iterations} iterations){where}")

@@ -63,7 +63,5 @@ class PathStates:
 
     @property
     def coefficients(self) -> Array:
-        """Arguments of :class:`PathPoint`, a column for each end of an interval, shape (6 n + 6, 2 K)."""
-        parts = (self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss)
-        both = np.concatenate(parts, axis=-1)
-        return both.reshape(-1, both.shape[-1]).T
+        """Arguments of :class:`PathPoint` at both ends of the intervals, shape (2, K, 6 n + 6)."""
+        return np.concatenate([self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss], axis=-1)

@@ -8,11 +8,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.description import Array
 from dhkit.planning.along.path_states import PathStates
 from dhkit.planning.along.rows import TimingRows
 from dhkit.planning.along.terms import Terms
+from dhkit.planning.blocks import Block, BlockProgram, LocalFunction
 from dhkit.planning.objectives import Time
 from dhkit.planning.solver import Solver, delayed_interrupts
 
@@ -25,10 +27,11 @@ TIME_TOLERANCE, SMOOTH_TOLERANCE = 1e-7, 1e-8
 class TimingProgram:
     """A program for K intervals with a number of linear rows at each end; built once for each combination.
 
-    The variables are the duration and b at the inner knots, in a unit of time that the caller chooses. The rows are the
-    linear ones, (2, K, rows) flattened; those of ``terms``, a column for each end, left ends first; and the excess of
-    the intervals' time over the duration. For least time the program is convex. For other objectives it is not: slow
-    motions stay longest where gravity torques are smallest, and logarithms of b cover their range of decades.
+    The variables are the durations of the intervals and b at the inner knots, in a unit of time that the caller
+    chooses. The rows of an interval are the time that it takes beyond its duration; the linear ones, first those of its
+    left end; and those of ``terms``, likewise. The last row is the duration. For least time the program is convex. For
+    other objectives it is not: slow motions stay longest where gravity torques are smallest, and logarithms of b cover
+    their range of decades.
     """
 
     def __init__(self, intervals: int, rows: int, terms: Terms | None) -> None:
@@ -36,48 +39,70 @@ class TimingProgram:
 
         K = intervals
         self.intervals, self.rows, self.terms = intervals, rows, terms
-        x, steps = casadi.MX.sym("x", K), casadi.MX.sym("steps", 1, K)
-        left, right = casadi.MX.sym("left", rows, 2 * K), casadi.MX.sym("right", rows, 2 * K)
-        path = casadi.MX.sym("path", terms.function.numel_in(3) if terms else 0, 2 * K)
-        rate, scale = casadi.MX.sym("rate"), casadi.MX.sym("scale")
         self.logarithmic = terms is not None and not terms.objective.only_time
-        inside = casadi.exp(x[1:]).T if self.logarithmic else x[1:].T
-        duration, rest = x[0], casadi.DM(1, 1)
-        b, speed = casadi.horzcat(rest, inside, rest), casadi.horzcat(rest, casadi.sqrt(inside), rest)
-        # As a sum of speeds: the square root has no derivative at rest, and there the speed is a constant.
-        times = 2 * steps / (speed[:-1] + speed[1:])
-        b0, b1 = (casadi.repmat(casadi.horzcat(part, part), rows, 1) for part in (b[:-1], b[1:]))
-        g, f = [casadi.vec(left * b0 + right * b1)], scale * duration
-        if terms is not None:
-            sdd = (b[1:] - b[:-1]) / (2 * steps)
-            both = [casadi.horzcat(*pair) for pair in ((sdd, sdd), (b[:-1], b[1:]), (speed[:-1], speed[1:]))]
-            values = terms.function.map("along", "serial", 2 * K, [], [])(
-                both[0] * rate**2, both[1] * rate**2, both[2] * rate, path
-            )
-            g.append(casadi.vec(values[0]))
-            weight = sum(term.weight for term in terms.objective.terms if isinstance(term, Time))
-            f = scale / rate * (weight * duration + casadi.dot(casadi.horzcat(times, times) / 2, values[1]))
-        g.append(casadi.sum2(times) - duration)
-        p = casadi.vertcat(*(casadi.vec(part) for part in (steps, left, right, path, rate, scale)))
+        path = terms.function.numel_in(3) if terms else 0
+        sizes = (1, rows, rows, path)
+        # Parameters: for each interval its length and the coefficients of both ends; the unit of time, and the scale.
+        self.parameter_sizes = (1, *(2 * size for size in sizes[1:]))
+        each, scales = sum(self.parameter_sizes), K * sum(self.parameter_sizes) + np.arange(2)
+        step = np.arange(K)
+        parameters = np.vstack([each * step + np.arange(each)[:, None], np.tile(scales[:, None], K)])
+        durations, inner = step[None], K + step[None, :-1]
+        total, scale = casadi.SX.sym("total", K), casadi.SX(0, 1)
+        blocks = (
+            Block(self._interval(first=True), np.vstack([durations[:, :1], inner[:, :1]]), parameters[:, :1]),
+            Block(self._interval(), np.vstack([durations[:, 1:-1], inner[:, :-1], inner[:, 1:]]), parameters[:, 1:-1]),
+            Block(self._interval(last=True), np.vstack([durations[:, -1:], inner[:, -1:]]), parameters[:, -1:]),
+            Block(LocalFunction(total, scale, casadi.sum1(total)), durations.T, np.zeros((0, 1), dtype=int)),
+        )
         tolerance = TIME_TOLERANCE if terms is None or terms.objective.has_time else SMOOTH_TOLERANCE
-        program = {"x": x, "p": p, "f": f, "g": casadi.vertcat(*g)}
-        self.solver = Solver(program, 1, tolerance=tolerance, expand=False)
+        self.solver = Solver(BlockProgram(2 * K - 1, int(scales[-1]) + 1, blocks), K, tolerance=tolerance)
 
-    def numbers(self, duration: float, b: Array) -> Array:
-        """Return the program's variables for b at the inner knots, shape (K-1,)."""
+    def _interval(self, *, first: bool = False, last: bool = False) -> LocalFunction:
+        """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
+        import casadi
+
+        symbol, terms = casadi.SX.sym, self.terms
+        duration, inner = symbol("duration"), symbol("b", 2 - first - last)
+        step, left, right, path = (symbol(f"p{k}", size) for k, size in enumerate(self.parameter_sizes))
+        rate, scale = symbol("rate"), symbol("scale")
+        known = casadi.vertsplit(casadi.exp(inner) if self.logarithmic else inner)
+        # At rest the speed is a constant: the square root has no derivative there.
+        rest = [casadi.SX(0)]
+        b = [*rest * first, *known, *rest * last]
+        speed = [*rest * first, *(casadi.sqrt(part) for part in known), *rest * last]
+        rows = [2 * step / (speed[0] + speed[1]) - duration, left * b[0] + right * b[1]]
+        cost = scale * duration
+        if terms is not None:
+            sdd = (b[1] - b[0]) / (2 * step)
+            ends = zip(b, speed, casadi.vertsplit(path, path.numel() // 2), strict=True)
+            values = [terms.function(sdd * rate**2, x * rate**2, v * rate, given) for x, v, given in ends]
+            rows += [value[0] for value in values]
+            weight = sum(term.weight for term in terms.objective.terms if isinstance(term, Time))
+            cost = scale / rate * duration * (weight + (values[0][1] + values[1][1]) / 2)
+        z, p = casadi.vertcat(duration, inner), casadi.vertcat(step, left, right, path, rate, scale)
+        return LocalFunction(z, p, casadi.vertcat(*rows), cost)
+
+    def numbers(self, durations: ArrayLike, b: ArrayLike) -> Array:
+        """Return the program's variables for durations of the intervals (K,) and b at the inner knots, (K-1,)."""
+        K = self.intervals
         with np.errstate(divide="ignore"):
-            return np.concatenate([[duration], np.log(b) if self.logarithmic else b])
+            inner = np.log(b) if self.logarithmic else np.asarray(b)
+        return np.concatenate([np.broadcast_to(durations, K), np.broadcast_to(inner, K - 1)])
 
     def squares(self, x: Array) -> Array:
         """Return b at all knots, shape (K+1,), from the program's variables."""
-        inside = np.exp(x[1:]) if self.logarithmic else np.maximum(x[1:], 0.0)
+        inner = x[self.intervals :]
+        inside = np.exp(inner) if self.logarithmic else np.maximum(inner, 0.0)
         return np.concatenate([[0.0], inside, [0.0]])
 
     def parameters(self, states: PathStates, rows: list[TimingRows], unit: float, scale: float) -> Array:
         """Return the program's parameters, shape (parameters,); ``unit`` is the unit of time, s."""
         left, right = (self._side(rows, side) / unit**2 for side in ("left", "right"))
-        path = states.coefficients.ravel(order="F") if self.terms else np.zeros(0)
-        return np.concatenate([states.steps, left.ravel(), right.ravel(), path, [1 / unit, scale]])
+        path = states.coefficients if self.terms else np.zeros((2, self.intervals, 0))
+        ends = [np.concatenate([*part], axis=-1) for part in (left, right, path)]
+        each = np.concatenate([states.steps[:, None], *ends], axis=1)
+        return np.concatenate([each.ravel(), [1 / unit, scale]])
 
     def _side(self, rows: list[TimingRows], side: str) -> Array:
         arrays = [getattr(row, side) for row in rows]

@@ -109,10 +109,11 @@ def _solution(
     """Return the solution of a task's program from b at its knots, scaled by a unit of time (s) and a cost."""
     program = task.program
     parameters = program.parameters(task.states, task.rows, unit, 1 / cost)
-    durations = (0.0, np.inf) if task.duration is None else (1.0, 1.0)
+    durations = (0.0, np.inf)
     low, high = (program.numbers(*pair) for pair in zip(durations, task.b_bounds(reserved, unit), strict=True))
     rows = task.g_bounds(reserved)
-    start = program.numbers(1.0, b[1:-1] * unit**2)
+    speed = np.sqrt(b) * unit
+    start = program.numbers(2 * task.states.steps / (speed[:-1] + speed[1:]), b[1:-1] * unit**2)
     try:
         solution = program.solver(start, parameters, (low, high), rows, deadline, progress)
     except Stopped:

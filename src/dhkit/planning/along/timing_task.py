@@ -130,22 +130,27 @@ class TimingTask:
 
     def g_bounds(self, reserved: dict[str, Array]) -> tuple[Array, Array]:
         """Return the lower and upper bounds of the program's rows, shape (rows,) each, without unit."""
-        n = self.description.n
-        linear = [row.bounds(self.shares(reserved, row.what, n)) for row in self.rows]
-        parts = [[np.concatenate(side, axis=-1).ravel() for side in zip(*linear, strict=True)]]
+        K = self.intervals
+        linear = [row.bounds(self.shares(reserved, row.what, self.description.n)) for row in self.rows]
+        others = []
         if self.terms is not None:
-            low: list[Array] = []
-            high: list[Array] = []
             for constraint, count in zip(self.terms.constraints, self.terms.counts, strict=True):
                 most = np.tile(1 - self.shares(reserved, constraint.what, count), (2, 1, 1))
-                high.append(most)
-                low.append(-most if constraint.two_sided else np.full_like(most, -np.inf))
-            if high:
-                parts.append([np.concatenate(side, axis=-1).ravel() for side in (low, high)])
-        # For least time the intervals may take less than the duration, which keeps the program convex.
-        parts.append([np.array([-np.inf if self.objective.only_time else 0.0]), np.zeros(1)])
-        bounds = [np.concatenate(side) for side in zip(*parts, strict=True)]
-        return bounds[0], bounds[1]
+                others.append((-most if constraint.two_sided else np.full_like(most, -np.inf), most))
+
+        def side(k: int, time: float, total: float) -> Array:
+            each = [np.full((K, 1), time)]
+            for kinds in (linear, others):
+                if kinds:
+                    # First the rows of the left end of an interval, then those of the right.
+                    each.extend(np.concatenate([bounds[k] for bounds in kinds], axis=-1))
+            return np.append(np.hstack(each).ravel(), total)
+
+        # For least time the intervals may take less than their durations, which keeps the program convex.
+        least, (shortest, longest) = -np.inf if self.objective.only_time else 0.0, (0.0, np.inf)
+        if self.duration is not None:
+            shortest = longest = 1.0  # in the unit of time
+        return side(0, least, shortest), side(1, 0.0, longest)
 
     def motion(self, b: Array) -> tuple[Trajectory, Array]:
         """Return the motion with b at all knots, shape (K+1,), 1/s^2, and the times of its knots, shape (K+1,), s."""
