@@ -1,6 +1,6 @@
 """Spheres and boxes on the direct way, passed at the clearance that was asked for.
 
-Modules: collision_avoidance.
+Modules: collision_avoidance, avoiding.
 """
 
 import numpy as np

@@ -8,7 +8,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.mesh import Curve, Mesh
-from dhkit.planning.problem import Knots
+from dhkit.planning.variables import Knots
 from dhkit.trajectories import Trajectory
 
 ROUNDS = 2

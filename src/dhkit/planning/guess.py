@@ -9,9 +9,9 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.planning.assembly import knots_along
 from dhkit.planning.mesh import Mesh
-from dhkit.planning.problem import Knots
 from dhkit.planning.states import States
 from dhkit.planning.task import PlanTask
+from dhkit.planning.variables import Knots
 from dhkit.trajectories import Limits, Trajectory
 
 SAMPLES = 17

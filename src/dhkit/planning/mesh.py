@@ -1,11 +1,11 @@
-"""Mesh of a motion: the intervals of its legs, and the polynomial degree of acceleration in them."""
+"""Mesh of a motion: the intervals of its legs, the polynomial degree of acceleration in them, and its integration."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,3 +103,43 @@ def graded(intervals: int) -> Array:
     x = np.linspace(0.0, 1.0, intervals + 1)
     knots: Array = (1 - GRADING) * x + GRADING * (1 - np.cos(np.pi * x)) / 2
     return knots
+
+
+class Interval(NamedTuple):
+    """One interval of a motion: its duration h (s), the state at its beginning, and the acceleration in it.
+
+    The acceleration is at most quadratic, given by its values a, b and c at the beginning, the middle and the end; a
+    linear one has b = (a + c) / 2, a constant one a = b = c. All may be arrays or CasADi's symbols.
+    """
+
+    h: Any
+    q: Any
+    qd: Any
+    a: Any
+    b: Any
+    c: Any
+
+    @property
+    def q_end(self) -> Any:
+        """Joint values at the end, rad and m."""
+        return self.q + self.h * self.qd + self.h**2 * (self.a / 6 + self.b / 3)
+
+    @property
+    def qd_end(self) -> Any:
+        """Joint rates at the end, rad/s and m/s."""
+        return self.qd + self.h * (self.a + 4 * self.b + self.c) / 6
+
+    @property
+    def q_middle(self) -> Any:
+        """Joint values halfway in time."""
+        return self.q + self.h / 2 * self.qd + self.h**2 * (7 * self.a + 6 * self.b - self.c) / 96
+
+    @property
+    def qd_middle(self) -> Any:
+        """Joint rates halfway in time."""
+        return self.qd + self.h * (5 * self.a + 8 * self.b - self.c) / 24
+
+    @property
+    def jerks(self) -> tuple[Any, Any]:
+        """Jerks at both ends, rad/s^3 and m/s^3; the jerk is linear between them."""
+        return (-3 * self.a + 4 * self.b - self.c) / self.h, (self.a - 4 * self.b + 3 * self.c) / self.h

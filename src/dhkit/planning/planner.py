@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -15,8 +16,9 @@ from dhkit.description import Array, Payload, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
+from dhkit.planning.avoiding import AvoidingSearch
 from dhkit.planning.certificate import Checker
-from dhkit.planning.collision_avoidance import ClearanceConstraint, CollisionAvoidance
+from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
     classical_durations,
@@ -47,6 +49,8 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
 MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
+FINER = 2
+"""Factor of the intervals of a finer mesh among obstacles."""
 SMALL_ARM_SIZE = 384
 """Product of joints and default intervals for arms of few joints."""
 DURATION_TOLERANCE = 1e-3
@@ -254,10 +258,10 @@ class Planner:
     def program(self, task: PlanTask, intervals: int | None = None) -> tuple[Program, float]:
         """Return the program for a task, and the time for building it now, s."""
         intervals = self.intervals_for(task) if intervals is None else intervals
-        legs, limits, slots = len(task.points) - 1, task.limits, task.avoidance.slots
+        legs, limits = len(task.points) - 1, task.limits
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
-        key = (legs, task.is_loaded, slots, jerk_limited, with_torque, intervals)
+        key = (legs, task.is_loaded, jerk_limited, with_torque, intervals)
         with self._making:
             if key in self._programs:
                 return self._programs[key], 0.0
@@ -267,7 +271,7 @@ class Planner:
             problem = Problem(
                 self.description,
                 self.objective,
-                (*self.constraints, ClearanceConstraint(slots)) if task.avoidance else self.constraints,
+                self.constraints,
                 limits,
                 Mesh.of(intervals, legs, curve),
                 friction=self.friction,
@@ -283,6 +287,9 @@ class Planner:
         if self._requested_intervals is None and task.avoidance:
             return max(MIN_DEFAULT_INTERVALS, self.intervals // 2)
         return self.intervals
+
+    def _finer(self, task: PlanTask) -> Program:
+        return self.program(task, FINER * self.intervals_for(task))[0]
 
     # One motion
 
@@ -362,9 +369,13 @@ class Planner:
                 task = self._task(request, route.points)
                 program, seconds_made = self.program(task)
                 seconds += seconds_made
-                search = Search(task, program, deadline + seconds, progress)
+                search = Search(task.without_obstacles, program, deadline, progress)
                 try:
                     found = search(warm)
+                    if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
+                        found = AvoidingSearch(task, search, partial(self._finer, task))(warm)
+                    elif task.avoidance:
+                        found = replace(found, certificate=certificate)
                 finally:
                     iterations, solves = iterations + search.iterations, solves + search.solves
             except PlanningError as error:
@@ -394,10 +405,8 @@ class Planner:
             self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False
         )
         try:
-            program, seconds_made = quickest.program(
-                quick := quickest._task(replace(request, duration=None), routes[0].points)
-            )
-            least = Search(quick, program, deadline + seconds_made)().trajectory.duration
+            program, _ = quickest.program(quick := quickest._task(replace(request, duration=None), routes[0].points))
+            least = Search(quick, program, deadline)().trajectory.duration
         except PlanningError:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
@@ -409,8 +418,8 @@ class Planner:
         half = max(MIN_LEG_INTERVALS, self.intervals_for(task) // 2)
         if half == self.intervals_for(task):
             return None
-        program, seconds_made = self.program(task, half)
-        return coarser(Search(task, program, deadline + seconds_made), best.trajectory)
+        program, _ = self.program(task, half)
+        return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)
 
     def _require_ends(self, request: PlanRequest, points: Array) -> None:
         loaded = request.loaded(self.description)

@@ -6,22 +6,23 @@ a motion; limits can be exceeded only between the points where they are imposed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
 from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, Rows
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.integration import Interval
-from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, Time
+from dhkit.planning.obstacles.separation import PlaneRow
 from dhkit.planning.point import LOAD, Point
+from dhkit.planning.variables import Knots, StatePoints, Variables
 from dhkit.symbolic import Friction
+from dhkit.symbolic.differentiable.frames import SymbolicTable
 from dhkit.trajectories import Limits
 
 if TYPE_CHECKING:
@@ -32,25 +33,6 @@ SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
 MIN_LEG_DURATION = 1e-4
 """Shortest duration of a leg, s."""
-
-
-@dataclass(frozen=True, eq=False)
-class Knots:
-    """A motion on a mesh."""
-
-    durations: Array
-    """Durations of the legs, shape (legs,), s."""
-    q: Array
-    """Joint values at the knots, shape (intervals + 1, n), rad and m."""
-    qd: Array
-    """Joint rates at the knots, shape (intervals + 1, n), rad/s and m/s."""
-    qdd: Array
-    """Accelerations, shape (columns, n), rad/s^2 and m/s^2; see :class:`Curve`."""
-
-    def intervals(self, mesh: Mesh) -> Interval:
-        """Return all intervals at once, arrays of shape (intervals, n)."""
-        h = (mesh.shares * self.durations[mesh.leg])[:, None]
-        return Interval(h, self.q[:-1], self.qd[:-1], *mesh.curve.values(self.qdd))
 
 
 class Problem:
@@ -79,6 +61,7 @@ class Problem:
             or objective.needs_torque
             or any(constraint.needs_torque for constraint in constraints)
         )
+        self._plane_functions: dict[int, LocalFunction] = {}
         self.moving = tuple(constraint for constraint in constraints if constraint.moving)
         self.places = tuple(constraint for constraint in constraints if not constraint.moving)
 
@@ -156,6 +139,34 @@ class Problem:
         if self.places:
             blocks.append(self._resting_places)
         return BlockProgram(self.variables.count, sum(self.parameter_sizes), tuple(blocks))
+
+    def apart(self, rows: Sequence[PlaneRow]) -> tuple[BlockProgram, Array]:
+        """Return the program with points of links kept on their sides of planes, and its additional parameters."""
+        at, begin = self.variables, self.program.parameters
+        blocks, values = list(self.program.blocks), [np.zeros(0)]
+        for link in sorted({row.link for row in rows}):
+            of_link = [row for row in rows if row.link == link]
+            knots = np.array([row.knot for row in of_link])
+            planes = np.array([[*row.point, *row.normal, row.level] for row in of_link])
+            intervals = np.clip(np.stack([knots - 1, knots], axis=1), 0, self.mesh.intervals - 1)
+            parameters = (begin + np.arange(planes.size)).reshape(planes.shape).T
+            kinds = (Rows.of("clearance", 1, 0.0),)
+            blocks.append(Block(self._beside_plane(link), at.q[:, knots], parameters, kinds, intervals))
+            values.append(planes.ravel())
+            begin += planes.size
+        return BlockProgram(at.count, begin, tuple(blocks)), np.concatenate(values)
+
+    def _beside_plane(self, link: int) -> LocalFunction:
+        """Return how far a point of a link, given in its frame, is beyond a plane, m."""
+        import casadi
+
+        if link not in self._plane_functions:
+            point, normal, level = casadi.SX.sym("point", 3), casadi.SX.sym("normal", 3), casadi.SX.sym("level")
+            T = SymbolicTable.of(self.description).world_to_frames(self.point.q)[link]
+            beyond = casadi.dot(normal, T[:3, :3] @ point + T[:3, 3]) - level
+            parameters = casadi.vertcat(point, normal, level)
+            self._plane_functions[link] = LocalFunction(self.point.q, parameters, beyond)
+        return self._plane_functions[link]
 
     @property
     def _durations(self) -> Block:
@@ -240,46 +251,7 @@ class Problem:
     @cached_property
     def _state_points(self) -> StatePoints:
         """The points where torques are limited and integrands are summed."""
-        mesh, at = self.mesh, self.variables
-        K, step = mesh.intervals, np.arange(mesh.intervals)
-        columns = np.array([mesh.curve.columns_of(k) for k in range(K)])
-        each = np.stack([step, step], axis=1)
-        if mesh.curve in (Curve.CONSTANT, Curve.JUMPING):
-            ends = StatePoints.of(
-                np.hstack([at.q[:, :-1], at.q[:, 1:]]),
-                np.hstack([at.qd[:, :-1], at.qd[:, 1:]]),
-                np.hstack([at.qdd[:, columns[:, 0]], at.qdd[:, columns[:, -1]]]),
-                np.vstack([each, each]),
-                np.tile(mesh.shares, 2) * (1 / 6 if self._states_at_middles else 1 / 2),
-                np.tile(mesh.leg, 2),
-            )
-        else:
-            # A knot between two legs appears once for each, since its weights depend on both durations.
-            leg, shares = mesh.leg, mesh.shares
-            knots = [(leg[0], 0, 0, 0, shares[0] / 6)]
-            for k in range(1, K):
-                before, after = shares[k - 1] / 6, shares[k] / 6
-                if leg[k] == leg[k - 1]:
-                    knots.append((leg[k], k, k - 1, k, before + after))
-                else:
-                    knots += [(leg[k - 1], k, k - 1, k, before), (leg[k], k, k - 1, k, after)]
-            knots.append((leg[-1], K, K - 1, K - 1, shares[-1] / 6))
-            which = np.array([knot[:4] for knot in knots], dtype=int)
-            at_knot = np.append(columns[:, 0], columns[-1, -1])
-            ends = StatePoints.of(
-                at.q[:, which[:, 1]],
-                at.qd[:, which[:, 1]],
-                at.qdd[:, at_knot[which[:, 1]]],
-                which[:, 2:],
-                np.array([knot[4] for knot in knots]),
-                which[:, 0],
-                np.append(True, np.diff(which[:, 1]) > 0),
-            )
-        if not self._states_at_middles:
-            return ends
-        q, qd, qdd = at.middles
-        qdd = qdd if qdd.size else at.qdd[:, columns[:, 1]]
-        return ends.with_points(StatePoints.of(q, qd, qdd, each, 2 / 3 * mesh.shares, mesh.leg))
+        return StatePoints.of(self.mesh, self.variables, with_middles=self._states_at_middles)
 
     @property
     def _weights(self) -> Array:
@@ -346,89 +318,6 @@ class Problem:
 
         sizes = self.parameter_sizes[1 : 1 + len(self.constraints)]
         return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes))]
-
-
-@dataclass(frozen=True, eq=False)
-class Variables:
-    """Indices of a program's variables: a row for each joint, a column for each point; empty where there are none."""
-
-    durations: Indices
-    """Of each leg, shape (legs,)."""
-    q: Indices
-    """At the knots, shape (n, intervals + 1)."""
-    qd: Indices
-    qdd: Indices
-    """Shape (n, columns), see :class:`Curve`."""
-    middles: tuple[Indices, Indices, Indices]
-    """Joint values, rates and accelerations at the middles of intervals, shape (n, intervals) each or empty."""
-
-    @classmethod
-    def of(cls, n: int, mesh: Mesh, middles: tuple[bool, bool, bool]) -> Variables:
-        """Return the indices of variables in the order of the fields, point by point."""
-        K = mesh.intervals
-        counts = (K + 1, K + 1, mesh.curve.columns(K), *(K * is_there for is_there in middles))
-        edges = len(mesh.legs) + n * np.cumsum([0, *counts])
-        q, qd, qdd, *rest = (
-            np.arange(edge, edge + n * count).reshape(n, count, order="F")
-            for edge, count in zip(edges[:-1], counts, strict=True)
-        )
-        return cls(np.arange(len(mesh.legs)), q, qd, qdd, (rest[0], rest[1], rest[2]))
-
-    @property
-    def count(self) -> int:
-        """The number of variables."""
-        rest = (self.q, self.qd, self.qdd, *self.middles)
-        return len(self.durations) + sum(indices.size for indices in rest)
-
-
-@dataclass(frozen=True, eq=False)
-class StatePoints:
-    """Points of a motion: the indices of their variables, their intervals, and their weights in an integral."""
-
-    q: Indices
-    """Shape (n, P)."""
-    qd: Indices
-    qdd: Indices
-    intervals: Indices
-    """First and last interval of each point, shape (P, 2)."""
-    weights: Array
-    """Shape (P,), shares of the leg's duration."""
-    leg: Indices
-    """Shape (P,)."""
-    is_limited: NDArray[np.bool_]
-    """Whether limits apply, shape (P,): a point that appears twice is limited once."""
-
-    @classmethod
-    def of(
-        cls,
-        q: Indices,
-        qd: Indices,
-        qdd: Indices,
-        intervals: Indices,
-        weights: Array,
-        leg: Indices,
-        is_limited: NDArray[np.bool_] | None = None,
-    ) -> StatePoints:
-        """Return points that are all limited, unless told otherwise."""
-        is_limited = np.ones(len(leg), dtype=bool) if is_limited is None else is_limited
-        return cls(q, qd, qdd, intervals, weights, leg, is_limited)
-
-    @property
-    def count(self) -> int:
-        """The number of points."""
-        return len(self.leg)
-
-    def with_points(self, other: StatePoints) -> StatePoints:
-        """Return these points followed by others."""
-        return StatePoints(
-            np.hstack([self.q, other.q]),
-            np.hstack([self.qd, other.qd]),
-            np.hstack([self.qdd, other.qdd]),
-            np.vstack([self.intervals, other.intervals]),
-            np.append(self.weights, other.weights),
-            np.append(self.leg, other.leg),
-            np.append(self.is_limited, other.is_limited),
-        )
 
 
 def _rows_of(constraint: Constraint, point: Point, parameters: casadi.SX) -> tuple[Rows, casadi.SX]:

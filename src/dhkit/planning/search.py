@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,16 +11,18 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import assemble_trajectory, knots_along
+from dhkit.planning.blocks import BlockProgram
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.collision_avoidance import INFLATION_FACTOR
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
-from dhkit.planning.problem import Knots, Problem
+from dhkit.planning.obstacles.separation import PlaneRow
+from dhkit.planning.problem import Problem
 from dhkit.planning.report import JOINT_LIMITS
-from dhkit.planning.solver import ProgressCall, Solution, Solver, Stopped
+from dhkit.planning.solver import ProgressCall, Solver, Stopped
 from dhkit.planning.states import States
 from dhkit.planning.task import MAX_SMALL_JOINTS, Margins, PlanTask, g_bounds, worst_row, x_bounds
+from dhkit.planning.variables import Knots
 from dhkit.trajectories import Trajectory
 
 FEASIBILITY_TOLERANCE = 1e-5
@@ -44,8 +46,6 @@ MIN_LEG_DURATION = 1e-3
 """Shortest duration of a leg in an initial guess, s."""
 MAX_GUESSED_DURATION, GUESSED_DURATIONS = 100.0, 24
 """Longest duration (s) and number of durations that are compared for the initial guess of mixed objectives."""
-MAX_DETOURS = 8
-"""Largest number of starts with detours around obstacles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +53,20 @@ class Program:
     """A problem with its solver."""
 
     problem: Problem
+    blocks: BlockProgram
     solver: Solver
+    planes: Array
+    """Parameters of the planes that keep links apart from obstacles, shape (k,)."""
 
     @classmethod
-    def of(cls, problem: Problem, tolerance: float) -> Program:
-        """Build the solver of a problem."""
-        return cls(problem, Solver(problem.program, len(problem.mesh.legs), tolerance=tolerance))
+    def of(cls, problem: Problem, tolerance: float, planes: Sequence[PlaneRow] = ()) -> Program:
+        """Build the solver of a problem, with planes on one side of which points of links stay."""
+        blocks, values = problem.apart(planes)
+        return cls(problem, blocks, Solver(blocks, len(problem.mesh.legs), tolerance=tolerance), values)
+
+    def apart(self, planes: Sequence[PlaneRow]) -> Program:
+        """Return the same program with other planes."""
+        return Program.of(self.problem, self.solver.tolerance, planes)
 
     @property
     def mesh(self) -> Mesh:
@@ -71,6 +79,7 @@ class PlannedMotion:
     """A certified motion, with its cost and the work of finding it."""
 
     trajectory: Trajectory
+    knots: Knots
     certificate: Certificate
     cost: float
     slow_down: float
@@ -109,57 +118,48 @@ class Search:
                 try:
                     return self._certify(knots)
                 except PlanningError as error:
-                    self._keep_first_failure(error)
-        except _TimeLimitReached:
+                    self.keep_first_failure(error)
+        except TimeLimitError:
             starts = f"{self.solves} start{'s' * (self.solves > 1)}"
-            raise PlanningError(
-                f"no motion found{self._clearance_text} within the time limit, in {starts}{self._failure_reason}"
-            ) from None
-        if self.failure is None or not self.task.avoidance:
-            raise self.failure or PlanningError("no motion found")
-        raise PlanningError(
-            f"no motion found{self._clearance_text}, in {self.solves} starts{self._failure_reason}"
-        ) from None
+            reason = f"; the first: {self.failure}" if self.failure else ""
+            raise PlanningError(f"no motion found within the time limit, in {starts}{reason}") from None
+        raise self.failure or PlanningError("no motion found")
 
-    @property
-    def _clearance_text(self) -> str:
-        avoidance = self.task.avoidance
-        if not avoidance:
-            return ""
-        return f" that keeps {1000 * avoidance.clearance:.3g} mm clear of {avoidance.names}"
-
-    @property
-    def _failure_reason(self) -> str:
-        return f"; the first: {self.failure}" if self.failure else ""
-
-    def _keep_first_failure(self, error: PlanningError) -> None:
-        if isinstance(error, _TimeLimitReached):
+    def keep_first_failure(self, error: PlanningError) -> None:
+        """Remember the first failure of several starts; the end of the time is raised again."""
+        if isinstance(error, TimeLimitError):
             raise error
         self.failure = self.failure or error
 
     def _certify(self, knots: Knots) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
-        task, mesh = self.task, self.program.mesh
-        margins, inflation = Margins(mesh), np.zeros(len(task.avoidance.obstacles) + 1)
+        margins = Margins(self.program.mesh)
         for turn in range(MAX_ROUNDS):
-            trajectory = assemble_trajectory(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
-            trajectory, states, certificate, c = self._slow_down(trajectory, SMALL_STEP[mesh.curve] * STEP_GROWTH**turn)
-            if certificate.ok:
-                cost = self._cost(trajectory)
-                return PlannedMotion(
-                    trajectory, certificate, cost, c, tuple(self.tightened), self.iterations, self.solves
-                )
-            exceeded = [check.what for check in certificate.checks if check.excess > 0]
-            self.tightened += [what for what in exceeded if what not in self.tightened]
-            margins = self._widen_margins(margins, states, MARGIN_FACTOR * MARGIN_GROWTH**turn)
-            if "clearance" in exceeded:
-                inflation = inflation + INFLATION_FACTOR * task.avoidance.shortfalls(task.description, states.q)
-            guess = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
-            knots = self._solution(guess, margins, inflation)
+            found = self.checked(knots, turn)
+            if isinstance(found, PlannedMotion):
+                return found
+            margins = self.widen_margins(margins, found.states, turn)
+            knots = self.solution(found.knots, margins)
+        raise self.stays_exceeded(found.certificate)
+
+    def checked(self, knots: Knots, turn: int) -> PlannedMotion | Excess:
+        """Return a solution as a certified motion, or what it exceeds; in later turns it may be slowed down further."""
+        task, mesh = self.task, self.program.mesh
+        trajectory = assemble_trajectory(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
+        trajectory, states, certificate, c = self._slow_down(trajectory, SMALL_STEP[mesh.curve] * STEP_GROWTH**turn)
+        again = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
+        if certificate.ok:
+            cost, tightened = self._cost(trajectory), tuple(self.tightened)
+            return PlannedMotion(trajectory, again, certificate, cost, c, tightened, self.iterations, self.solves)
+        exceeded = [check.what for check in certificate.checks if check.excess > 0]
+        self.tightened += [what for what in exceeded if what not in self.tightened]
+        return Excess(trajectory, again, states, certificate)
+
+    def stays_exceeded(self, certificate: Certificate) -> PlanningError:
+        """Return the error for a limit that tightening does not help."""
         worst = max(certificate.checks, key=lambda check: check.excess)
-        raise PlanningError(
-            f"{self._row_name(worst.what, worst.row)} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds"
-        )
+        name = self._row_name(worst.what, worst.row)
+        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds")
 
     def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
         """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
@@ -176,9 +176,9 @@ class Search:
                 c = 1.0
         return trajectory, states, task.checker.check(trajectory, states), c
 
-    def _widen_margins(self, margins: Margins, states: States, factor: float) -> Margins:
-        """Return margins raised in each interval by ``factor`` times the excess of a motion."""
-        checker = self.task.checker
+    def widen_margins(self, margins: Margins, states: States, turn: int) -> Margins:
+        """Return margins raised in each interval in proportion to the excess of a motion, more in later turns."""
+        checker, factor = self.task.checker, MARGIN_FACTOR * MARGIN_GROWTH**turn
         excesses = [(what, use - 1) for what, use in checker.peaks(states) if what != "clearance"]
         for what, excess in [*excesses, ("position", checker.positions(states))]:
             worst = excess.reshape(margins.mesh.intervals, -1, excess.shape[1]).max(axis=1)
@@ -190,19 +190,16 @@ class Search:
 
     def _solutions(self, warm: Trajectory | None) -> Iterator[Knots]:
         """Yield solutions; several starts of a small arm are sorted by their cost."""
-        task, mesh = self.task, self.program.mesh
-        margins, inflation = Margins(mesh), np.zeros(len(task.avoidance.obstacles) + 1)
-        is_multistart = (
-            1 < task.arm.n <= MAX_SMALL_JOINTS and self.program.problem.objective.has_time and not task.avoidance
-        )
+        task = self.task
+        is_multistart = 1 < task.arm.n <= MAX_SMALL_JOINTS and self.program.problem.objective.has_time
         found: list[tuple[float, Knots]] = []
         for guess in self._guesses(warm, SMALL_ARM_STARTS if is_multistart else 1):
             try:
-                knots = self._solution(guess(), margins, inflation)
+                knots = self.solution(guess())
             except PlanningError as error:
-                if found and isinstance(error, _TimeLimitReached):
+                if found and isinstance(error, TimeLimitError):
                     break
-                self._keep_first_failure(error)
+                self.keep_first_failure(error)
                 continue
             if not is_multistart:
                 yield knots
@@ -215,17 +212,23 @@ class Search:
         task, mesh = self.task, self.program.mesh
         if warm is not None and len(mesh.legs) == 1:
             yield lambda: knots_along(warm, mesh, np.array([warm.duration]))
+        durations = self.guessed_durations()
+        yield lambda: straight_knots(task, mesh, durations)
+        for seed in range(starts - 1):
+            yield lambda seed=seed: detour(task, mesh, durations, seed)  # type: ignore[misc]
+        if self.failure is not None and task.duration is None:
+            for factor in RESTART_FACTORS:
+                yield lambda factor=factor: straight_knots(task, mesh, durations * factor)  # type: ignore[misc]
+
+    def guessed_durations(self) -> Array:
+        """Return durations of the legs for an initial guess, shape (legs,), s."""
+        task = self.task
         durations = np.maximum(leg_durations(task.description, task.limits, task.points), MIN_LEG_DURATION)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
         elif not self.program.problem.objective.only_time:
             durations *= self._best_factor(durations)
-        yield lambda: straight_knots(task, mesh, durations)
-        for seed in range(MAX_DETOURS if task.avoidance else starts - 1):
-            yield lambda seed=seed: detour(task, mesh, durations, seed)  # type: ignore[misc]
-        if self.failure is not None and task.duration is None:
-            for factor in RESTART_FACTORS:
-                yield lambda factor=factor: straight_knots(task, mesh, durations * factor)  # type: ignore[misc]
+        return durations
 
     def _best_factor(self, durations: Array) -> float:
         """Return the factor of the durations with which the straight path costs least."""
@@ -239,7 +242,7 @@ class Search:
     def _cost(self, trajectory: Trajectory) -> float:
         return cost_of(self.program.problem.objective, trajectory, self.task.description, self.task.friction)
 
-    def _solution(self, guess: Knots, margins: Margins, inflation: Array) -> Knots:
+    def solution(self, guess: Knots, margins: Margins | None = None, program: Program | None = None) -> Knots:
         """Return a solution from an initial guess.
 
         Raises
@@ -247,31 +250,31 @@ class Search:
         PlanningError
             Not converged: names the row with the largest violation.
         """
-        task, problem = self.task, self.program.problem
-        bounds = g_bounds(task, problem, margins)
+        task, program = self.task, program or self.program
+        problem, margins = program.problem, margins or Margins(program.mesh)
+        bounds = g_bounds(task, problem, program.blocks, margins)
         parameters = problem.parameters(
-            task.load,
-            (*task.parameters, task.avoidance.values(inflation)) if task.avoidance else task.parameters,
-            1.0 / self._cost_scale(guess),
-            usual_accelerations(task, guess),
+            task.load, task.parameters, 1.0 / self._cost_scale(guess), usual_accelerations(task, guess)
         )
         inside = x_bounds(task, problem, margins)
         self.solves += 1
         try:
-            solution = self.program.solver(
-                problem.vector(guess), parameters, inside, bounds, self.deadline, self.progress
+            solution = program.solver(
+                problem.vector(guess),
+                np.append(parameters, program.planes),
+                inside,
+                bounds,
+                self.deadline,
+                self.progress,
             )
         except Stopped:
-            raise _TimeLimitReached from None
+            raise TimeLimitError from None
         self.iterations += solution.iterations
         if solution.converged and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self.value = solution.cost
             return problem.knots(solution.x)
-        raise PlanningError(self._failure_text(solution, bounds))
-
-    def _failure_text(self, solution: Solution, bounds: tuple[Array, Array]) -> str:
-        what, which, share, misses = worst_row(solution, self.program.problem, bounds)
-        return (
+        what, which, share, misses = worst_row(solution, problem, program.blocks, bounds)
+        raise PlanningError(
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
             f"{self._row_name(what, which)} misses its bound by {misses:.2g} at {100 * share:.0f} % of the way"
         )
@@ -289,7 +292,18 @@ class Search:
         return max(size_of(objective, trajectory, task.description, task.friction), MIN_COST_SCALE)
 
 
-class _TimeLimitReached(PlanningError):  # noqa: N818 (internal to this file)
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """A motion that exceeds limits."""
+
+    trajectory: Trajectory
+    knots: Knots
+    """The motion on the mesh, as the start of the next solution."""
+    states: States
+    certificate: Certificate
+
+
+class TimeLimitError(PlanningError):
     """The time limit was reached."""
 
 

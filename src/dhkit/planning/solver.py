@@ -77,6 +77,7 @@ class Solver:
     def __init__(self, program: BlockProgram, legs: int, *, tolerance: float) -> None:
         import casadi
 
+        self.tolerance = tolerance
         function, derivatives = program.functions
         options: dict[str, Any] = {
             **derivatives,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.blocks import Block, Indices, Rows
+from dhkit.planning.blocks import Block, BlockProgram, Indices, Rows
 from dhkit.planning.certificate import Checker, position_sizes
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.mesh import Curve, Mesh
@@ -44,6 +44,11 @@ class PlanTask:
     """Parameters of each constraint."""
     friction: Friction | None = None
     avoidance: CollisionAvoidance = NO_AVOIDANCE
+
+    @property
+    def without_obstacles(self) -> PlanTask:
+        """The same motion in free space."""
+        return replace(self, avoidance=NO_AVOIDANCE, checker=replace(self.checker, avoidance=NO_AVOIDANCE))
 
     @property
     def is_loaded(self) -> bool:
@@ -120,10 +125,10 @@ def x_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array,
     return low, high
 
 
-def g_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array, Array]:
+def g_bounds(task: PlanTask, problem: Problem, program: BlockProgram, margins: Margins) -> tuple[Array, Array]:
     """Return the lower and upper bounds of a program's rows, shape (rows,) each, in the units of the rows."""
     lows, highs = [], []
-    for block in problem.program.blocks:
+    for block in program.blocks:
         each = [_row_bounds(task, problem, margins, block, rows) for rows in block.rows]
         low, high = (np.concatenate([np.zeros((block.points, 0)), *side], axis=1) for side in zip(*each, strict=True))
         if block.is_limited is not None:
@@ -162,12 +167,14 @@ def _row_bounds(task: PlanTask, problem: Problem, margins: Margins, block: Block
     return -most, most
 
 
-def worst_row(solution: Solution, problem: Problem, bounds: tuple[Array, Array]) -> tuple[str, int, float, float]:
+def worst_row(
+    solution: Solution, problem: Problem, program: BlockProgram, bounds: tuple[Array, Array]
+) -> tuple[str, int, float, float]:
     """Return the kind of row with the largest violation of bounds (rows,), its index, place (0 to 1), violation."""
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)
     at, begin = int(np.argmax(misses)), 0
-    for block in problem.program.blocks:
+    for block in program.blocks:
         if at < begin + block.count:
             point, which = divmod(at - begin, block.function.count)
             share = (

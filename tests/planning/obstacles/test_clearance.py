@@ -13,7 +13,6 @@ from dhkit.planning.obstacles import (
     Floor,
     Obstacle,
     checked_pairs,
-    deficits,
     distance,
     link_capsules,
     world_axes,
@@ -182,19 +181,6 @@ def test_shapes_and_nothing_to_check():
     assert distance(arm, np.zeros((0, 6)), SCENE).per_obstacle.shape == (0, 4)
     with pytest.raises(ValueError, match=r"expected \(..., 6\)"):
         distance(arm, np.zeros(5), SCENE)
-
-
-def test_deficits_are_what_is_short():
-    arm = library_robot("ur5")
-    q = states(arm)
-    found = distance(arm, q, SCENE, self_collision=True)
-    short = deficits(arm, q, SCENE, 0.03, self_collision=True)
-    assert short.shape == (5,)
-    for k in range(4):
-        assert short[k] == max(0.0, 0.03 - found.per_obstacle[:, k].min())
-    assert short[4] == max(0.0, 0.03 - found.itself.min())
-    assert np.array_equal(deficits(arm, q, SCENE, 0.03), short[:4])
-    assert np.all(deficits(arm, q[:1], [Obstacle.sphere(0.1, (9, 9, 9))], 0.03) == 0)
 
 
 def test_the_foot_of_an_arm_may_stand_on_the_floor():

@@ -1,24 +1,25 @@
-"""Obstacles: scenes, capsules around links, exact distances, and smooth distances for an optimizer."""
+"""Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
 
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.clearance import Distances, deficits, distance
+from dhkit.planning.obstacles.clearance import Distances, distance
 from dhkit.planning.obstacles.pairs import CheckedPairs, checked_pairs
+from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
-from dhkit.planning.obstacles.slots import SceneSlots
-from dhkit.planning.obstacles.smooth import clearances
+from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
 
 __all__ = [
     "CheckedPairs",
     "Distances",
     "Floor",
+    "Gaps",
     "LinkCapsule",
     "Obstacle",
+    "PathSampler",
+    "PlaneRow",
     "Scene",
-    "SceneSlots",
+    "Separation",
     "check_obstacles",
     "checked_pairs",
-    "clearances",
-    "deficits",
     "distance",
     "link_capsules",
     "world_axes",

@@ -110,36 +110,6 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     )
 
 
-def deficits(
-    description: Description, q: ArrayLike, obstacles: Scene, clearance: float, self_collision: bool = False
-) -> Array:
-    """Return the largest shortfalls of a path's distances from a clearance.
-
-    Parameters
-    ----------
-    q
-        Dense states of the path, shape (..., n), rad and m.
-    obstacles
-        K obstacles.
-    clearance
-        Required distance, m.
-    self_collision
-        Whether distances between links are included.
-
-    Returns
-    -------
-    Array
-        Shortfalls, shape (K,), or (K + 1,) with that between links last, m; 0 for a kept clearance, NaN for a path with
-        NaN.
-    """
-    found = distance(description, q, obstacles, self_collision)
-    gaps = found.per_obstacle.reshape(-1, len(obstacles))
-    if self_collision:
-        gaps = np.concatenate([gaps, found.itself.reshape(-1, 1)], axis=1)
-    short: Array = np.max(clearance - gaps, axis=0, initial=0.0)
-    return short
-
-
 def _from_one(
     description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
 ) -> Nearest:

@@ -30,6 +30,19 @@ def segment_distances(first: Array, second: Array) -> Array:
     Array
         Distances, shape (...), m.
     """
+    own, theirs = nearest_points(first, second)
+    distances: Array = np.linalg.norm(own - theirs, axis=-1)
+    return distances
+
+
+def nearest_points(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the nearest points of segments, shape (..., 3) each, m, on the first and on the second.
+
+    Parameters
+    ----------
+    first, second
+        As in :func:`segment_distances`.
+    """
     p, d1 = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
     other, d2 = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
     r = p - other
@@ -38,8 +51,44 @@ def segment_distances(first: Array, second: Array) -> Array:
     s = np.clip(_quotient(b * f - c * e, a * e - b * b), 0.0, 1.0)
     t = np.clip(_quotient(b * s + f, e), 0.0, 1.0)
     s = np.clip(_quotient(b * t - c, a), 0.0, 1.0)
-    distances: Array = np.linalg.norm(r + s[..., None] * d1 - t[..., None] * d2, axis=-1)
-    return distances
+    return p + s[..., None] * d1, other + t[..., None] * d2
+
+
+def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[Array, Array]:
+    """Return the nearest points of segments and a box, shape (..., 3) each, m, on the segment and in the box.
+
+    The derivative of the squared distance along a segment is piecewise linear and grows: its zero lies between two of
+    the positions at which a coordinate enters or leaves the box.
+
+    Parameters
+    ----------
+    axes
+        Ends of the segments, shape (..., 2, 3), m.
+    T_world_box
+        Pose of the box, shape (..., 4, 4), m; batch axes are broadcast.
+    half_sizes
+        Half the edges, shape (..., 3), m; zeros for a point or a segment.
+    """
+    R, centre, half = T_world_box[..., :3, :3], T_world_box[..., None, :3, 3], half_sizes[..., None, :]
+    ends = (axes - centre) @ R
+    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = np.concatenate([(-half_sizes - start) / along, (half_sizes - start) / along], axis=-1)
+    shares = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    edges = np.zeros((*shares.shape[:-1], 1))
+    shares = np.sort(np.concatenate([edges, shares, edges + 1], axis=-1), axis=-1)
+    points = start[..., None, :] + shares[..., None] * along[..., None, :]
+    slopes = np.sum(along[..., None, :] * (points - np.clip(points, -half, half)), axis=-1)
+    last = np.maximum(np.sum(slopes < 0, axis=-1, keepdims=True) - 1, 0)
+    after = np.minimum(last + 1, shares.shape[-1] - 1)
+    (s0, g0), (s1, g1) = (
+        [np.take_along_axis(array, k, axis=-1)[..., 0] for array in (shares, slopes)] for k in (last, after)
+    )
+    s = np.where(g0 >= 0, s0, np.where(g1 < 0, s1, s0 + (s1 - s0) * _quotient(-g0, g1 - g0)))
+    own = (start + s[..., None] * along)[..., None, :]
+    R_world_box = np.swapaxes(R, -1, -2)
+    found = own @ R_world_box + centre, np.clip(own, -half, half) @ R_world_box + centre
+    return found[0][..., 0, :], found[1][..., 0, :]
 
 
 def axis_bounds(obstacle: Obstacle, axes: Array) -> Bounds:

@@ -1,0 +1,212 @@
+"""Gaps of a motion from obstacles and between links, and planes that separate each pair, for an optimizer.
+
+Solids are convex. The plane at a solid's nearest point, at right angles to the shortest connection, therefore has the
+solid on one side: while a link stays on the other side, the two cannot meet. Planes are linear in the positions of the
+links, so that an optimizer needs no distances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Box, Description
+from dhkit.planning.obstacles.capsules import link_capsules, world_axes
+from dhkit.planning.obstacles.pairs import checked_pairs
+from dhkit.planning.obstacles.scene import Floor, Obstacle
+from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
+
+Indices = NDArray[np.int_]
+
+ZERO = 1e-12
+"""Length (m) of the shortest connection below which its direction is undefined."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class Pair(NamedTuple):
+    """A capsule of the arm, by its index, and what it must stay away from."""
+
+    capsule: int
+    obstacle: int | None
+    """Index of an obstacle, or None for another capsule."""
+    other: int | None = None
+    """Index of the other capsule."""
+    ends: tuple[int, ...] = (0, 1)
+    """Ends of the capsule's axis that are checked: of the floor, those whose height changes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Gaps of P pairs in K groups of states, each at the state where it is smallest."""
+
+    gap: Array
+    """Shape (K, P), m; for axes that intersect, minus the sum of the radii."""
+    normal: Array
+    """Directions from the other body to the capsule, shape (K, P, 3)."""
+    level: Array
+    """Position of the other body's surface along the normal, shape (K, P), m."""
+
+
+class PlaneRow(NamedTuple):
+    """A point of a link that must stay on one side of a plane, at a knot: normal . x >= level."""
+
+    link: int
+    """Index of its DH frame."""
+    knot: int
+    point: Array
+    """In that frame, shape (3,), m."""
+    normal: Array
+    """In the world, shape (3,)."""
+    level: float
+    """m."""
+
+
+class Separation:
+    """The pairs of an arm and a scene.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    obstacles
+        K obstacles, of which at most one is a floor.
+    self_collision
+        Whether pairs of links are included.
+    """
+
+    def __init__(
+        self, description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool = False
+    ) -> None:
+        self.description, self.obstacles = description, tuple(obstacles)
+        self.capsules = link_capsules(description)
+        self.radii = np.array([capsule.radius for capsule in self.capsules])
+        checked = checked_pairs(description)
+        self._half_lengths = np.array([capsule.length / 2 for capsule in self.capsules])
+        self.pairs: list[Pair] = []
+        self._groups: list[_Group] = []
+        for k, item in enumerate(self.obstacles):
+            if isinstance(item, Floor):
+                ends = {i: tuple(end for j, end in checked.heights if j == i) for i, _ in checked.heights}
+                self._add([Pair(i, k, None, which) for i, which in ends.items()])
+            else:
+                self._add([Pair(i, k) for i in checked.moving])
+        if self_collision:
+            self._add([Pair(i, None, j) for i, j in checked.itself])
+
+    def _add(self, pairs: list[Pair]) -> None:
+        if pairs:
+            begin = len(self.pairs)
+            self.pairs += pairs
+            obstacle = None if pairs[0].obstacle is None else self.obstacles[pairs[0].obstacle]
+            self._groups.append(_Group(slice(begin, len(self.pairs)), obstacle, [pair.capsule for pair in pairs]))
+
+    def gaps(self, q: Array, near: float = np.inf) -> Gaps:
+        """Return the gaps of K groups of states, shape (K, S, n), rad and m; infinite if surely above ``near``, m."""
+        axes = world_axes(self.description, q)
+        shape = (len(q), len(self.pairs))
+        found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape))
+        for group in self._groups:
+            at = self._near(axes, group, near)
+            if len(at[0]):
+                self._measure(axes, group, at, found)
+        return found
+
+    def smallest(self, q: Array, near: float = np.inf) -> Array:
+        """Return the smallest gap at states q (N, n), shape (N,), m; infinite if certainly above ``near``, m."""
+        smallest: Array = self.gaps(q[:, None], near).gap.min(axis=1, initial=np.inf)
+        return smallest
+
+    def rows(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array) -> list[PlaneRow]:
+        """Return the rows that keep pairs apart in the intervals of a mesh, at both of their knots.
+
+        Parameters
+        ----------
+        gaps
+            Gaps of a motion that is clear of obstacles, in K intervals.
+        active
+            Pairs to include, shape (K, P).
+        margins
+            Distances to keep, shape (K, P), m.
+        """
+        rows = []
+        for k, p in np.argwhere(active):
+            pair, n = self.pairs[p], gaps.normal[k, p]
+            capsule, need = self.capsules[pair.capsule], float(margins[k, p])
+            if pair.other is None:
+                sides = [(capsule, pair.ends, n, float(gaps.level[k, p]) + need)]
+            else:
+                # Both may move: each stays on its side of the plane halfway between them.
+                other = self.capsules[pair.other]
+                middle = float(gaps.level[k, p] + gaps.gap[k, p] / 2)
+                sides = [(capsule, (0, 1), n, middle + need / 2), (other, (0, 1), -n, -middle + need / 2)]
+            for body, ends, normal, level in sides:
+                points = [(body.start, body.end)[end] for end in (ends if body.length > 0 else ends[:1])]
+                rows += [
+                    PlaneRow(body.link, knot, point, normal, level + body.radius)
+                    for point in points
+                    for knot in (int(k), int(k) + 1)
+                    if body.link > 0
+                ]
+        return rows
+
+    def _near(self, axes: Array, group: _Group, near: float) -> tuple[Indices, Indices]:
+        """Return the groups of states and the pairs of a group whose balls around them come nearer than ``near``."""
+        capsules, item = group.capsules, group.obstacle
+        every = np.indices((len(axes), len(capsules))).reshape(2, -1)
+        if not isinstance(item, Obstacle) or np.isinf(near):
+            return every[0], every[1]
+        own = axes[:, :, capsules]
+        away = (own[..., 0, :] + own[..., 1, :]) / 2 - item.centre
+        reach = near + self.radii[capsules] + self._half_lengths[capsules] + item.radius
+        reach += float(np.linalg.norm(item.half_sizes))
+        k, p = np.nonzero(np.min(np.sum(away * away, axis=-1), axis=1) < np.maximum(reach, 0.0) ** 2)
+        return k, p
+
+    def _measure(self, axes: Array, group: _Group, at: tuple[Indices, Indices], found: Gaps) -> None:
+        """Write the gaps of some groups of states and pairs, each at its smallest."""
+        k, p = at
+        pairs = [self.pairs[group.part][i] for i in range(len(group.capsules))]
+        capsules = np.array(group.capsules)[p]
+        own, item = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.obstacle
+        radius: Array | float = 0.0
+        if item is None:
+            others = np.array([pair.other for pair in pairs])[p]
+            radius = self.radii[others]
+            on_axis, nearest = nearest_points(own, axes[k[:, None], np.arange(axes.shape[1]), others[:, None]])
+        elif isinstance(item, Floor):
+            is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
+            low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
+            nearest = np.take_along_axis(own, low, axis=-2)[..., 0, :]
+            on_axis = nearest.copy()
+            nearest[..., 2] = item.height
+            # Gaps of axes are not negative: an axis below the floor counts as on it.
+            on_axis[..., 2] = np.maximum(on_axis[..., 2], item.height)
+        elif isinstance(item.geometry, Box):
+            on_axis, nearest = nearest_on_box(own, item.T_world_obstacle, item.half_sizes)
+        else:
+            radius = item.radius
+            on_axis, nearest = nearest_points(own, item.axis)
+        along = on_axis - nearest
+        squares = np.sum(along * along, axis=-1)
+        which = np.arange(len(k)), np.argmin(squares, axis=1)
+        length = np.sqrt(squares[which])
+        normal = along[which] / np.maximum(length, ZERO)[:, None]
+        normal[length < ZERO] = UP
+        here = k, p + group.part.start
+        found.gap[here] = length - self.radii[capsules] - radius
+        found.normal[here] = normal
+        found.level[here] = np.sum(normal * nearest[which], axis=-1) + radius
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Pairs with one obstacle, or between links."""
+
+    part: slice
+    """Their indices."""
+    obstacle: Obstacle | Floor | None
+    capsules: list[int]

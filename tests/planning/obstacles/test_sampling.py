@@ -1,0 +1,57 @@
+"""Sampled paths: free from end to end, short, and the same for the same seed."""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dhkit.planning.obstacles import PathSampler
+
+LOWER, UPPER = -np.ones(2), np.ones(2)
+
+
+def wall(q):
+    """Free are points outside a wall that leaves a gap at the top."""
+    return ~((np.abs(q[:, 0]) < 0.1) & (q[:, 1] < 0.7))
+
+
+def sampler(seed=0, is_free=wall, **options):
+    return PathSampler(is_free, LOWER, UPPER, np.ones(2), seed, **options)
+
+
+def dense(path):
+    return np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(path)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_path_leads_around_a_wall(seed):
+    start, goal = np.array([-0.8, -0.5]), np.array([0.8, -0.5])
+    search = sampler(seed)
+    path = search.path(start, goal)
+    assert np.array_equal(path[0], start) and np.array_equal(path[-1], goal)
+    assert wall(dense(path)).mean() > 0.99  # states are checked 0.05 apart
+    short = search.shortened(path)
+    length = np.linalg.norm(np.diff(short, axis=0), axis=1).sum()
+    assert length <= np.linalg.norm(np.diff(path, axis=0), axis=1).sum() + 1e-12
+    shortest = 2 * np.hypot(0.7, 1.2) + 0.2
+    assert shortest * 0.98 < length < 1.15 * shortest
+    assert np.array_equal(short[[0, -1]], path[[0, -1]])
+    assert np.array_equal(path, sampler(seed).path(start, goal))
+
+
+def test_a_free_way_is_straight():
+    assert sampler().path(np.array([-0.8, 0.9]), np.array([0.8, 0.9])).shape == (2, 2)
+
+
+def test_where_there_is_no_path_it_ends(monkeypatch):
+    monkeypatch.setattr("dhkit.planning.obstacles.sampling.MAX_SAMPLES", 200)
+    closed = sampler(is_free=lambda q: np.abs(q[:, 0]) > 0.1)
+    assert closed.path(np.array([-0.8, 0.0]), np.array([0.8, 0.0])) is None
+
+
+def test_the_deadline_is_kept():
+    closed = sampler(is_free=lambda q: np.abs(q[:, 0]) > 0.1, deadline=time.perf_counter() + 0.05)
+    began = time.perf_counter()
+    assert closed.path(np.array([-0.8, 0.0]), np.array([0.8, 0.0])) is None
+    assert time.perf_counter() - began < 5
