@@ -88,10 +88,10 @@ class AvoidingSearch:
     search
         The search of the same motion without obstacles.
     finer
-        Makes the program of a finer mesh, for which paths serve that led to no motion on the first.
+        Returns the program of a finer mesh, on which paths that led to no motion are tried again, and its build time.
     """
 
-    def __init__(self, task: PlanTask, search: Search, finer: Callable[[], Program]) -> None:
+    def __init__(self, task: PlanTask, search: Search, finer: Callable[[], tuple[Program, float]]) -> None:
         avoidance = task.avoidance
         self.task, self.search, self.clearance = task, search, avoidance.clearance
         self.separation = Separation(task.arm, avoidance.obstacles, avoidance.self_collision)
@@ -112,7 +112,7 @@ class AvoidingSearch:
             # On the coarse mesh the arm may move too far in an interval for one plane to separate it from an obstacle.
             for is_finer in (False, True):
                 if is_finer:
-                    search.program = self._finer()
+                    search.program, _ = self._finer()
                 for guess in self._starts(warm):
                     try:
                         found = self._improved(*guess, np.inf if best is None else best.cost)

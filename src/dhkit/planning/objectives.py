@@ -203,6 +203,13 @@ class Objective:
         return self.only_time or any(isinstance(term, Energy) for term in self.terms)
 
     @property
+    def is_smooth(self) -> bool:
+        """Whether torques of optimal motions do not jump where no limit is reached."""
+        return all(
+            isinstance(term, Effort | Jerk) or (isinstance(term, Energy) and term.constants) for term in self.terms
+        )
+
+    @property
     def has_integral(self) -> bool:
         """Whether a term is the integral of a function of the state."""
         return any(isinstance(term, Effort | Energy) for term in self.terms)

@@ -36,10 +36,10 @@ from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
-from dhkit.planning.search import PlannedMotion, Program, Search, coarser
+from dhkit.planning.search import MAX_ROUNDS, PlannedMotion, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
-from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curve_for
+from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curves_for
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
@@ -49,10 +49,12 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
 MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
-FINER = 2
+FINER = 2.0
 """Factor of the intervals of a finer mesh among obstacles."""
 SMALL_ARM_SIZE = 384
 """Product of joints and default intervals for arms of few joints."""
+FIRST_ROUNDS = 3
+"""Largest number of solutions with tightened limits before another curve of accelerations is tried."""
 DURATION_TOLERANCE = 1e-3
 """Relative excess of the fastest motion over a given duration from which an error calls the duration too short."""
 DEFAULT_DURATION_FACTOR = 2.0
@@ -255,19 +257,27 @@ class Planner:
     # Programs
 
     @delayed_interrupts()
-    def program(self, task: PlanTask, intervals: int | None = None) -> tuple[Program, float]:
-        """Return the program for a task, and the time for building it now, s."""
-        intervals = self.intervals_for(task) if intervals is None else intervals
+    def program(self, task: PlanTask, attempt: int = 0, scale: float = 1.0) -> tuple[Program, float]:
+        """Return the program for a task, and the time for building it now, s.
+
+        Parameters
+        ----------
+        attempt
+            Index of its curve, see :func:`dhkit.planning.task.curves_for`; later ones have twice as many intervals.
+        scale
+            Factor of the number of intervals.
+        """
         legs, limits = len(task.points) - 1, task.limits
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
-        key = (legs, task.is_loaded, jerk_limited, with_torque, intervals)
+        intervals = max(MIN_LEG_INTERVALS, int(scale * self.intervals_for(task) * (2 if attempt else 1)))
+        key = (legs, task.is_loaded, jerk_limited, with_torque, intervals, attempt)
         with self._making:
             if key in self._programs:
                 return self._programs[key], 0.0
             began = time.perf_counter()
             prepare(self.description)
-            curve = curve_for(self.description.n, self.objective.has_time, jerk_limited or self.objective.has_jerk)
+            curve = self._curves(task)[attempt]
             problem = Problem(
                 self.description,
                 self.objective,
@@ -288,8 +298,9 @@ class Planner:
             return max(MIN_DEFAULT_INTERVALS, self.intervals // 2)
         return self.intervals
 
-    def _finer(self, task: PlanTask) -> Program:
-        return self.program(task, FINER * self.intervals_for(task))[0]
+    def _curves(self, task: PlanTask) -> tuple[Curve, ...]:
+        jerk_counts = bool(np.isfinite(task.limits.jerk).any()) or self.objective.has_jerk
+        return curves_for(self.description.n, self.objective, jerk_counts)
 
     # One motion
 
@@ -367,17 +378,25 @@ class Planner:
                 if route.label:  # a chosen branch; the ends of a single route were checked by _require
                     self._require_ends(request, route.points)
                 task = self._task(request, route.points)
-                program, seconds_made = self.program(task)
-                seconds += seconds_made
-                search = Search(task.without_obstacles, program, deadline, progress)
-                try:
-                    found = search(warm)
-                    if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
-                        found = AvoidingSearch(task, search, partial(self._finer, task))(warm)
-                    elif task.avoidance:
-                        found = replace(found, certificate=certificate)
-                finally:
-                    iterations, solves = iterations + search.iterations, solves + search.solves
+                for attempt in range(count := len(self._curves(task))):
+                    program, seconds_made = self.program(task, attempt)
+                    seconds += seconds_made
+                    is_last = attempt == count - 1
+                    rounds = MAX_ROUNDS if is_last else FIRST_ROUNDS
+                    search = Search(task.without_obstacles, program, deadline, progress, rounds)
+                    try:
+                        found = search(warm)
+                        if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
+                            finer = partial(self.program, task, attempt, FINER)
+                            found = AvoidingSearch(task, search, finer)(warm)
+                        elif task.avoidance:
+                            found = replace(found, certificate=certificate)
+                        break
+                    except PlanningError:
+                        if is_last or time.perf_counter() > deadline:
+                            raise
+                    finally:
+                        iterations, solves = iterations + search.iterations, solves + search.solves
             except PlanningError as error:
                 failure = failure or error
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
@@ -418,7 +437,7 @@ class Planner:
         half = max(MIN_LEG_INTERVALS, self.intervals_for(task) // 2)
         if half == self.intervals_for(task):
             return None
-        program, _ = self.program(task, half)
+        program, _ = self.program(task, scale=0.5)
         return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)
 
     def _require_ends(self, request: PlanRequest, points: Array) -> None:

@@ -97,6 +97,8 @@ class Search:
     deadline: float
     """Time at which the search ends, on the clock of ``time.perf_counter``, s."""
     progress: ProgressCall | None = None
+    rounds: int = MAX_ROUNDS
+    """Largest number of solutions with tightened limits."""
     iterations: int = 0
     solves: int = 0
     tightened: list[str] = field(default_factory=list)
@@ -134,7 +136,7 @@ class Search:
     def _certify(self, knots: Knots) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
         margins = Margins(self.program.mesh)
-        for turn in range(MAX_ROUNDS):
+        for turn in range(self.rounds):
             found = self.checked(knots, turn)
             if isinstance(found, PlannedMotion):
                 return found
@@ -159,7 +161,7 @@ class Search:
         """Return the error for a limit that tightening does not help."""
         worst = max(certificate.checks, key=lambda check: check.excess)
         name = self._row_name(worst.what, worst.row)
-        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds")
+        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {self.rounds} rounds")
 
     def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
         """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""

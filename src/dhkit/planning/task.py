@@ -11,6 +11,7 @@ from dhkit.planning.blocks import Block, BlockProgram, Indices, Rows
 from dhkit.planning.certificate import Checker, position_sizes
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.objectives import Objective
 from dhkit.planning.problem import MIN_LEG_DURATION, Problem
 from dhkit.planning.solver import Solution
 from dhkit.symbolic import Friction
@@ -188,14 +189,18 @@ def worst_row(
     raise AssertionError("a row of none")
 
 
-def curve_for(n: int, has_time: bool, jerk_counts: bool) -> Curve:
-    """Return the curve of accelerations with the fewest variables that comes near the optimum.
+def curves_for(n: int, objective: Objective, jerk_counts: bool) -> tuple[Curve, ...]:
+    """Return the curves of accelerations that are tried in turn.
 
-    Torques of time-optimal motions jump. Constant accelerations need twice as many intervals as linear ones, but are
-    solved faster for arms of many joints.
+    Torques of time-optimal motions jump, and so do those of least energy without losses in windings. Constant
+    accelerations need twice as many intervals as linear ones, but are solved faster for arms of many joints. Smooth
+    objectives are nearest to their optimum with parabolas; these exceed limits between their points where torques
+    nearly jump, as in motions in little more than the least time, for which the second curve serves.
     """
-    if not has_time:
-        return Curve.QUADRATIC
+    if objective.has_time:
+        if jerk_counts:
+            return (Curve.LINEAR,)
+        return (Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT,)
     if jerk_counts:
-        return Curve.LINEAR
-    return Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT
+        return (Curve.QUADRATIC, Curve.LINEAR)
+    return (Curve.QUADRATIC, Curve.CONSTANT) if objective.is_smooth else (Curve.CONSTANT,)
