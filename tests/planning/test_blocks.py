@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 
-from dhkit.planning.blocks import Block, BlockProgram, LocalFunction
+from dhkit.planning.blocks import Block, BlockProgram, LocalFunction, Scaling
 
 
 @pytest.fixture
@@ -45,14 +45,24 @@ def test_values_and_derivatives_are_those_of_the_program_written_out(functions):
     rng = np.random.default_rng(5)
     at = [rng.normal(size=size) for size in (program.variables, program.parameters, 1, program.rows)]
     function, derivatives = program.functions
-    found = [
-        *function(*at[:2]),
-        derivatives["grad_f"](*at[:2])[1],
-        derivatives["jac_g"](*at[:2])[1],
-        derivatives["hess_lag"](*at),
-    ]
-    for ours, theirs in zip(found, truth(*at), strict=True):
-        np.testing.assert_allclose(np.array(ours), np.array(theirs), rtol=1e-14, atol=1e-14)
+    for units in (program.unscaled, scaling(program, rng)):
+        u, r = units.unit, units.row_unit
+        arguments = [units.scaled(at[0]), np.concatenate([at[1], units.vector]), at[2], at[3] * r]
+        found = [
+            *function(*arguments[:2]),
+            derivatives["grad_f"](*arguments[:2])[1],
+            derivatives["jac_g"](*arguments[:2])[1],
+            derivatives["hess_lag"](*arguments),
+        ]
+        f, g, gradient, jacobian, hessian = (np.array(value) for value in truth(*at))
+        expected = f, g / r[:, None], gradient * u[:, None], jacobian * u / r[:, None], hessian * u * u[:, None]
+        for ours, theirs in zip(found, expected, strict=True):
+            np.testing.assert_allclose(np.array(ours), theirs, rtol=1e-12, atol=1e-12)
+
+
+def scaling(program, rng):
+    sizes = program.variables, program.variables, program.rows
+    return Scaling(*(rng.uniform(0.5, 2.0, size) for size in sizes))
 
 
 def test_derivatives_are_sparse(functions):

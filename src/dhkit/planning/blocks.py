@@ -106,6 +106,31 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
+class Scaling:
+    """Units in which a program is solved."""
+
+    offset: Array
+    """Values that count as 0, shape (variables,)."""
+    unit: Array
+    """Units of the variables, shape (variables,)."""
+    row_unit: Array
+    """Units of the rows, shape (rows,)."""
+
+    @property
+    def vector(self) -> Array:
+        """All of them, in this order."""
+        return np.concatenate([self.offset, self.unit, self.row_unit])
+
+    def scaled(self, x: Array) -> Array:
+        """Return variables, shape (variables,), in these units."""
+        return (x - self.offset) / self.unit
+
+    def variables(self, scaled: Array) -> Array:
+        """Return variables from those in these units, shape (variables,)."""
+        return self.offset + self.unit * scaled
+
+
+@dataclass(frozen=True, eq=False)
 class BlockProgram:
     """A nonlinear program: the sum of its blocks' costs, and all their rows, point by point."""
 
@@ -121,13 +146,26 @@ class BlockProgram:
         count: int = sum(block.count for block in self.blocks)
         return count
 
+    @property
+    def unscaled(self) -> Scaling:
+        """Units of 1."""
+        return Scaling(np.zeros(self.variables), np.ones(self.variables), np.ones(self.rows))
+
     @cached_property
     def functions(self) -> tuple[casadi.Function, dict[str, casadi.Function]]:
-        """The program's function of x and p for :func:`casadi.nlpsol`, and its derivatives as options of it."""
+        """The program's function of x and p for :func:`casadi.nlpsol`, and its derivatives as options of it.
+
+        The function's x are the variables less an offset over a scale, its rows are scaled, and its p are the
+        parameters followed by those of a :class:`Scaling`.
+        """
         import casadi
 
-        x, p = casadi.MX.sym("x", self.variables), casadi.MX.sym("p", self.parameters)
-        multipliers, weight = casadi.MX.sym("lam_g", self.rows), casadi.MX.sym("lam_f")
+        scaled = casadi.MX.sym("x", self.variables)
+        given = casadi.MX.sym("p", self.parameters + 2 * self.variables + self.rows)
+        edges = np.cumsum([0, self.parameters, self.variables, self.variables, self.rows])
+        p, offset, unit, row_unit = casadi.vertsplit(given, edges.tolist())
+        scaled_multipliers, weight = casadi.MX.sym("lam_g", self.rows), casadi.MX.sym("lam_f")
+        x, multipliers = offset + unit * scaled, scaled_multipliers / row_unit
         cost, rows = casadi.MX(1, 1), []
         jacobian, gradient, hessian = (
             _Nonzeros(shape) for shape in ((self.rows, self.variables), (self.variables, 1), (self.variables,) * 2)
@@ -151,18 +189,20 @@ class BlockProgram:
                 values = function.hessian.map(points)(*inputs, weights, casadi.repmat(weight, 1, points))
                 hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)
             begin += block.count
-        g = casadi.vertcat(casadi.MX(0, 1), *rows)
+        g = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
 
         def derivative(inputs: list[casadi.MX], values: dict[str, casadi.MX]) -> casadi.Function:
-            given = {"x": x, "p": p, "lam_f": weight, "lam_g": multipliers}
-            names = [name for name, symbol in given.items() if any(symbol is other for other in inputs)]
+            symbols = {"x": scaled, "p": given, "lam_f": weight, "lam_g": scaled_multipliers}
+            names = [name for name, symbol in symbols.items() if any(symbol is other for other in inputs)]
             return casadi.Function("derivative", inputs, list(values.values()), names, list(values))
 
-        program = casadi.Function("nlp", [x, p], [cost, g], ["x", "p"], ["f", "g"])
+        program = casadi.Function("nlp", [scaled, given], [cost, g], ["x", "p"], ["f", "g"])
         return program, {
-            "grad_f": derivative([x, p], {"f": cost, "grad_f_x": casadi.densify(gradient.matrix)}),
-            "jac_g": derivative([x, p], {"g": g, "jac_g_x": jacobian.matrix}),
-            "hess_lag": derivative([x, p, weight, multipliers], {"triu_hess_gamma_x_x": hessian.matrix}),
+            "grad_f": derivative([scaled, given], {"f": cost, "grad_f_x": casadi.densify(gradient.matrix()) * unit}),
+            "jac_g": derivative([scaled, given], {"g": g, "jac_g_x": jacobian.matrix(1 / row_unit, unit)}),
+            "hess_lag": derivative(
+                [scaled, given, weight, scaled_multipliers], {"triu_hess_gamma_x_x": hessian.matrix(unit, unit)}
+            ),
         }
 
 
@@ -183,8 +223,8 @@ class _Nonzeros:
         self._columns.append(columns.ravel(order="F"))
         self._values.append(casadi.vec(values))
 
-    @property
-    def matrix(self) -> casadi.MX:
+    def matrix(self, row_factors: casadi.MX | None = None, column_factors: casadi.MX | None = None) -> casadi.MX:
+        """Return the matrix, with its rows and columns multiplied by factors, shape (rows, 1) and (columns, 1)."""
         import casadi
 
         if not self._values:
@@ -193,13 +233,15 @@ class _Nonzeros:
         values = casadi.vertcat(*self._values)
         # In CasADi's order, by columns; values at the same place are added.
         places, order = np.unique(columns * self.shape[0] + rows, return_inverse=True)
-        pattern = casadi.Sparsity.triplet(
-            *self.shape, (places % self.shape[0]).tolist(), (places // self.shape[0]).tolist()
-        )
+        i, j = (places % self.shape[0]).tolist(), (places // self.shape[0]).tolist()
         if len(places) == len(order):
-            return casadi.MX(pattern, values[np.argsort(order).tolist()])
-        adding = casadi.Sparsity.triplet(len(places), len(order), order.tolist(), list(range(len(order))))
-        return casadi.MX(pattern, casadi.DM(adding, 1.0) @ values)
+            nonzeros = values[np.argsort(order).tolist()]
+        else:
+            adding = casadi.Sparsity.triplet(len(places), len(order), order.tolist(), list(range(len(order))))
+            nonzeros = casadi.DM(adding, 1.0) @ values
+        if row_factors is not None and column_factors is not None:
+            nonzeros = nonzeros * row_factors[i] * column_factors[j]
+        return casadi.MX(casadi.Sparsity.triplet(*self.shape, i, j), nonzeros)
 
 
 def _gather(vector: casadi.MX, indices: Indices) -> casadi.MX:

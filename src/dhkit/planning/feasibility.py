@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.frames import world_to_tool
 from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.goals import Place
+from dhkit.planning.goals import Place, Route
 from dhkit.planning.objectives import Objective
+from dhkit.planning.request import PlanRequest
 from dhkit.planning.states import States
 from dhkit.planning.task import PlanTask
 from dhkit.trajectories import Limits, quintic, trapezoidal
@@ -119,6 +121,61 @@ def require_bounded(description: Description, limits: Limits, objective: Objecti
             f"joint {name} has neither a torque, an acceleration nor a jerk limit, so least time has no bound below; "
             "give one of them (effort in the robot file, or limits=)"
         )
+
+
+def require_possible(
+    description: Description,
+    objective: Objective,
+    constraints: Sequence[Constraint],
+    request: PlanRequest,
+    places: Sequence[Place],
+    routes: Sequence[Route],
+) -> None:
+    """Require that the given places and limits allow a motion, as far as can be checked without a solution.
+
+    Raises
+    ------
+    PlanningError
+        Says which place, limit or obstacle does not.
+    """
+    limits = request.limits
+    loaded = request.loaded(description)
+    require_speed(description, limits, request.start_velocity, "start")
+    require_speed(description, limits, request.goal_velocity, "goal")
+    for place in places:
+        if place.q is None:
+            continue
+        if request.rests_at(place.name):
+            require_holdable(loaded, limits, place.q, place.name)
+        if request.avoidance:
+            request.avoidance.require(description, place.q, place.name)
+    resting = [constraint for constraint in constraints if not constraint.moving]
+    T_start = world_to_tool(description, routes[0].points[0])
+    for place in places:
+        require_kept(description, resting, T_start, place)
+    if request.duration is not None and request.duration < routes[0].bound:
+        least = f"the speed limits alone ask for {routes[0].bound:.6g} s"
+        raise PlanningError(f"a duration of {request.duration:.6g} s is too short: {least}")
+    moves = np.max([np.ptp(route.points, axis=0) for route in routes], axis=0) > 0
+    if not moves.any() and request.rests_at("start") and request.rests_at("goal"):
+        raise PlanningError("start and goal are the same configuration")
+    require_bounded(description, limits, objective, moves)
+
+
+def require_ends(description: Description, request: PlanRequest, points: Array) -> None:
+    """Require that the arm can be at the ends of a route's legs, configurations of shape (legs + 1, n), rad and m.
+
+    Raises
+    ------
+    PlanningError
+        Torque limits do not hold it there, or it is nearer to obstacles than the clearance.
+    """
+    loaded = request.loaded(description)
+    if request.rests_at("goal"):
+        require_holdable(loaded, request.limits, points[-1], "goal")
+    if request.avoidance:
+        for k, point in enumerate(points[1:], start=1):
+            request.avoidance.require(description, point, "goal" if k == len(points) - 1 else f"via {k}")
 
 
 def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:

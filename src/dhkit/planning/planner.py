@@ -22,13 +22,11 @@ from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
     classical_durations,
-    require_bounded,
-    require_holdable,
+    require_ends,
     require_inside_limits,
-    require_kept,
-    require_speed,
+    require_possible,
 )
-from dhkit.planning.goals import Place, Route, find_routes, parse_place
+from dhkit.planning.goals import Route, find_routes, parse_place
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
@@ -36,7 +34,7 @@ from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
-from dhkit.planning.search import MAX_ROUNDS, PlannedMotion, Program, Search, coarser
+from dhkit.planning.search import MAX_ROUNDS, RESOLUTION, PlannedMotion, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curves_for
@@ -227,7 +225,7 @@ class Planner:
             if place.q is not None:
                 require_inside_limits(description, request.limits, place.q, place.name)
         routes = find_routes(description, request.limits, places)
-        self._require(request, places, routes)
+        require_possible(description, self.objective, self.constraints, request, places, routes)
         deadline = began + time_limit
         try:
             found, branches, seconds, counts = self._best(request, routes, warm, deadline, progress)
@@ -249,8 +247,9 @@ class Planner:
             tightened=best.tightened,
             branches=branches,
             unlimited=request.limits.unlimited,
+            is_resolved=best.is_resolved,
         )
-        if compare:
+        if compare and best.is_resolved:
             report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 
@@ -304,31 +303,6 @@ class Planner:
 
     # One motion
 
-    def _require(self, request: PlanRequest, places: Sequence[Place], routes: Sequence[Route]) -> None:
-        """Require that the given places and limits allow a motion, as far as can be checked without a solution."""
-        description, limits = self.description, request.limits
-        loaded = request.loaded(description)
-        require_speed(description, limits, request.start_velocity, "start")
-        require_speed(description, limits, request.goal_velocity, "goal")
-        for place in places:
-            if place.q is None:
-                continue
-            if request.rests_at(place.name):
-                require_holdable(loaded, limits, place.q, place.name)
-            if request.avoidance:
-                request.avoidance.require(description, place.q, place.name)
-        resting = [constraint for constraint in self.constraints if not constraint.moving]
-        T_start = world_to_tool(description, routes[0].points[0])
-        for place in places:
-            require_kept(description, resting, T_start, place)
-        if request.duration is not None and request.duration < routes[0].bound:
-            least = f"the speed limits alone ask for {routes[0].bound:.6g} s"
-            raise PlanningError(f"a duration of {request.duration:.6g} s is too short: {least}")
-        moves = np.max([np.ptp(route.points, axis=0) for route in routes], axis=0) > 0
-        if not moves.any() and request.rests_at("start") and request.rests_at("goal"):
-            raise PlanningError("start and goal are the same configuration")
-        require_bounded(description, limits, self.objective, moves)
-
     def _task(self, request: PlanRequest, points: Array) -> PlanTask:
         description, limits = self.description, request.limits
         loaded = request.loaded(description)
@@ -376,27 +350,10 @@ class Planner:
                 continue
             try:
                 if route.label:  # a chosen branch; the ends of a single route were checked by _require
-                    self._require_ends(request, route.points)
+                    require_ends(self.description, request, route.points)
                 task = self._task(request, route.points)
-                for attempt in range(count := len(self._curves(task))):
-                    program, seconds_made = self.program(task, attempt)
-                    seconds += seconds_made
-                    is_last = attempt == count - 1
-                    rounds = MAX_ROUNDS if is_last else FIRST_ROUNDS
-                    search = Search(task.without_obstacles, program, deadline, progress, rounds)
-                    try:
-                        found = search(warm)
-                        if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
-                            finer = partial(self.program, task, attempt, FINER)
-                            found = AvoidingSearch(task, search, finer)(warm)
-                        elif task.avoidance:
-                            found = replace(found, certificate=certificate)
-                        break
-                    except PlanningError:
-                        if is_last or time.perf_counter() > deadline:
-                            raise
-                    finally:
-                        iterations, solves = iterations + search.iterations, solves + search.solves
+                found, made, counts = self._route_motion(task, warm, deadline, progress)
+                seconds, iterations, solves = seconds + made, iterations + counts[0], solves + counts[1]
             except PlanningError as error:
                 failure = failure or error
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
@@ -412,6 +369,35 @@ class Planner:
             tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(routes) > 1 else ()
         )
         return best, reports_of_branches, seconds, (iterations, solves)
+
+    def _route_motion(
+        self, task: PlanTask, warm: Trajectory | None, deadline: float, progress: ProgressCall | None
+    ) -> tuple[PlannedMotion, float, tuple[int, int]]:
+        """Return the best motion of a task, the building time (s), and the numbers of iterations and solutions."""
+        if task.rests and task.span < RESOLUTION:
+            return PlannedMotion.unresolved(task, self.objective), 0.0, (0, 0)
+        seconds, iterations, solves = 0.0, 0, 0
+        count = len(self._curves(task))
+        for attempt in range(count):
+            program, seconds_made = self.program(task, attempt)
+            seconds += seconds_made
+            is_last = attempt == count - 1
+            rounds = MAX_ROUNDS if is_last else FIRST_ROUNDS
+            search = Search(task.without_obstacles, program, deadline, progress, rounds)
+            try:
+                found = search(warm)
+                if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
+                    finer = partial(self.program, task, attempt, FINER)
+                    found = AvoidingSearch(task, search, finer)(warm)
+                elif task.avoidance:
+                    found = replace(found, certificate=certificate)
+                break
+            except PlanningError:
+                if is_last or time.perf_counter() > deadline:
+                    raise
+            finally:
+                iterations, solves = iterations + search.iterations, solves + search.solves
+        return found, seconds, (iterations, solves)
 
     def _with_reason(
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
@@ -439,11 +425,3 @@ class Planner:
             return None
         program, _ = self.program(task, scale=0.5)
         return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)
-
-    def _require_ends(self, request: PlanRequest, points: Array) -> None:
-        loaded = request.loaded(self.description)
-        if request.rests_at("goal"):
-            require_holdable(loaded, request.limits, points[-1], "goal")
-        if request.avoidance:
-            for k, point in enumerate(points[1:], start=1):
-                request.avoidance.require(self.description, point, "goal" if k == len(points) - 1 else f"via {k}")

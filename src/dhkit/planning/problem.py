@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, Rows
+from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, Rows, Scaling
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, Time
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
 """Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
-MIN_LEG_DURATION = 1e-4
-"""Shortest duration of a leg, s."""
+USUAL_MOVE, USUAL_DURATIONS = 0.1, (0.1, 10.0)
+"""Smallest largest move (rad or m) and range of durations (s) of motions that are planned in SI units."""
 
 
 class Problem:
@@ -108,6 +108,36 @@ class Problem:
         """Return the motion of variables, shape (variables,), SI units."""
         at = self.variables
         return Knots(x[at.durations], x[at.q].T, x[at.qd].T, x[at.qdd].T)
+
+    def scaling(self, program: BlockProgram, guess: Knots) -> Scaling:
+        """Return units in which a small, fast or slow motion is of order one; SI units for others."""
+        at, span = self.variables, float(np.ptp(guess.q, axis=0).max())
+        total = float(guess.durations.sum())
+        length = span if 0 < span < USUAL_MOVE else 1.0
+        time = 1.0 if USUAL_DURATIONS[0] < total < USUAL_DURATIONS[1] else total
+        units = program.unscaled
+        if length == time == 1.0:
+            return units
+        for k, indices in enumerate((at.q, at.qd, at.qdd, *at.middles)):
+            units.unit[indices] = length / time ** (k % 3)
+        units.unit[at.durations] = time
+        if length < 1.0:
+            for indices in (at.q, at.middles[0]):
+                units.offset[indices] = guess.q[:1].T
+        orders = {
+            **dict(zip(("joint positions", "joint velocities", "joint accelerations"), (0, 1, 2), strict=True)),
+            **dict(zip(("position", "velocity", "acceleration", "jerk"), range(4), strict=True)),
+        }
+        parts = [np.zeros(0)]
+        for block in program.blocks:
+            each = [
+                np.full(rows.count, time if rows.what == "duration" else length / time ** orders[rows.what])
+                if rows.what in orders or rows.what == "duration"
+                else np.ones(rows.count)
+                for rows in block.rows
+            ]
+            parts.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
+        return Scaling(units.offset, units.unit, np.concatenate(parts))
 
     # Arguments
 

@@ -61,6 +61,8 @@ class PlanReport:
     branches: tuple[BranchReport, ...] = ()
     unlimited: tuple[str, ...] = ()
     """Kinds of limits that the motion was planned without, such as ``acceleration``: these quantities may jump."""
+    is_resolved: bool = True
+    """Whether the motion was optimized; a move below 1e-10 rad or m is a quintic that keeps the limits."""
 
     @property
     def sensitivity(self) -> float | None:
@@ -134,6 +136,7 @@ class PlanReport:
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
             "any_active": certificate.any_active,
             "unlimited": list(self.unlimited),
+            "resolved": self.is_resolved,
             "slow_down": self.slow_down,
             "tightened": list(self.tightened),
             "intervals": self.intervals,
@@ -178,6 +181,8 @@ class PlanReport:
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
+        if not self.is_resolved:
+            lines.append("the move is too small to be optimized: a quintic that keeps the limits")
         if self.coarse is not None:
             more = f"{100 * (self.sensitivity or 0):.3g} % more"
             lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")

@@ -16,14 +16,15 @@ from dhkit.planning.certificate import Certificate
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
 from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.objectives import Objective
 from dhkit.planning.obstacles.separation import PlaneRow
-from dhkit.planning.problem import Problem
+from dhkit.planning.problem import USUAL_MOVE, Problem
 from dhkit.planning.report import JOINT_LIMITS
 from dhkit.planning.solver import ProgressCall, Solver, Stopped
 from dhkit.planning.states import States
 from dhkit.planning.task import MAX_SMALL_JOINTS, Margins, PlanTask, g_bounds, worst_row, x_bounds
 from dhkit.planning.variables import Knots
-from dhkit.trajectories import Trajectory
+from dhkit.trajectories import Trajectory, quintic
 
 FEASIBILITY_TOLERANCE = 1e-5
 """Largest violation of a solution's rows with which it is used; the certificate then decides."""
@@ -42,8 +43,16 @@ RESTART_FACTORS = (2.5, 0.6)
 """Factors of the guessed durations for further starts, if the first one fails."""
 SMALL_ARM_STARTS = 4
 """Number of starts for arms of two or three joints: their programs are small and have several local optima."""
-MIN_LEG_DURATION = 1e-3
-"""Shortest duration of a leg in an initial guess, s."""
+MIN_LEG_SHARE = 1e-4
+"""Shortest duration of a leg, as a share of the guessed duration of the motion."""
+RESOLUTION = 1e-10
+"""Smallest move (rad or m) that is optimized: below it, joint values are rounded by more than a millionth of it."""
+SHORTEST_DURATION = 1e-6
+"""Shortest duration of smaller moves, s."""
+SLOWNESS = 2.0
+"""Duration of smaller moves over that of the fastest cubic."""
+STILL_DURATION = 1e-3
+"""Guessed duration (s) of a motion that nothing limits."""
 MAX_GUESSED_DURATION, GUESSED_DURATIONS = 100.0, 24
 """Longest duration (s) and number of durations that are compared for the initial guess of mixed objectives."""
 
@@ -86,6 +95,30 @@ class PlannedMotion:
     tightened: tuple[str, ...]
     iterations: int
     solves: int
+    is_resolved: bool = True
+    """Whether the motion was optimized; a move below ``RESOLUTION`` is not."""
+
+    @classmethod
+    def unresolved(cls, task: PlanTask, objective: Objective) -> PlannedMotion:
+        """Return a quintic for a move that is too small to be optimized, slow enough for its limits.
+
+        Raises
+        ------
+        PlanningError
+            The given duration is too short.
+        """
+        least = leg_durations(task.description, task.limits, task.points[[0, -1]])
+        duration = task.duration or max(SLOWNESS * float(least.sum()), SHORTEST_DURATION)
+        trajectory = quintic(task.arm, task.points[0], task.points[-1], duration)
+        certificate = task.checker.check(trajectory)
+        if not certificate.ok:
+            worst = max(certificate.checks, key=lambda check: check.excess)
+            raise PlanningError(f"{worst.what} is exceeded by {100 * worst.excess:.2g} % at {worst.time:.3g} s")
+        cost = cost_of(objective, trajectory, task.description, task.friction)
+        knots = Knots(
+            np.array([trajectory.duration]), task.points, np.zeros_like(task.points), np.zeros((1, task.arm.n))
+        )
+        return cls(trajectory, knots, certificate, cost, 1.0, (), 0, 0, is_resolved=False)
 
 
 @dataclass(eq=False)
@@ -193,7 +226,9 @@ class Search:
     def _solutions(self, warm: Trajectory | None) -> Iterator[Knots]:
         """Yield solutions; several starts of a small arm are sorted by their cost."""
         task = self.task
-        is_multistart = 1 < task.arm.n <= MAX_SMALL_JOINTS and self.program.problem.objective.has_time
+        is_small_arm = 1 < task.arm.n <= MAX_SMALL_JOINTS and self.program.problem.objective.has_time
+        # In small moves gravity and inertia hardly change, so that detours do not pay.
+        is_multistart = is_small_arm and task.span >= USUAL_MOVE
         found: list[tuple[float, Knots]] = []
         for guess in self._guesses(warm, SMALL_ARM_STARTS if is_multistart else 1):
             try:
@@ -225,7 +260,8 @@ class Search:
     def guessed_durations(self) -> Array:
         """Return durations of the legs for an initial guess, shape (legs,), s."""
         task = self.task
-        durations = np.maximum(leg_durations(task.description, task.limits, task.points), MIN_LEG_DURATION)
+        durations = leg_durations(task.description, task.limits, task.points)
+        durations = np.maximum(durations, 10 * MIN_LEG_SHARE * float(durations.sum()) or STILL_DURATION)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
         elif not self.program.problem.objective.only_time:
@@ -258,7 +294,7 @@ class Search:
         parameters = problem.parameters(
             task.load, task.parameters, 1.0 / self._cost_scale(guess), usual_accelerations(task, guess)
         )
-        inside = x_bounds(task, problem, margins)
+        inside = x_bounds(task, problem, margins, MIN_LEG_SHARE * float(guess.durations.sum()))
         self.solves += 1
         try:
             solution = program.solver(
@@ -268,6 +304,7 @@ class Search:
                 bounds,
                 self.deadline,
                 self.progress,
+                problem.scaling(program.blocks, guess),
             )
         except Stopped:
             raise TimeLimitError from None

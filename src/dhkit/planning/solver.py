@@ -15,7 +15,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import value_line
-from dhkit.planning.blocks import BlockProgram
+from dhkit.planning.blocks import BlockProgram, Scaling
 
 if TYPE_CHECKING:
     import casadi
@@ -77,7 +77,7 @@ class Solver:
     def __init__(self, program: BlockProgram, legs: int, *, tolerance: float) -> None:
         import casadi
 
-        self.tolerance = tolerance
+        self.tolerance, self._unscaled = tolerance, program.unscaled
         function, derivatives = program.functions
         options: dict[str, Any] = {
             **derivatives,
@@ -86,7 +86,7 @@ class Solver:
             "show_eval_warnings": False,
             "ipopt": {**OPTIONS, "tol": tolerance},
         }
-        sizes = program.variables, program.rows, program.parameters
+        sizes = program.variables, program.rows, program.parameters + len(program.unscaled.vector)
         options["iteration_callback"] = self._watch = _watch(*sizes, legs)
         self._function = casadi.nlpsol("plan", "ipopt", function, options)
         self._turn = threading.Lock()
@@ -99,11 +99,14 @@ class Solver:
         g_bounds: tuple[Array, Array],
         deadline: float,
         progress: ProgressCall | None = None,
+        scaling: Scaling | None = None,
     ) -> Solution:
         """Solve from x0.
 
         Parameters
         ----------
+        scaling
+            Units in which tolerances hold.
         deadline
             Time at which to stop, on the clock of ``time.perf_counter``, s.
 
@@ -112,19 +115,21 @@ class Solver:
         Stopped
             The deadline has passed.
         """
+        units = scaling or self._unscaled
+        lbx, ubx = (units.scaled(bound) for bound in x_bounds)
+        lbg, ubg = (bound / units.row_unit for bound in g_bounds)
+        p = np.concatenate([parameters, units.vector])
         with self._turn, delayed_interrupts() as interrupts:
-            self._watch.begin(g_bounds, deadline, progress, interrupts)
-            found = self._function(
-                x0=x0, p=parameters, lbx=x_bounds[0], ubx=x_bounds[1], lbg=g_bounds[0], ubg=g_bounds[1]
-            )
+            self._watch.begin((lbg, ubg), units, deadline, progress, interrupts)
+            found = self._function(x0=units.scaled(x0), p=p, lbx=lbx, ubx=ubx, lbg=lbg, ubg=ubg)
             raised = self._watch.end()
             stats = self._function.stats()
         if raised is not None:
             raise raised
         x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
-        misses = max(_outside(x, *x_bounds), _outside(g, *g_bounds))
+        misses = max(_outside(x, lbx, ubx), _outside(g, lbg, ubg))
         success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
-        return Solution(x, g, success, status, iterations, misses, float(found["f"]))
+        return Solution(units.variables(x), g * units.row_unit, success, status, iterations, misses, float(found["f"]))
 
 
 @contextmanager
@@ -174,11 +179,13 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
         def begin(
             self,
             bounds: tuple[Array, Array],
+            units: Scaling,
             deadline: float,
             progress: ProgressCall | None,
             interrupts: list[BaseException],
         ) -> None:
-            self.bounds, self.deadline, self.progress, self.interrupts = bounds, deadline, progress, interrupts
+            self.bounds, self.units = bounds, units
+            self.deadline, self.progress, self.interrupts = deadline, progress, interrupts
             self.started, self.iteration, self.raised = time.perf_counter(), 0, None
 
         def end(self) -> BaseException | None:
@@ -205,7 +212,7 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
                     return [1]
                 if self.progress is not None:
                     values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))
-                    duration = float(casadi.sum1(values["x"][:legs]))
+                    duration = float(self.units.variables(np.array(values["x"]).ravel())[:legs].sum())
                     misses = _outside(np.array(values["g"]).ravel(), *self.bounds)
                     self.progress(Progress(self.iteration - 1, duration, misses, now - self.started))
             except BaseException as error:  # Ipopt would discard it, KeyboardInterrupt too

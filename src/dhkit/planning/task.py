@@ -12,7 +12,7 @@ from dhkit.planning.certificate import Checker, position_sizes
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
 from dhkit.planning.mesh import Curve, Mesh
 from dhkit.planning.objectives import Objective
-from dhkit.planning.problem import MIN_LEG_DURATION, Problem
+from dhkit.planning.problem import Problem
 from dhkit.planning.solver import Solution
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits
@@ -57,6 +57,11 @@ class PlanTask:
         return self.load is not None
 
     @property
+    def span(self) -> float:
+        """Largest difference of a joint's values between the given configurations, rad or m."""
+        return float(np.ptp(self.points, axis=0).max())
+
+    @property
     def rests(self) -> bool:
         """Whether the motion begins and ends at rest, so that it can be slowed down."""
         return not (self.start_velocity.any() or self.goal_velocity.any())
@@ -98,8 +103,14 @@ class Margins:
         return Margins(self.mesh, {**self.shares, what: wider})
 
 
-def x_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array, Array]:
-    """Return the lower and upper bounds of a program's variables, shape (variables,) each, SI units."""
+def x_bounds(task: PlanTask, problem: Problem, margins: Margins, shortest_leg: float) -> tuple[Array, Array]:
+    """Return the lower and upper bounds of a program's variables, shape (variables,) each, SI units.
+
+    Parameters
+    ----------
+    shortest_leg
+        Shortest duration of a leg, s.
+    """
     limits, mesh, at = task.limits, problem.mesh, problem.variables
     n, low, high = problem.n, np.full(at.count, -np.inf), np.full(at.count, np.inf)
 
@@ -120,7 +131,7 @@ def x_bounds(task: PlanTask, problem: Problem, margins: Margins) -> tuple[Array,
         set_bounds(at.qd[:, k], velocity, velocity)
         if problem.jerk_counts:
             set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
-    low[at.durations] = MIN_LEG_DURATION
+    low[at.durations] = shortest_leg
     if task.duration is not None and len(mesh.legs) == 1:
         low[at.durations] = high[at.durations] = task.duration
     return low, high
