@@ -316,10 +316,10 @@ def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
     view = View(signal_arm)
     view.show(q)
     open_offline(page, view, tmp_path)
-    without = page.screenshot()
+    without = page.screenshot(fine=True)
     view.ellipsoid(ellipsoid)
     open_offline(page, view, tmp_path)
-    picture = page.screenshot()
+    picture = page.screenshot(fine=True)
     assert (orange(picture) & ~orange(without)).sum() > 200  # its circles
     # What the page draws maps the unit ball as Python says, and its middle is the tool.
     drawn = page.evaluate("dhkit.stage.overlays.layers.ellipsoids.group.children[0].matrix.elements")
