@@ -34,6 +34,8 @@ from dhkit.planning import (
 )
 from dhkit.planning.certificate import Checker
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.costs import cost_of
+from dhkit.planning.objectives import Objective
 from dhkit.trajectories import Limits
 from planning_reference import grids, slide, worst_excess
 
@@ -482,3 +484,46 @@ def test_nothing_is_printed(planner, capfd):
     with pytest.raises(PlanningError):
         planner.solve(START, GOAL, time_limit=1e-4)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("move", [1e-9, 1e-6, 1e-3])
+def test_small_moves_take_the_square_root_of_their_size(move):
+    """Gravity and inertia hardly change, so that the fastest motion of any small move is the same but for its scale."""
+    arm = library_robot("planar2r")
+    planner, q = Planner(arm, intervals=48), np.array([0.4, 0.4])
+    small, larger = (planner.solve(q, q + size * np.array([1.0, -0.5])) for size in (move, 1e-2))
+    assert small.duration == pytest.approx(larger.duration * np.sqrt(move / 1e-2), rel=0.01)
+    assert small.report.certificate.ok and small.report.is_resolved
+    assert np.abs(small.q(small.duration) - q - move * np.array([1.0, -0.5])).max() < 1e-15
+
+
+def test_a_move_too_small_to_be_optimized_is_certified_and_the_report_says_so():
+    arm = library_robot("planar2r")
+    motion = Planner(arm).solve([0.4, 0.4], [0.4 + 1e-12, 0.4])
+    assert motion.report.certificate.ok and not motion.report.is_resolved
+    assert "too small to be optimized" in str(motion.report)
+    assert motion.q(motion.duration).tolist() == [0.4 + 1e-12, 0.4]
+    kept(arm, motion, Limits.of(arm))
+
+
+@pytest.mark.parametrize("objective", ["effort", "energy", "jerk"])
+def test_smooth_objectives_in_little_more_than_the_least_time(objective):
+    """Torques nearly jump there, which parabolas exceed between their points."""
+    arm = library_robot("planar2r")
+    quick, planner = Planner(arm), Planner(arm, objective)
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        start, goal = rng.uniform(-1, 1, (2, 2))
+        least = quick.solve(start, goal).duration
+        motion = planner.solve(start, goal, duration=1.03 * least)
+        assert motion.report.certificate.ok and motion.duration == pytest.approx(1.03 * least)
+        kept(arm, motion, Limits.of(arm))
+
+
+def test_least_energy_is_below_that_of_smooth_motions():
+    arm = library_robot("puma560")
+    start, goal = np.zeros(6), np.array([0.5, -0.4, 0.6, 0.3, 0.5, -0.2])
+    energy = Planner(arm, "energy").solve(start, goal, duration=2.0)
+    for other in ("effort", "jerk"):
+        smooth = Planner(arm, other).solve(start, goal, duration=2.0)
+        assert energy.report.cost < cost_of(Objective.of("energy"), smooth, arm)

@@ -8,6 +8,7 @@ import pytest
 
 from dhkit.description import library_robot
 from dhkit.description.frames import world_to_frames, world_to_tool
+from dhkit.dynamics import gravity_torque
 from dhkit.planning import Floor, Obstacle, Planner, distance
 from dhkit.planning.obstacles import link_capsules
 from planning_reference import worst_excess
@@ -102,6 +103,53 @@ def test_an_obstacle_that_is_far_away_changes_nothing():
     planner = Planner(PUMA, intervals=24)
     far = planner.solve(start, goal, obstacles=[Obstacle.sphere(0.1, (5, 5, 5))])
     assert far.duration == pytest.approx(planner.solve(start, goal).duration, rel=1e-4)
+
+
+def cluttered(arm, count, seed):
+    """Yield start, goal and ten spheres and boxes around an arm; the straight joint path collides."""
+    rng, numbers = np.random.default_rng(seed), arm.numbers
+    lower, upper = np.maximum(numbers.lower, -3.0), np.minimum(numbers.upper, 3.0)
+    found = 0
+    while found < count:
+        obstacles = []
+        while len(obstacles) < 10:
+            at = rng.uniform(-1, 1, 3) * arm.reach
+            at[2] = abs(at[2]) + 0.1
+            if np.linalg.norm(at[:2]) < 0.25 * arm.reach:
+                continue
+            box = rng.uniform() < 0.5
+            obstacles.append(
+                Obstacle.box(rng.uniform(0.1, 0.3, 3), at) if box else Obstacle.sphere(rng.uniform(0.05, 0.15), at)
+            )
+        states = rng.uniform(lower, upper, (200, arm.n))
+        clear = states[distance(arm, states, obstacles).distance > 0.03]
+        clear = clear[(np.abs(gravity_torque(arm, clear)) < 0.9 * numbers.effort).all(axis=1)]
+        if len(clear) < 2:
+            continue
+        way = clear[0] + np.linspace(0, 1, 60)[:, None] * (clear[1] - clear[0])
+        if distance(arm, way, obstacles).distance.min() < CLEARANCE:
+            found += 1
+            yield clear[0], clear[1], obstacles
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "panda"])
+def test_ten_obstacles(law, name):
+    arm = library_robot(name)
+    planner = Planner(arm)
+    for k, (start, goal, obstacles) in enumerate(cluttered(arm, law.samples(30) // 10, seed=7)):
+        motion = planner.solve(start, goal, obstacles=obstacles, clearance=CLEARANCE, time_limit=30)
+        q = motion.q(np.linspace(0, motion.duration, 2000))
+        law.holds("m short of the clearance", CLEARANCE - distance(arm, q, obstacles).distance.min(), ROUNDING, k)
+        for what, excess in worst_excess(arm, motion, planner.limits).items():
+            law.holds(f"{what} above its limit", excess, 1e-6, k)
+
+
+def test_an_obstacle_thinner_than_the_way_between_two_points_is_not_missed():
+    arm = library_robot("planar2r")
+    sheet = Obstacle.box((0.5, 1e-3, 0.5), (1.6, 0.0, 0.0), name="sheet")
+    motion = Planner(arm, intervals=12).solve([-0.6, 0.1], [0.6, 0.1], obstacles=[sheet], clearance=0.0)
+    q = motion.q(np.linspace(0, motion.duration, 5000))
+    assert distance(arm, q, [sheet]).distance.min() > -ROUNDING
 
 
 def test_floor_and_itself():

@@ -320,7 +320,7 @@ def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
     view.ellipsoid(ellipsoid)
     open_offline(page, view, tmp_path)
     picture = page.screenshot(fine=True)
-    assert (orange(picture) & ~orange(without)).sum() > 200  # its circles
+    assert (orange(picture) & ~orange(without)).sum() > 100  # its circles, whose edges are smoothed
     # What the page draws maps the unit ball as Python says, and its middle is the tool.
     drawn = page.evaluate("dhkit.stage.overlays.layers.ellipsoids.group.children[0].matrix.elements")
     T = np.reshape(drawn, (4, 4)).T

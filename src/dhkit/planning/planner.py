@@ -34,7 +34,7 @@ from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
-from dhkit.planning.search import MAX_ROUNDS, RESOLUTION, PlannedMotion, Program, Search, coarser
+from dhkit.planning.search import RESOLUTION, PlannedMotion, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curves_for
@@ -51,8 +51,6 @@ FINER = 2.0
 """Factor of the intervals of a finer mesh among obstacles."""
 SMALL_ARM_SIZE = 384
 """Product of joints and default intervals for arms of few joints."""
-FIRST_ROUNDS = 3
-"""Largest number of solutions with tightened limits before another curve of accelerations is tried."""
 DURATION_TOLERANCE = 1e-3
 """Relative excess of the fastest motion over a given duration from which an error calls the duration too short."""
 DEFAULT_DURATION_FACTOR = 2.0
@@ -248,6 +246,7 @@ class Planner:
             branches=branches,
             unlimited=request.limits.unlimited,
             is_resolved=best.is_resolved,
+            is_converged=best.is_converged,
         )
         if compare and best.is_resolved:
             report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))
@@ -299,7 +298,8 @@ class Planner:
 
     def _curves(self, task: PlanTask) -> tuple[Curve, ...]:
         jerk_counts = bool(np.isfinite(task.limits.jerk).any()) or self.objective.has_jerk
-        return curves_for(self.description.n, self.objective, jerk_counts)
+        has_friction = self.friction is not None
+        return curves_for(self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction)
 
     # One motion
 
@@ -382,8 +382,7 @@ class Planner:
             program, seconds_made = self.program(task, attempt)
             seconds += seconds_made
             is_last = attempt == count - 1
-            rounds = MAX_ROUNDS if is_last else FIRST_ROUNDS
-            search = Search(task.without_obstacles, program, deadline, progress, rounds)
+            search = Search(task.without_obstacles, program, deadline, progress, is_last)
             try:
                 found = search(warm)
                 if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:

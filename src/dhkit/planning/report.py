@@ -64,6 +64,9 @@ class PlanReport:
     is_resolved: bool = True
     """Whether the motion was optimized; a move below 1e-10 rad or m is a quintic that keeps the limits."""
 
+    is_converged: bool = True
+    """Whether the motion is optimal to the solver's tolerance; with friction or energy it may be only feasible."""
+
     @property
     def sensitivity(self) -> float | None:
         """Relative excess of the cost on half as many intervals over this one."""
@@ -137,6 +140,7 @@ class PlanReport:
             "any_active": certificate.any_active,
             "unlimited": list(self.unlimited),
             "resolved": self.is_resolved,
+            "converged": self.is_converged,
             "slow_down": self.slow_down,
             "tightened": list(self.tightened),
             "intervals": self.intervals,
@@ -181,6 +185,8 @@ class PlanReport:
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
+        if not self.is_converged:
+            lines.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:
             lines.append("the move is too small to be optimized: a quintic that keeps the limits")
         if self.coarse is not None:

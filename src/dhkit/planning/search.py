@@ -35,6 +35,10 @@ STEP_GROWTH = 3.0
 MARGIN_FACTOR, MARGIN_GROWTH = 1.1, 2.0
 """Factor of an excess that is added to the margin of a limit, and its growth in each round: some limits are exceeded
 only between knots."""
+UNCONVERGED_TOLERANCE = 1e-7
+"""Largest violation of a solution's rows with which it is used although it is not optimal."""
+FIRST_ROUNDS = 3
+"""Largest number of solutions with tightened limits, before another curve of accelerations is tried."""
 MAX_ROUNDS = 8
 """Largest number of solutions with tightened limits, before the search fails."""
 TIME_SCALING_MARGIN = 2e-7
@@ -97,6 +101,8 @@ class PlannedMotion:
     solves: int
     is_resolved: bool = True
     """Whether the motion was optimized; a move below ``RESOLUTION`` is not."""
+    is_converged: bool = True
+    """Whether it is optimal to the solver's tolerance, near where the search began."""
 
     @classmethod
     def unresolved(cls, task: PlanTask, objective: Objective) -> PlannedMotion:
@@ -130,8 +136,10 @@ class Search:
     deadline: float
     """Time at which the search ends, on the clock of ``time.perf_counter``, s."""
     progress: ProgressCall | None = None
-    rounds: int = MAX_ROUNDS
-    """Largest number of solutions with tightened limits."""
+    is_last: bool = True
+    """Whether no other curve of accelerations is tried after this search."""
+    is_converged: bool = True
+    """Whether the last solution is optimal to the solver's tolerance."""
     iterations: int = 0
     solves: int = 0
     tightened: list[str] = field(default_factory=list)
@@ -169,7 +177,7 @@ class Search:
     def _certify(self, knots: Knots) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
         margins = Margins(self.program.mesh)
-        for turn in range(self.rounds):
+        for turn in range(MAX_ROUNDS if self.is_last else FIRST_ROUNDS):
             found = self.checked(knots, turn)
             if isinstance(found, PlannedMotion):
                 return found
@@ -185,7 +193,17 @@ class Search:
         again = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
         if certificate.ok:
             cost, tightened = self._cost(trajectory), tuple(self.tightened)
-            return PlannedMotion(trajectory, again, certificate, cost, c, tightened, self.iterations, self.solves)
+            return PlannedMotion(
+                trajectory,
+                again,
+                certificate,
+                cost,
+                c,
+                tightened,
+                self.iterations,
+                self.solves,
+                is_converged=self.is_converged,
+            )
         exceeded = [check.what for check in certificate.checks if check.excess > 0]
         self.tightened += [what for what in exceeded if what not in self.tightened]
         return Excess(trajectory, again, states, certificate)
@@ -194,7 +212,7 @@ class Search:
         """Return the error for a limit that tightening does not help."""
         worst = max(certificate.checks, key=lambda check: check.excess)
         name = self._row_name(worst.what, worst.row)
-        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {self.rounds} rounds")
+        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds")
 
     def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
         """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
@@ -309,7 +327,10 @@ class Search:
         except Stopped:
             raise TimeLimitError from None
         self.iterations += solution.iterations
-        if solution.converged and solution.infeasibility <= FEASIBILITY_TOLERANCE:
+        # A feasible motion that is not optimal is better than none: friction and absolute powers have kinks.
+        is_usable = solution.converged or (self.is_last and solution.infeasibility <= UNCONVERGED_TOLERANCE)
+        if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
+            self.is_converged = solution.converged
             self.value = solution.cost
             return problem.knots(solution.x)
         what, which, share, misses = worst_row(solution, problem, program.blocks, bounds)

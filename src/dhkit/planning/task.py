@@ -200,13 +200,14 @@ def worst_row(
     raise AssertionError("a row of none")
 
 
-def curves_for(n: int, objective: Objective, jerk_counts: bool) -> tuple[Curve, ...]:
+def curves_for(n: int, objective: Objective, *, jerk_counts: bool, friction: bool) -> tuple[Curve, ...]:
     """Return the curves of accelerations that are tried in turn.
 
-    Torques of time-optimal motions jump, and so do those of least energy without losses in windings. Constant
-    accelerations need twice as many intervals as linear ones, but are solved faster for arms of many joints. Smooth
-    objectives are nearest to their optimum with parabolas; these exceed limits between their points where torques
-    nearly jump, as in motions in little more than the least time, for which the second curve serves.
+    Torques of time-optimal motions jump, and so do those of least energy without losses in windings and, with friction,
+    where a joint turns back. Constant accelerations need twice as many intervals as linear ones, but are solved faster
+    for arms of many joints. Smooth objectives are nearest to their optimum with parabolas; these exceed limits between
+    their points where torques nearly jump, as in motions in little more than the least time, for which the second
+    curve serves.
     """
     if objective.has_time:
         if jerk_counts:
@@ -214,4 +215,4 @@ def curves_for(n: int, objective: Objective, jerk_counts: bool) -> tuple[Curve, 
         return (Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT,)
     if jerk_counts:
         return (Curve.QUADRATIC, Curve.LINEAR)
-    return (Curve.QUADRATIC, Curve.CONSTANT) if objective.is_smooth else (Curve.CONSTANT,)
+    return (Curve.QUADRATIC, Curve.CONSTANT) if objective.is_smooth and not friction else (Curve.CONSTANT,)
