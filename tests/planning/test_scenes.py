@@ -144,6 +144,25 @@ def test_ten_obstacles(law, name):
             law.holds(f"{what} above its limit", excess, 1e-6, k)
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+def test_at_an_end_within_the_clearance_it_is_reduced_and_the_report_says_so(backwards):
+    """The gap starts at 4 mm; it keeps three quarters of that until it has reached the clearance, then all of it."""
+    start, goal = np.array([0, 0.8, -1.0, 0, 0.5, 0]), np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
+    tool, low, high = world_to_tool(PUMA, start)[:3, 3], 0.0, 0.5
+    for _ in range(50):
+        middle = (low + high) / 2
+        ball = Obstacle.sphere(0.05, tool - [middle, 0, middle / 5], name="ball")
+        low, high = (middle, high) if distance(PUMA, start, [ball]).distance < 0.004 else (low, middle)
+    ends = (goal, start) if backwards else (start, goal)
+    motion = Planner(PUMA).solve(*ends, obstacles=[ball], clearance=CLEARANCE)
+    gap = distance(PUMA, motion.q(np.linspace(0, motion.duration, 4000)), [ball]).distance
+    gap = gap[::-1] if backwards else gap
+    assert gap[0] == pytest.approx(0.004, abs=1e-6) and gap.min() > 0.003 - ROUNDING
+    assert gap[np.argmax(gap >= CLEARANCE) :].min() > CLEARANCE - ROUNDING
+    assert "clearance reduced near the ends: 3 mm between link" in str(motion.report)
+    assert motion.report.as_dict()["reduced_clearances"] == list(motion.report.reduced_clearances)
+
+
 def test_an_obstacle_thinner_than_the_way_between_two_points_is_not_missed():
     arm = library_robot("planar2r")
     sheet = Obstacle.box((0.5, 1e-3, 0.5), (1.6, 0.0, 0.0), name="sheet")

@@ -18,6 +18,7 @@ from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import MIN_REACH, Certificate
+from dhkit.planning.collision_avoidance import KEPT_SHARE
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
 from dhkit.planning.search import Excess, PlannedMotion, Program, Search, TimeLimitError
 from dhkit.planning.task import Margins, PlanTask
@@ -32,6 +33,9 @@ ROUNDING = 1e-6
 """Shortfall of a gap (m) that counts as none."""
 INFLATION_FACTOR = 1.2
 """Factor of a gap's shortfall between knots that is added to its margin."""
+LONGER = 3
+"""Factor of the number of intervals for which planes keep a clearance that is reduced at an end: the next motion may
+take more of them to reach the whole clearance."""
 MAX_SOLUTIONS = 16
 """Largest number of solutions in the improvement of one path."""
 EXPECTED_ROUNDS = 4
@@ -58,23 +62,25 @@ class Planes:
     """Gaps of that motion in each interval, which place the planes."""
     active: NDArray[np.bool_]
     """Pairs that are kept apart, shape (K, P)."""
-    margins: Array
-    """Distances to keep, shape (K, P), m: the clearance, and what is missing between knots."""
+    required: Array
+    """Distances to keep, shape (K, P), m."""
+    inflation: Array | float
+    """Additions to them for what is missing between knots, shape (K, P), m."""
 
     @classmethod
-    def of(cls, gaps: Gaps, clearance: float, margins: Array | None = None) -> Planes:
+    def of(cls, gaps: Gaps, required: Array, inflation: Array | float) -> Planes:
         """Return the planes beside a motion with these gaps."""
-        margins = np.full(gaps.gap.shape, clearance) if margins is None else margins
-        return cls(gaps, gaps.gap < clearance + ACTIVE_GAP, margins)
+        return cls(gaps, gaps.gap < required + ACTIVE_GAP, required, inflation)
 
-    def widened(self, gap: Array, clearance: float) -> bool:
-        """Include pairs of another motion that came too near, and widen margins; return whether pairs were new."""
-        short = clearance - gap
+    def widened(self, gap: Array, required: Array) -> bool:
+        """Include pairs of another motion that came too near, and inflate others; return whether pairs were new."""
+        short = required - gap
         new = (short > ROUNDING) & ~self.active
         # An active pair is too near only between knots.
-        self.margins = self.margins + INFLATION_FACTOR * np.where(self.active, np.maximum(short, 0.0), 0.0)
+        missing = np.where(self.active, np.maximum(short, 0.0), 0.0)
+        self.inflation = self.inflation + INFLATION_FACTOR * missing
         if new.any():
-            self.active = self.active | (gap < clearance + ACTIVE_GAP / 2)
+            self.active = self.active | (gap < required + ACTIVE_GAP / 2)
         return bool(new.any())
 
 
@@ -171,7 +177,9 @@ class AvoidingSearch:
         lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span)
         upper = np.where(np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span)
         ends = self.separation.gaps(task.points[:, None]).gap
-        need = np.minimum(self.clearance + PATH_CLEARANCE, ends.min(axis=0) - ROUNDING)
+        least = ends.min(axis=0)
+        at_ends = np.where(least < self.clearance, KEPT_SHARE * least, least - ROUNDING)
+        need = np.minimum(self.clearance + PATH_CLEARANCE, at_ends)
         speed, most = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0), float(need.max(initial=0.0))
 
         def is_free(q: Array) -> NDArray[np.bool_]:
@@ -239,11 +247,13 @@ class AvoidingSearch:
         """
         search, mesh = self.search, self.search.program.mesh
         guess = knots_along(start, mesh, ends)
-        planes, margins = Planes.of(self._gaps(start, guess, np.inf), self.clearance), Margins(mesh)
+        gaps = self._gaps(start, guess, np.inf)
+        planes, margins = Planes.of(gaps, self._required(gaps, LONGER), 0.0), Margins(mesh)
         best: PlannedMotion | None = None
         turn = 0
         for _ in range(MAX_SOLUTIONS):
-            program = search.program.apart(self.separation.rows(planes.gaps, planes.active, planes.margins))
+            kept = planes.required + planes.inflation
+            program = search.program.apart(self.separation.rows(planes.gaps, planes.active, kept, {0, *mesh.ends}))
             try:
                 found = search.checked(search.solution(guess, margins, program), turn)
             except PlanningError:
@@ -251,7 +261,8 @@ class AvoidingSearch:
                     return best
                 raise
             gaps = self._gaps(found.trajectory, found.knots, self.clearance + ACTIVE_GAP)
-            short = self.clearance - float(gaps.gap.min(initial=np.inf))
+            required = self._required(gaps)
+            short = float(np.max(required - gaps.gap, initial=-np.inf))
             missing = 0.0
             if isinstance(found, PlannedMotion) and short <= ROUNDING:
                 found = self._certified(found)
@@ -264,10 +275,10 @@ class AvoidingSearch:
                 if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
                     break
                 gaps = self._gaps(found.trajectory, found.knots, np.inf)
-                planes = Planes.of(gaps, self.clearance, planes.margins)
+                planes = Planes.of(gaps, self._required(gaps, LONGER), planes.inflation)
                 guess = found.knots
                 continue
-            is_new = planes.widened(gaps.gap - missing, self.clearance)
+            is_new = planes.widened(gaps.gap - missing, required)
             if is_new and short > ACTIVE_GAP:
                 continue  # from the same guess: this motion went far astray
             if isinstance(found, Excess) and any(
@@ -296,6 +307,10 @@ class AvoidingSearch:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""
         short = [check.excess for check in certificate.checks if check.what == "clearance"]
         return max(0.0, *short) * max(self.task.description.reach, MIN_REACH)
+
+    def _required(self, gaps: Gaps, longer: int = 1) -> Array:
+        """Return the required gaps in each interval, shape (K, P), m."""
+        return self.task.avoidance.required(gaps.gap, self.separation.pairs, longer)
 
     def _gaps(self, motion: Trajectory, knots: Knots, near: float) -> Gaps:
         """Return the gaps in each interval of the mesh; those above ``near`` (m) may be infinite."""

@@ -194,7 +194,7 @@ class Checker:
         for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
             found.append((constraint.what, constraint.use(states, parameters)))
         if self.avoidance:
-            short = self.avoidance.clearance - self.avoidance.gaps(self.description, states.q)
+            short = self.avoidance.shortfalls(self.description, states.q)
             found.append(("clearance", 1 + short[:, None] / max(self.description.reach, MIN_REACH)))
         return found
 

@@ -4,13 +4,44 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
-from dhkit.planning.obstacles import Floor, Obstacle, Scene, check_obstacles, distance
+from dhkit.planning.obstacles import (
+    Floor,
+    Obstacle,
+    Pair,
+    Scene,
+    Separation,
+    check_obstacles,
+    distance,
+    distances_without,
+    pair_distances,
+    required_gaps,
+)
+
+KEPT_SHARE = 0.75
+"""Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
+way out of a narrow place."""
+
+
+@dataclass(frozen=True)
+class ReducedClearance:
+    """A pair that is nearer than the clearance at the start or the goal of a motion, and what it keeps there."""
+
+    pair: Pair
+    names: tuple[str, str]
+    """Names of the link and of what it is near."""
+    start: float
+    """Distance to keep near the start, m; above the clearance it has no effect."""
+    goal: float
+
+    def __str__(self) -> str:
+        return f"{1000 * min(self.start, self.goal):.3g} mm between {self.names[0]} and {self.names[1]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +52,7 @@ class CollisionAvoidance:
     clearance: float = 0.01
     """Smallest distance, m."""
     self_collision: bool = False
+    reduced: tuple[ReducedClearance, ...] = ()
 
     @classmethod
     def of(cls, obstacles: Scene, clearance: float, self_collision: bool) -> CollisionAvoidance:
@@ -44,13 +76,36 @@ class CollisionAvoidance:
         counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
         return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
 
-    def gaps(self, description: Description, q: Array) -> Array:
-        """Return the exact smallest distance at states q (N, n), shape (N,), m."""
-        found = distance(description, q, self.obstacles, self.self_collision)
-        return np.asarray(found.distance)
+    def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
+        """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends."""
+        separation = Separation(description, self.obstacles, self.self_collision)
+        ends = separation.gaps(np.stack([start, goal])[:, None]).gap
+        reduced = []
+        for p in np.flatnonzero(ends.min(axis=0, initial=np.inf) < self.clearance):
+            pair = separation.pairs[p]
+            other = separation.capsules[pair.other].name if pair.other is not None else ""
+            names = separation.capsules[pair.capsule].name, other or self.obstacles[pair.obstacle or 0].name
+            reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
+        return replace(self, reduced=tuple(reduced))
 
-    def require(self, description: Description, q: Array, where: str) -> None:
-        """Require the clearance at one configuration q (n,), rad and m.
+    def required(self, gap: Array, pairs: Sequence[Pair], longer: int = 1) -> Array:
+        """Return the required gaps of pairs along a motion, shape (N, P), m, see :func:`required_gaps`."""
+        ends = {reduced.pair: (reduced.start, reduced.goal) for reduced in self.reduced}
+        each = np.array([ends.get(pair, (np.inf, np.inf)) for pair in pairs]).reshape(-1, 2)
+        return required_gaps(gap, self.clearance, each[:, 0], each[:, 1], longer)
+
+    def shortfalls(self, description: Description, q: Array) -> Array:
+        """Return how much is missing of the required distances along a motion q (N, n), shape (N,), m; by coal."""
+        pairs = [reduced.pair for reduced in self.reduced]
+        found = distances_without(description, q, self.obstacles, self.self_collision, pairs)
+        short: Array = self.clearance - np.asarray(found.distance)
+        if pairs:
+            each = np.stack([pair_distances(description, q, self.obstacles, pair) for pair in pairs], axis=1)
+            short = np.maximum(short, np.max(self.required(each, pairs) - each, axis=1))
+        return short
+
+    def require_no_collision(self, description: Description, q: Array, where: str, least: float = 0.0) -> None:
+        """Require a distance at one configuration q (n,), rad and m.
 
         Raises
         ------
@@ -59,7 +114,7 @@ class CollisionAvoidance:
         """
         found = distance(description, q, self.obstacles, self.self_collision)
         gap = float(found.distance)
-        if gap >= self.clearance:
+        if gap >= least and gap > 0:
             return
         who, what = found.pair or ("the arm", "an obstacle")
         state = f"{1000 * gap:.3g} mm from" if gap > 0 else f"{-1000 * gap:.3g} mm inside"

@@ -148,7 +148,9 @@ def require_possible(
         if request.rests_at(place.name):
             require_holdable(loaded, limits, place.q, place.name)
         if request.avoidance:
-            request.avoidance.require(description, place.q, place.name)
+            # At the ends the clearance may be reduced.
+            allowed = 0.0 if place.name in ("start", "goal") else request.avoidance.clearance
+            request.avoidance.require_no_collision(description, place.q, place.name, allowed)
     resting = [constraint for constraint in constraints if not constraint.moving]
     T_start = world_to_tool(description, routes[0].points[0])
     for place in places:
@@ -175,7 +177,9 @@ def require_ends(description: Description, request: PlanRequest, points: Array) 
         require_holdable(loaded, request.limits, points[-1], "goal")
     if request.avoidance:
         for k, point in enumerate(points[1:], start=1):
-            request.avoidance.require(description, point, "goal" if k == len(points) - 1 else f"via {k}")
+            is_goal = k == len(points) - 1
+            name, allowed = ("goal", 0.0) if is_goal else (f"via {k}", request.avoidance.clearance)
+            request.avoidance.require_no_collision(description, point, name, allowed)
 
 
 def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:

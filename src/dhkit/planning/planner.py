@@ -246,6 +246,7 @@ class Planner:
             branches=branches,
             unlimited=request.limits.unlimited,
             is_resolved=best.is_resolved,
+            reduced_clearances=tuple(str(reduced) for reduced in task.avoidance.reduced),
             is_converged=best.is_converged,
         )
         if compare and best.is_resolved:
@@ -313,7 +314,10 @@ class Planner:
             duration = DEFAULT_DURATION_FACTOR * float(leg_durations(loaded, limits, points).sum())
             if not duration > 0:
                 raise PlanningError(f"nothing limits how fast {self.objective} may be: give a duration, or limits")
-        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, request.avoidance)
+        avoidance = request.avoidance
+        if avoidance:
+            avoidance = avoidance.between(description, points[0], points[-1])
+        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, avoidance)
         return PlanTask(
             description,
             loaded,
@@ -326,7 +330,7 @@ class Planner:
             load=request.payload.numbers if request.payload else None,
             parameters=parameters,
             friction=self.friction,
-            avoidance=request.avoidance,
+            avoidance=avoidance,
         )
 
     def _best(

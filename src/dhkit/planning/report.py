@@ -67,6 +67,9 @@ class PlanReport:
     is_converged: bool = True
     """Whether the motion is optimal to the solver's tolerance; with friction or energy it may be only feasible."""
 
+    reduced_clearances: tuple[str, ...] = ()
+    """Distances at the start or the goal that are below the clearance, which is reduced to them there."""
+
     @property
     def sensitivity(self) -> float | None:
         """Relative excess of the cost on half as many intervals over this one."""
@@ -139,6 +142,7 @@ class PlanReport:
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
             "any_active": certificate.any_active,
             "unlimited": list(self.unlimited),
+            "reduced_clearances": list(self.reduced_clearances),
             "resolved": self.is_resolved,
             "converged": self.is_converged,
             "slow_down": self.slow_down,
@@ -185,6 +189,8 @@ class PlanReport:
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
+        if self.reduced_clearances:
+            lines.append(f"clearance reduced near the ends: {', '.join(self.reduced_clearances)}")
         if not self.is_converged:
             lines.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:

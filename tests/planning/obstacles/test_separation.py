@@ -7,7 +7,14 @@ from scipy.spatial.transform import Rotation
 from dhkit.description import library_robot
 from dhkit.description.frames import world_to_frames
 from dhkit.planning import Floor, Obstacle, distance
-from dhkit.planning.obstacles import Separation, link_capsules, world_axes
+from dhkit.planning.obstacles import (
+    Separation,
+    distances_without,
+    link_capsules,
+    pair_distances,
+    required_gaps,
+    world_axes,
+)
 from dhkit.planning.obstacles.segments import nearest_on_box
 
 TILTED = np.eye(4)
@@ -112,3 +119,23 @@ def test_floor_counts_only_ends_that_change_their_height(ur5):
     below = separation.smallest(np.array([[0, 1.2, 0, 0, 0, 0.0]]))
     assert below[0] < 0
     assert Separation(ur5, []).smallest(np.zeros((2, 6))).tolist() == [np.inf, np.inf]
+
+
+def test_required_gaps_are_lower_only_until_the_clearance_is_reached():
+    gap = np.array([[4, 30, 4], [9, 5, 4], [25, 30, 4], [9, 30, 4], [25, 30, 4], [8, 30, 4.0]])
+    at_start, at_goal = np.array([3.0, 30, 3]), np.array([6.0, 30, 3])
+    need = required_gaps(gap, 20.0, at_start, at_goal)
+    assert need[:, 0].tolist() == [3, 3, 20, 20, 20, 6]
+    assert need[:, 1].tolist() == [20] * 6
+    assert need[:, 2].tolist() == [3] * 6
+    assert required_gaps(gap, 20.0, at_start, at_goal, longer=2)[:, 0].tolist() == [3, 3, 3, 3, 6, 6]
+
+
+def test_distances_of_single_pairs_are_those_of_all(ur5):
+    q = states(ur5, 100)
+    separation = Separation(ur5, SCENE, self_collision=True)
+    each = np.stack([pair_distances(ur5, q, SCENE, pair) for pair in separation.pairs], axis=1)
+    np.testing.assert_allclose(each.min(axis=1), distance(ur5, q, SCENE, self_collision=True).distance, atol=1e-8)
+    left_out = separation.pairs[::2]
+    rest = distances_without(ur5, q, SCENE, True, left_out).distance
+    np.testing.assert_allclose(each[:, 1::2].min(axis=1), rest, atol=1e-8)

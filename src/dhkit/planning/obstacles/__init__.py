@@ -1,11 +1,11 @@
 """Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
 
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.clearance import Distances, distance
-from dhkit.planning.obstacles.pairs import CheckedPairs, checked_pairs
+from dhkit.planning.obstacles.clearance import Distances, distance, distances_without, pair_distances
+from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, checked_pairs
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
-from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
+from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation, required_gaps
 
 __all__ = [
     "CheckedPairs",
@@ -14,6 +14,7 @@ __all__ = [
     "Gaps",
     "LinkCapsule",
     "Obstacle",
+    "Pair",
     "PathSampler",
     "PlaneRow",
     "Scene",
@@ -21,6 +22,9 @@ __all__ = [
     "check_obstacles",
     "checked_pairs",
     "distance",
+    "distances_without",
     "link_capsules",
+    "pair_distances",
+    "required_gaps",
     "world_axes",
 ]

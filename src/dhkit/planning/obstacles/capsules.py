@@ -37,6 +37,11 @@ class LinkCapsule:
     """Radius, m."""
 
     @property
+    def name(self) -> str:
+        """Name of its link."""
+        return f"link {self.link}" if self.link else "the base"
+
+    @property
     def length(self) -> float:
         """Length of the axis, m."""
         return float(np.linalg.norm(self.end - self.start))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import checked_pairs
+from dhkit.planning.obstacles.pairs import Pair, checked_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
+FARTHEST = 1e9
+"""Distance beyond which pairs are not measured, m."""
 ROUNDING = 1e-7
 """Difference of bounds (m) that counts as equal: coal's distances are accurate to about 1e-9."""
 
@@ -82,18 +84,31 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     >>> round(float(found.distance), 3)
     0.169
     """
-    obstacles = check_obstacles(obstacles)
+    return distances_without(description, q, check_obstacles(obstacles), self_collision, ())
+
+
+def distances_without(
+    description: Description,
+    q: ArrayLike,
+    obstacles: Sequence[Obstacle | Floor],
+    self_collision: bool,
+    without: Collection[Pair],
+) -> Distances:
+    """Return distances as :func:`distance`, without some pairs; q is (..., n), rad and m."""
     q = joint_array(description, q)
     rows = q.reshape(-1, description.n)
     finite = np.all(np.isfinite(rows), axis=1)
     capsules, axes = link_capsules(description), world_axes(description, rows[finite])
-    found = [_from_one(description, capsules, axes, obstacle) for obstacle in obstacles]
-    names = [_pair_names(description, capsules, obstacle) for obstacle in obstacles]
+    left_out = {(pair.capsule, pair.obstacle, pair.other) for pair in without}
+    found, names = [], []
+    for k, obstacle in enumerate(obstacles):
+        found.append(_from_one(description, capsules, axes, obstacle, {i for i, j, _ in left_out if j == k}))
+        names.append(_pair_names(description, capsules, obstacle))
     itself = np.full(len(axes), np.inf)
     if self_collision:
-        pairs = checked_pairs(description).itself
+        pairs = tuple((i, j) for i, j in checked_pairs(description).itself if (i, None, j) not in left_out)
         found.append(_from_itself(capsules, axes, pairs))
-        names.append([(_name(capsules[i]), _name(capsules[j])) for i, j in pairs])
+        names.append([(capsules[i].name, capsules[j].name) for i, j in pairs])
         itself = found[-1][0]
     every = np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
 
@@ -110,18 +125,43 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     )
 
 
+def pair_distances(description: Description, q: Array, obstacles: Sequence[Obstacle | Floor], pair: Pair) -> Array:
+    """Return the exact distances of one pair at states q (N, n), shape (N,), m."""
+    capsules, axes = link_capsules(description), world_axes(description, q)
+    first = axes[:, pair.capsule]
+    radius = capsules[pair.capsule].radius
+    if pair.other is not None:
+        return capsule_distances((radius, capsules[pair.other].radius), first, axes[:, pair.other])
+    obstacle = obstacles[pair.obstacle or 0]
+    if isinstance(obstacle, Floor):
+        heights: Array = first[:, list(pair.ends), 2].min(axis=1) - radius - obstacle.height
+        return heights
+    return obstacle_distances(radius, first, obstacle)
+
+
 def _from_one(
-    description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
+    description: Description,
+    capsules: tuple[LinkCapsule, ...],
+    axes: Array,
+    obstacle: Obstacle | Floor,
+    without: Collection[int],
 ) -> Nearest:
-    """Return the distances from one obstacle; the candidates are those of :func:`_pair_names`."""
+    """Return the distances from one obstacle, without some capsules; the candidates are those of `_pair_names`."""
     pairs = checked_pairs(description)
     if isinstance(obstacle, Floor):
-        heights = [axes[:, i, end, 2] - capsules[i].radius - obstacle.height for i, end in pairs.heights]
+        nothing = np.full(len(axes), np.inf)
+        heights = [
+            nothing if i in without else axes[:, i, end, 2] - capsules[i].radius - obstacle.height
+            for i, end in pairs.heights
+        ]
         return _smallest(np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf))
     radii = np.array([capsules[i].radius for i in pairs.moving])
     moving = axes[:, list(pairs.moving)]
     low, high = axis_bounds(obstacle, moving)
-    return _exact((low - radii, high - radii), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle))
+    far = np.where([i in without for i in pairs.moving], np.inf, 0.0)
+    return _exact(
+        (low - radii + far, high - radii + far), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle)
+    )
 
 
 def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:
@@ -140,7 +180,7 @@ def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) ->
     distances = np.full(low.shape, np.inf)
     least = np.min(high, axis=1, initial=np.inf)
     for k in range(low.shape[1]):
-        rows = np.flatnonzero(low[:, k] <= least + ROUNDING)
+        rows = np.flatnonzero(low[:, k] <= np.minimum(least + ROUNDING, FARTHEST))
         if len(rows):
             distances[rows, k] = measure(k, rows)
     return _smallest(distances)
@@ -157,7 +197,7 @@ def _pair_names(
 ) -> list[tuple[str, str]]:
     pairs = checked_pairs(description)
     ends = [i for i, _ in pairs.heights] if isinstance(obstacle, Floor) else pairs.moving
-    return [(_name(capsules[i]), obstacle.name) for i in ends]
+    return [(capsules[i].name, obstacle.name) for i in ends]
 
 
 def _worst(every: Array, found: list[Nearest], names: list[list[tuple[str, str]]]) -> tuple[str, str] | None:
@@ -165,7 +205,3 @@ def _worst(every: Array, found: list[Nearest], names: list[list[tuple[str, str]]
         return None
     state, k = (int(x) for x in np.unravel_index(np.argmin(every), every.shape))
     return names[k][int(found[k][1][state])]
-
-
-def _name(capsule: LinkCapsule) -> str:
-    return f"link {capsule.link}" if capsule.link else "the base"

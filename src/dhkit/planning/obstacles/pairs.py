@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,18 @@ class CheckedPairs:
     """Pairs of capsules that are checked against each other."""
     near: tuple[tuple[int, int], ...]
     """The pairs of ``itself`` that came nearer than 5 % of the reach, which an optimizer includes."""
+
+
+class Pair(NamedTuple):
+    """A capsule of the arm, by its index, and what it must stay away from."""
+
+    capsule: int
+    obstacle: int | None
+    """Index of an obstacle, or None for another capsule."""
+    other: int | None = None
+    """Index of the other capsule."""
+    ends: tuple[int, ...] = (0, 1)
+    """Ends of the capsule's axis that are checked: of the floor, those whose height changes."""
 
 
 def checked_pairs(description: Description) -> CheckedPairs:

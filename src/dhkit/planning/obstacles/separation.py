@@ -7,7 +7,7 @@ links, so that an optimizer needs no distances.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Box, Description
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import checked_pairs
+from dhkit.planning.obstacles.pairs import Pair, checked_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
 
@@ -27,28 +27,21 @@ ZERO = 1e-12
 UP = np.array([0.0, 0.0, 1.0])
 
 
-class Pair(NamedTuple):
-    """A capsule of the arm, by its index, and what it must stay away from."""
-
-    capsule: int
-    obstacle: int | None
-    """Index of an obstacle, or None for another capsule."""
-    other: int | None = None
-    """Index of the other capsule."""
-    ends: tuple[int, ...] = (0, 1)
-    """Ends of the capsule's axis that are checked: of the floor, those whose height changes."""
-
-
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Gaps of P pairs in K groups of states, each at the state where it is smallest."""
+    """Smallest gaps of P pairs in K groups of states, and a plane between each pair.
+
+    The plane is that of the state whose plane both the first and the last state of the group keep best.
+    """
 
     gap: Array
     """Shape (K, P), m; for axes that intersect, minus the sum of the radii."""
     normal: Array
-    """Directions from the other body to the capsule, shape (K, P, 3)."""
+    """Normals of the planes, from the other body to the capsule, shape (K, P, 3)."""
     level: Array
     """Position of the other body's surface along the normal, shape (K, P), m."""
+    middle: Array
+    """Position halfway between the surfaces along the normal, shape (K, P), m."""
 
 
 class PlaneRow(NamedTuple):
@@ -108,7 +101,7 @@ class Separation:
         """Return the gaps of K groups of states, shape (K, S, n), rad and m; infinite if surely above ``near``, m."""
         axes = world_axes(self.description, q)
         shape = (len(q), len(self.pairs))
-        found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape))
+        found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape))
         for group in self._groups:
             at = self._near(axes, group, near)
             if len(at[0]):
@@ -120,7 +113,7 @@ class Separation:
         smallest: Array = self.gaps(q[:, None], near).gap.min(axis=1, initial=np.inf)
         return smallest
 
-    def rows(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array) -> list[PlaneRow]:
+    def rows(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array, fixed: Container[int] = ()) -> list[PlaneRow]:
         """Return the rows that keep pairs apart in the intervals of a mesh, at both of their knots.
 
         Parameters
@@ -131,6 +124,8 @@ class Separation:
             Pairs to include, shape (K, P).
         margins
             Distances to keep, shape (K, P), m.
+        fixed
+            Knots whose joint values are given, without rows.
         """
         rows = []
         for k, p in np.argwhere(active):
@@ -141,7 +136,7 @@ class Separation:
             else:
                 # Both may move: each stays on its side of the plane halfway between them.
                 other = self.capsules[pair.other]
-                middle = float(gaps.level[k, p] + gaps.gap[k, p] / 2)
+                middle = float(gaps.middle[k, p])
                 sides = [(capsule, (0, 1), n, middle + need / 2), (other, (0, 1), -n, -middle + need / 2)]
             for body, ends, normal, level in sides:
                 points = [(body.start, body.end)[end] for end in (ends if body.length > 0 else ends[:1])]
@@ -149,7 +144,7 @@ class Separation:
                     PlaneRow(body.link, knot, point, normal, level + body.radius)
                     for point in points
                     for knot in (int(k), int(k) + 1)
-                    if body.link > 0
+                    if body.link > 0 and knot not in fixed
                 ]
         return rows
 
@@ -172,11 +167,13 @@ class Separation:
         pairs = [self.pairs[group.part][i] for i in range(len(group.capsules))]
         capsules = np.array(group.capsules)[p]
         own, item = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.obstacle
-        radius: Array | float = 0.0
+        radius = np.zeros(len(k))
+        theirs = own
         if item is None:
             others = np.array([pair.other for pair in pairs])[p]
             radius = self.radii[others]
-            on_axis, nearest = nearest_points(own, axes[k[:, None], np.arange(axes.shape[1]), others[:, None]])
+            theirs = axes[k[:, None], np.arange(axes.shape[1]), others[:, None]]
+            on_axis, nearest = nearest_points(own, theirs)
         elif isinstance(item, Floor):
             is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
             low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
@@ -188,18 +185,53 @@ class Separation:
         elif isinstance(item.geometry, Box):
             on_axis, nearest = nearest_on_box(own, item.T_world_obstacle, item.half_sizes)
         else:
-            radius = item.radius
+            radius += item.radius
             on_axis, nearest = nearest_points(own, item.axis)
         along = on_axis - nearest
-        squares = np.sum(along * along, axis=-1)
-        which = np.arange(len(k)), np.argmin(squares, axis=1)
-        length = np.sqrt(squares[which])
-        normal = along[which] / np.maximum(length, ZERO)[:, None]
+        length = np.sqrt(np.sum(along * along, axis=-1))
+        normal = along / np.maximum(length, ZERO)[..., None]
         normal[length < ZERO] = UP
+        own_radius = self.radii[capsules]
+        level = np.sum(normal * nearest, axis=-1) + radius[:, None]
+        gap = length - own_radius[:, None] - radius[:, None]
+        # How far the first and the last state are on their sides of each state's plane, shape (pairs, states).
+        sides = own[:, [0, -1]] if not isinstance(item, Floor) else on_axis[:, [0, -1], None]
+        beyond = np.einsum("msi,mkei->mske", normal, sides).min(axis=(2, 3)) - own_radius[:, None]
+        if item is None:
+            behind = np.einsum("msi,mkei->mske", normal, theirs[:, [0, -1]]).max(axis=(2, 3)) + radius[:, None]
+            margin = np.minimum(beyond - (level + gap / 2), level + gap / 2 - behind)
+        else:
+            margin = beyond - level
+        which = np.arange(len(k)), np.argmax(margin, axis=1)
         here = k, p + group.part.start
-        found.gap[here] = length - self.radii[capsules] - radius
-        found.normal[here] = normal
-        found.level[here] = np.sum(normal * nearest[which], axis=-1) + radius
+        found.gap[here] = gap.min(axis=1)
+        found.normal[here], found.level[here] = normal[which], level[which]
+        found.middle[here] = (level + gap / 2)[which]
+
+
+def required_gaps(gap: Array, clearance: float, at_start: Array, at_goal: Array, longer: int = 1) -> Array:
+    """Return the gaps that are required of pairs along a motion, shape (N, P), m.
+
+    A pair that begins within the clearance keeps less until it has reached the clearance; likewise before the goal.
+
+    Parameters
+    ----------
+    gap
+        Gaps along the motion, shape (N, P), m.
+    clearance
+        Distance to keep, m.
+    at_start, at_goal
+        Distances to keep near the ends, shape (P,), m; without effect where they are above the clearance.
+    longer
+        Factor of the number of states for which the lower gaps are required.
+    """
+    need = np.full(gap.shape, clearance)
+    N, steps = len(gap), np.arange(len(gap))[:, None]
+    kept, is_kept = gap >= clearance, (gap >= clearance).any(axis=0)
+    before = steps < longer * np.where(is_kept, kept.argmax(axis=0), N)
+    after = steps >= N - longer * np.where(is_kept, kept[::-1].argmax(axis=0), N)
+    need = np.where(before, np.minimum(need, at_start), need)
+    return np.where(after, np.minimum(need, at_goal), need)
 
 
 @dataclass(frozen=True, eq=False)
