@@ -36,6 +36,8 @@ INFLATION_FACTOR = 1.2
 LONGER = 3
 """Factor of the number of intervals for which planes keep a clearance that is reduced at an end: the next motion may
 take more of them to reach the whole clearance."""
+FINER = 2.0
+"""Factor of the number of intervals of a finer mesh."""
 MAX_SOLUTIONS = 16
 """Largest number of solutions in the improvement of one path."""
 EXPECTED_ROUNDS = 4

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +47,28 @@ class Route:
     """Lower bound of the duration from the speed limits, s."""
     length: float
     """Length of the straight joint path, each joint divided by its speed limit: orders routes without a bound."""
+
+
+def parse_places(
+    description: Description, start: ArrayLike | str, via: Sequence[ArrayLike | str], goal: ArrayLike | str
+) -> list[Place]:
+    """Return the places of a motion in order, as :func:`parse_place`; the start must be joint values (n,), rad and m.
+
+    Raises
+    ------
+    PlanningError
+        A name that is not one of the arm's configurations.
+    ValueError, TypeError
+        Another shape, values that are not finite, not numbers, or a pose as the start.
+    """
+    is_single = isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0)
+    between: list[Any] = [via] if is_single else list(via)
+    names = ["start", *(f"via {k}" for k in range(1, len(between) + 1)), "goal"]
+    values = (start, *between, goal)
+    places = [parse_place(description, value, name) for value, name in zip(values, names, strict=True)]
+    if places[0].q is None:
+        raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
+    return places
 
 
 def parse_place(description: Description, value: ArrayLike | str, name: str) -> Place:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from numbers import Real
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from dhkit.description import Array, Payload, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning.avoiding import AvoidingSearch
+from dhkit.planning.avoiding import FINER, AvoidingSearch
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
@@ -26,14 +26,15 @@ from dhkit.planning.feasibility import (
     require_inside_limits,
     require_possible,
 )
-from dhkit.planning.goals import Route, find_routes, parse_place
+from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
+from dhkit.planning.many import ManyProgress, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
-from dhkit.planning.request import PlanRequest, checked_limits, end_velocity
+from dhkit.planning.request import PlanRequest, check_options, checked_limits, end_velocity
 from dhkit.planning.search import RESOLUTION, PlannedMotion, Program, Search, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
@@ -47,8 +48,6 @@ CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Cu
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
 MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
-FINER = 2.0
-"""Factor of the intervals of a finer mesh among obstacles."""
 SMALL_ARM_SIZE = 384
 """Product of joints and default intervals for arms of few joints."""
 DURATION_TOLERANCE = 1e-3
@@ -129,6 +128,12 @@ class Planner:
         self._programs: dict[tuple[object, ...], Program] = {}
         self._making = threading.Lock()
 
+    def __reduce__(self) -> tuple[type[Planner], tuple[object, ...]]:
+        # Programs cannot be sent to another process: they are made again.
+        friction = False if self.friction is None else self.friction
+        arguments = self.description, self.objective, self.limits, self.constraints
+        return type(self), (*arguments, self._requested_intervals, friction)
+
     def __repr__(self) -> str:
         return repr_line(
             f"Planner of {self.description.name}", summary=f"least {self.objective}, {self.intervals} intervals"
@@ -194,28 +199,15 @@ class Planner:
             Arguments of another shape or type.
         """
         began = time.perf_counter()
-        if not isinstance(time_limit, Real) or not time_limit > 0:
-            raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s")
         description = self.description
-        if payload is not None and not isinstance(payload, Payload):
-            raise TypeError(f"payload is {payload!r}; expected Payload(mass, com, inertia)")
-        if progress is not None and not callable(progress):
-            raise TypeError(f"progress is {progress!r}; expected a function")
-        if warm is not None:
-            if not isinstance(warm, Trajectory):
-                raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
-            warm.require(description)
-        if isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0):
-            via = [via]  # a single place
+        check_options(description, payload, warm, time_limit, progress)
         check_duration(duration)
-        names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
-        places = [parse_place(description, value, name) for value, name in zip((start, *via, goal), names, strict=True)]
-        if places[0].q is None:
-            raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
+        places = parse_places(description, start, via, goal)
         request = PlanRequest(
             checked_limits(description, self.limits if limits is None else limits),
             duration,
-            *(end_velocity(description, v, name) for v, name in ((start_velocity, "start"), (goal_velocity, "goal"))),
+            end_velocity(description, start_velocity, "start"),
+            end_velocity(description, goal_velocity, "goal"),
             payload,
             CollisionAvoidance.of(obstacles, clearance, self_collision),
         )
@@ -252,6 +244,37 @@ class Planner:
         if compare and best.is_resolved:
             report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
+
+    def solve_many(
+        self,
+        starts: ArrayLike,
+        goals: ArrayLike,
+        *,
+        workers: int | None = None,
+        progress: ManyProgress | None = None,
+        **options: Any,
+    ) -> list[Trajectory | PlanningError]:
+        """Return the best motions between N pairs of places, or why there is none, found by several processes.
+
+        A script that calls this needs ``if __name__ == "__main__":``, as for Python's ``multiprocessing``.
+
+        Parameters
+        ----------
+        starts, goals
+            Joint values, shape (N, n), or (n,) for all, rad and m; goals may be poses (N, 4, 4) or (4, 4) of the tool.
+        workers
+            Number of processes: as many as the machine has cores unless given, 1 for none.
+        progress
+            Called after each motion with the numbers of motions done and of all; an exception in it ends the rest.
+        options
+            Arguments of :meth:`solve` for all motions.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Arguments of another shape or type.
+        """
+        return solve_many(self, starts, goals, workers=workers, progress=progress, options=options)
 
     # Programs
 
@@ -302,8 +325,6 @@ class Planner:
         has_friction = self.friction is not None
         return curves_for(self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction)
 
-    # One motion
-
     def _task(self, request: PlanRequest, points: Array) -> PlanTask:
         description, limits = self.description, request.limits
         loaded = request.loaded(description)
@@ -344,8 +365,7 @@ class Planner:
         """Return the best motion of all routes, the branches' reports, the building time (s), iterations and solves."""
         best: tuple[PlanTask, PlannedMotion] | None = None
         failure: PlanningError | None = None
-        reports: list[BranchReport] = []
-        seconds, iterations, solves, chosen = 0.0, 0, 0, -1
+        reports, seconds, iterations, solves, chosen = list[BranchReport](), 0.0, 0, 0, -1
         for number, route in enumerate(routes):
             hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
             late = best is not None and time.perf_counter() > deadline
@@ -419,12 +439,12 @@ class Planner:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
             return error
-        fastest = f"the fastest motion found takes {least:.6g} s"
-        return PlanningError(f"a duration of {request.duration:.6g} s is too short: {fastest}")
+        return PlanningError(
+            f"a duration of {request.duration:.6g} s is too short: the fastest motion found takes {least:.6g} s"
+        )
 
     def _coarse(self, task: PlanTask, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
-        half = max(MIN_LEG_INTERVALS, self.intervals_for(task) // 2)
-        if half == self.intervals_for(task):
+        if self.intervals_for(task) <= MIN_LEG_INTERVALS:
             return None
         program, _ = self.program(task, scale=0.5)
         return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)

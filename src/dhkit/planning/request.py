@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.collision_avoidance import CollisionAvoidance
-from dhkit.trajectories import Limits
+from dhkit.trajectories import Limits, Trajectory
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,30 @@ class PlanRequest:
     def rests_at(self, name: str) -> bool:
         """Whether the arm is at rest at a place, given by its name."""
         return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
+
+
+def check_options(
+    description: Description, payload: object, warm: object, time_limit: object, progress: object
+) -> None:
+    """Check the types of arguments of a search.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Says which is not as expected.
+    DescriptionError
+        ``warm`` is a motion of another robot.
+    """
+    if not isinstance(time_limit, Real) or not float(time_limit) > 0:
+        raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s")
+    if payload is not None and not isinstance(payload, Payload):
+        raise TypeError(f"payload is {payload!r}; expected Payload(mass, com, inertia)")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress is {progress!r}; expected a function")
+    if warm is not None:
+        if not isinstance(warm, Trajectory):
+            raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
+        warm.require(description)
 
 
 def checked_limits(description: Description, limits: Limits | None) -> Limits:

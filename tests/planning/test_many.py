@@ -1,0 +1,82 @@
+"""Many motions over processes: those of one planner, one after the other."""
+
+import pickle
+import time
+
+import numpy as np
+import pytest
+
+from dhkit.description import library_robot
+from dhkit.errors import PlanningError
+from dhkit.planning import Constraint, Planner, ToolSpeed
+
+ARM = library_robot("planar2r")
+STARTS, GOALS = np.zeros((4, 2)), np.array([[0.5, 0.2], [0.3, -0.4], [9.0, 0.0], [0.4, 0.4]])
+
+
+def planner(**options):
+    return Planner(ARM, intervals=12, **options)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_motions_and_errors_come_in_order(workers):
+    calls = []
+    made = planner(constraints=[ToolSpeed(5.0)])
+    found = made.solve_many(STARTS, GOALS, workers=workers, progress=lambda *done: calls.append(done))
+    assert isinstance(found[2], PlanningError) and "goal: joint" in str(found[2])
+    for k in (0, 1, 3):
+        alone = made.solve(STARTS[k], GOALS[k])
+        assert found[k].duration == pytest.approx(alone.duration, rel=1e-9)
+        assert found[k].report.certificate.ok
+    assert calls == [(k, 4) for k in range(1, 5)]
+
+
+def test_one_start_serves_all_goals_and_options_are_those_of_solve():
+    found = planner(objective="effort").solve_many([0, 0], GOALS[:2], workers=1, duration=2.0)
+    assert [motion.duration for motion in found] == [pytest.approx(2.0)] * 2
+    poses = np.stack([np.eye(4)] * 2)
+    poses[:, :3, 3] = [1.5, 0.3, 0], [1.2, 0.5, 0]
+    assert len(planner().solve_many([0, 0.3], poses, workers=1)) == 2
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "options", "message"),
+    [
+        (np.zeros((3, 2)), np.zeros((2, 2)), {}, "goals has 2 places; expected 1 or 3"),
+        (np.zeros((3, 3)), np.zeros((3, 2)), {}, r"starts has shape \(3, 3\); expected \(..., 2\)"),
+        (np.zeros((0, 2)), np.zeros((0, 2)), {}, r"starts has shape \(0, 2\)"),
+        (np.zeros((1, 2)), np.zeros((1, 2)), {"workers": 0}, "workers"),
+    ],
+)
+def test_other_shapes_are_refused(starts, goals, options, message):
+    with pytest.raises(ValueError, match=message):
+        planner().solve_many(starts, goals, **options)
+    with pytest.raises(TypeError, match="starts is no array of numbers"):
+        planner().solve_many("ready", goals)
+
+
+def test_an_exception_in_progress_ends_the_rest():
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    began = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        planner().solve_many(np.zeros((200, 2)), np.tile([[0.5, 0.2]], (200, 1)), workers=2, progress=stop)
+    assert time.perf_counter() - began < 60
+
+
+def test_an_error_of_a_callers_constraint_is_not_swallowed():
+    with pytest.raises(NotImplementedError, match="has no method rows"):
+        planner(constraints=[Unfinished()]).solve_many(STARTS[:2], GOALS[:2], workers=1)
+
+
+class Unfinished(Constraint):
+    pass
+
+
+def test_a_planner_is_pickled_without_its_programs():
+    made = planner(constraints=[ToolSpeed(5.0)], friction=True)
+    made.solve([0, 0], [0.3, 0.1])
+    again = pickle.loads(pickle.dumps(made))
+    assert (again.intervals, again.friction, again.constraints) == (made.intervals, made.friction, made.constraints)
+    assert again.solve([0, 0], [0.3, 0.1]).duration == made.solve([0, 0], [0.3, 0.1]).duration
