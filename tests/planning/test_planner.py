@@ -23,6 +23,7 @@ from dhkit.planning import (
     Energy,
     Jerk,
     MotorPower,
+    Obstacle,
     Payload,
     Planner,
     Time,
@@ -527,3 +528,16 @@ def test_least_energy_is_below_that_of_smooth_motions():
     for other in ("effort", "jerk"):
         smooth = Planner(arm, other).solve(start, goal, duration=2.0)
         assert energy.report.cost < cost_of(Objective.of("energy"), smooth, arm)
+
+
+def test_a_coarser_mesh_is_of_the_curve_that_led_to_the_motion_and_none_among_obstacles():
+    """The effort of planar2r near its least time is found with constant accelerations, after parabolas fail."""
+    arm = library_robot("planar2r")
+    start, goal = [0.0, 0.0], [0.6, -0.4]
+    least = Planner(arm).solve(start, goal).duration
+    planner = Planner(arm, "effort")
+    motion = planner.solve(start, goal, duration=1.02 * least, compare=True)
+    half, cost = motion.report.coarse
+    assert half == motion.report.intervals // 2 and cost == pytest.approx(motion.report.cost, rel=0.01)
+    far = planner.solve(start, goal, duration=3.0, obstacles=[Obstacle.sphere(0.1, (5, 5, 5))], compare=True)
+    assert far.report.coarse is None

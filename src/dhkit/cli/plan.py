@@ -246,6 +246,8 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
         say(f"slowed down by {100 * (report.slow_down - 1):.3g} % to keep its limits between knots")
     if report.tightened:
         say(f"solved again with tightened limits: {', '.join(report.tightened)}")
+    for note in report.notes:
+        say(note)
     if report.coarse is not None and report.sensitivity is not None:
         excess = 100 * report.sensitivity
         say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.3g} % more")

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.mesh import Curve, Mesh
+from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.variables import Knots
 from dhkit.trajectories import Trajectory
 
@@ -42,8 +42,9 @@ def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, f
         gap = np.vstack([(knots.q[ends] - q[ends]) / length, knots.qd[ends] - qd[ends]])
         qdd[free] += np.linalg.lstsq(influence, gap, rcond=None)[0]
     q, qd = _integrated(knots, qdd, h, W, U)
-    first, slope, curvature = _acceleration_polynomials(mesh.curve, qdd, h)
-    coefficients = np.stack([q[:-1], qd[:-1], first / 2, slope / 6, curvature / 12], axis=1)
+    interval = Interval(h[:, None], q[:-1], qd[:-1], *mesh.curve.values(qdd))
+    first, last = interval.jerks
+    coefficients = np.stack([q[:-1], qd[:-1], interval.a / 2, first / 6, (last - first) / (24 * interval.h)], axis=1)
     degree = (2, 3, 3, 4)[mesh.curve.value]
     return Trajectory(description, np.concatenate([[0.0], np.cumsum(h)]), coefficients[:, : degree + 1])
 
@@ -68,19 +69,6 @@ def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
     for k in range(intervals):
         W[k, step * k : step * k + len(w)], U[k, step * k : step * k + len(u)] = w, u
     return W, U
-
-
-def _acceleration_polynomials(curve: Curve, qdd: Array, h: Array) -> tuple[Array, Array, Array]:
-    """Return the coefficients a, b, c of the acceleration qdd = a + b t + c t^2 in each interval."""
-    h = h[:, None]
-    if curve is Curve.CONSTANT:
-        return qdd, 0 * qdd, 0 * qdd
-    if curve is Curve.LINEAR:
-        return qdd[:-1], (qdd[1:] - qdd[:-1]) / h, 0 * qdd[1:]
-    if curve is Curve.JUMPING:
-        return qdd[0::2], (qdd[1::2] - qdd[0::2]) / h, 0 * qdd[1::2]
-    a, b, c = qdd[0:-1:2], qdd[1::2], qdd[2::2]
-    return a, (-3 * a + 4 * b - c) / h, (2 * a - 4 * b + 2 * c) / h**2
 
 
 def knots_along(trajectory: Trajectory, mesh: Mesh, ends: Array) -> Knots:

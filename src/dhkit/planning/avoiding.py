@@ -18,7 +18,6 @@ from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import MIN_REACH, Certificate
-from dhkit.planning.collision_avoidance import KEPT_SHARE
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
 from dhkit.planning.search import Excess, PlannedMotion, Program, Search, TimeLimitError
 from dhkit.planning.task import Margins, PlanTask
@@ -104,6 +103,7 @@ class AvoidingSearch:
         self.task, self.search, self.clearance = task, search, avoidance.clearance
         self.separation = Separation(task.arm, avoidance.obstacles, avoidance.self_collision)
         self.paths = 0
+        self._speed = np.where(np.isfinite(task.limits.velocity), task.limits.velocity, 1.0)
         self._finer, self._found = finer, list[Trajectory]()
         self._paths: dict[int, list[Array] | None] = {}
 
@@ -179,16 +179,16 @@ class AvoidingSearch:
         lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span)
         upper = np.where(np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span)
         ends = self.separation.gaps(task.points[:, None]).gap
-        least = ends.min(axis=0)
-        at_ends = np.where(least < self.clearance, KEPT_SHARE * least, least - ROUNDING)
+        reduced = task.avoidance.at_ends(self.separation.pairs).min(axis=1)
+        at_ends = np.minimum(ends.min(axis=0) - ROUNDING, reduced)
         need = np.minimum(self.clearance + PATH_CLEARANCE, at_ends)
-        speed, most = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0), float(need.max(initial=0.0))
+        most = float(need.max(initial=0.0))
 
         def is_free(q: Array) -> NDArray[np.bool_]:
             free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], most).gap >= need, axis=1)
             return free
 
-        sampler = PathSampler(is_free, lower, upper, speed / speed.mean(), seed, self.search.deadline)
+        sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.deadline)
         path = []
         for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
             leg = sampler.path(start, goal)
@@ -214,9 +214,7 @@ class AvoidingSearch:
         return float(sum(self._durations(leg).sum() for leg in path))
 
     def _durations(self, leg: Array) -> Array:
-        speed = self.task.limits.velocity
-        speed = np.where(np.isfinite(speed), speed, 1.0)
-        times: Array = np.max(np.abs(np.diff(leg, axis=0)) / speed, axis=1)
+        times: Array = np.max(np.abs(np.diff(leg, axis=0)) / self._speed, axis=1)
         return times
 
     def _timed(self, path: list[Array]) -> tuple[Trajectory, Array]:
@@ -262,24 +260,24 @@ class AvoidingSearch:
                 if best is not None:
                     return best
                 raise
-            gaps = self._gaps(found.trajectory, found.knots, self.clearance + ACTIVE_GAP)
+            knots = search.knots_of(found.trajectory)
+            gaps = self._gaps(found.trajectory, knots, self.clearance + ACTIVE_GAP)
             required = self._required(gaps)
             short = float(np.max(required - gaps.gap, initial=-np.inf))
             missing = 0.0
             if isinstance(found, PlannedMotion) and short <= ROUNDING:
                 found = self._certified(found)
-                if isinstance(found, Excess):
-                    # The certificate's grid is finer.
-                    missing = self._shortfall(found.certificate) - short
-            if isinstance(found, PlannedMotion) and short <= ROUNDING:
-                saved = np.inf if best is None else best.cost - found.cost
-                best = found if saved > 0 else best
-                if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
-                    break
-                gaps = self._gaps(found.trajectory, found.knots, np.inf)
-                planes = Planes.of(gaps, self._required(gaps, LONGER), planes.inflation)
-                guess = found.knots
-                continue
+                if isinstance(found, PlannedMotion):
+                    saved = np.inf if best is None else best.cost - found.cost
+                    best = found if saved > 0 else best
+                    if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
+                        break
+                    gaps = self._gaps(found.trajectory, knots, np.inf)
+                    planes = Planes.of(gaps, self._required(gaps, LONGER), planes.inflation)
+                    guess = knots
+                    continue
+                # The certificate's grid is finer.
+                missing = self._shortfall(found.certificate) - short
             is_new = planes.widened(gaps.gap - missing, required)
             if is_new and short > ACTIVE_GAP:
                 continue  # from the same guess: this motion went far astray
@@ -288,7 +286,7 @@ class AvoidingSearch:
             ):
                 margins = search.widen_margins(margins, found.states, turn)
                 turn += 1
-            guess = found.knots
+            guess = knots
         if best is not None:
             return best
         if isinstance(found, Excess):
@@ -303,7 +301,7 @@ class AvoidingSearch:
         if certificate.ok:
             return replace(found, certificate=certificate)
         self.search.tightened += ["clearance"] * ("clearance" not in self.search.tightened)
-        return Excess(found.trajectory, found.knots, states, certificate)
+        return Excess(found.trajectory, states, certificate)
 
     def _shortfall(self, certificate: Certificate) -> float:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""

@@ -173,36 +173,35 @@ class BlockProgram:
         begin = 0
         for block in self.blocks:
             function, points, at = block.function, block.points, block.variables
-            inputs = [_gather(x, at), _gather(p, block.parameters)]
+            local = _gather(x, at), _gather(p, block.parameters)
             if function.count:
-                rows.append(casadi.vec(function.rows.map(points)(*inputs)))
+                rows.append(casadi.vec(function.rows.map(points)(*local)))
                 i, j = function.jacobian_at
                 here = begin + i[:, None] + function.count * np.arange(points)
-                jacobian.add(here, at[j], function.jacobian.map(points)(*inputs))
+                jacobian.add(here, at[j], function.jacobian.map(points)(*local))
             if function.has_cost:
-                cost += casadi.sum2(function.cost.map(points)(*inputs))
+                cost += casadi.sum2(function.cost.map(points)(*local))
                 i, _ = function.gradient_at
-                gradient.add(at[i], np.zeros_like(at[i]), function.gradient.map(points)(*inputs))
+                gradient.add(at[i], np.zeros_like(at[i]), function.gradient.map(points)(*local))
             i, j = function.hessian_at
             if len(i):
-                weights = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
-                values = function.hessian.map(points)(*inputs, weights, casadi.repmat(weight, 1, points))
+                multiplied = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
+                values = function.hessian.map(points)(*local, multiplied, casadi.repmat(weight, 1, points))
                 hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)
             begin += block.count
         g = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
 
-        def derivative(inputs: list[casadi.MX], values: dict[str, casadi.MX]) -> casadi.Function:
-            symbols = {"x": scaled, "p": given, "lam_f": weight, "lam_g": scaled_multipliers}
-            names = [name for name, symbol in symbols.items() if any(symbol is other for other in inputs)]
-            return casadi.Function("derivative", inputs, list(values.values()), names, list(values))
+        inputs = {"x": scaled, "p": given}
+        weights = {"lam_f": weight, "lam_g": scaled_multipliers}
 
-        program = casadi.Function("nlp", [scaled, given], [cost, g], ["x", "p"], ["f", "g"])
-        return program, {
-            "grad_f": derivative([scaled, given], {"f": cost, "grad_f_x": casadi.densify(gradient.matrix()) * unit}),
-            "jac_g": derivative([scaled, given], {"g": g, "jac_g_x": jacobian.matrix(1 / row_unit, unit)}),
-            "hess_lag": derivative(
-                [scaled, given, weight, scaled_multipliers], {"triu_hess_gamma_x_x": hessian.matrix(unit, unit)}
-            ),
+        def function_of(arguments: dict[str, casadi.MX], results: dict[str, casadi.MX]) -> casadi.Function:
+            symbols, values = list(arguments.values()), list(results.values())
+            return casadi.Function("program", symbols, values, list(arguments), list(results))
+
+        return function_of(inputs, {"f": cost, "g": g}), {
+            "grad_f": function_of(inputs, {"f": cost, "grad_f_x": casadi.densify(gradient.matrix()) * unit}),
+            "jac_g": function_of(inputs, {"g": g, "jac_g_x": jacobian.matrix(1 / row_unit, unit)}),
+            "hess_lag": function_of({**inputs, **weights}, {"triu_hess_gamma_x_x": hessian.matrix(unit, unit)}),
         }
 
 

@@ -88,11 +88,15 @@ class CollisionAvoidance:
             reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
         return replace(self, reduced=tuple(reduced))
 
+    def at_ends(self, pairs: Sequence[Pair]) -> Array:
+        """Return the reduced clearances of pairs at the start and the goal, shape (P, 2), m; inf if not reduced."""
+        ends = {reduced.pair: (reduced.start, reduced.goal) for reduced in self.reduced}
+        return np.array([ends.get(pair, (np.inf, np.inf)) for pair in pairs]).reshape(-1, 2)
+
     def required(self, gap: Array, pairs: Sequence[Pair], longer: int = 1) -> Array:
         """Return the required gaps of pairs along a motion, shape (N, P), m, see :func:`required_gaps`."""
-        ends = {reduced.pair: (reduced.start, reduced.goal) for reduced in self.reduced}
-        each = np.array([ends.get(pair, (np.inf, np.inf)) for pair in pairs]).reshape(-1, 2)
-        return required_gaps(gap, self.clearance, each[:, 0], each[:, 1], longer)
+        at_start, at_goal = self.at_ends(pairs).T
+        return required_gaps(gap, self.clearance, at_start, at_goal, longer)
 
     def shortfalls(self, description: Description, q: Array) -> Array:
         """Return how much is missing of the required distances along a motion q (N, n), shape (N,), m; by coal."""
@@ -104,8 +108,8 @@ class CollisionAvoidance:
             short = np.maximum(short, np.max(self.required(each, pairs) - each, axis=1))
         return short
 
-    def require_no_collision(self, description: Description, q: Array, where: str, least: float = 0.0) -> None:
-        """Require a distance at one configuration q (n,), rad and m.
+    def require_gap(self, description: Description, q: Array, where: str, least: float) -> None:
+        """Require a distance of at least ``least`` (m), and no collision, at one configuration q (n,), rad and m.
 
         Raises
         ------

@@ -139,18 +139,11 @@ def require_possible(
         Says which place, limit or obstacle does not.
     """
     limits = request.limits
-    loaded = request.loaded(description)
     require_speed(description, limits, request.start_velocity, "start")
     require_speed(description, limits, request.goal_velocity, "goal")
     for place in places:
-        if place.q is None:
-            continue
-        if request.rests_at(place.name):
-            require_holdable(loaded, limits, place.q, place.name)
-        if request.avoidance:
-            # At the ends the clearance may be reduced.
-            allowed = 0.0 if place.name in ("start", "goal") else request.avoidance.clearance
-            request.avoidance.require_no_collision(description, place.q, place.name, allowed)
+        if place.q is not None:
+            require_place(description, request, place.q, place.name)
     resting = [constraint for constraint in constraints if not constraint.moving]
     T_start = world_to_tool(description, routes[0].points[0])
     for place in places:
@@ -164,22 +157,20 @@ def require_possible(
     require_bounded(description, limits, objective, moves)
 
 
-def require_ends(description: Description, request: PlanRequest, points: Array) -> None:
-    """Require that the arm can be at the ends of a route's legs, configurations of shape (legs + 1, n), rad and m.
+def require_place(description: Description, request: PlanRequest, q: Array, name: str) -> None:
+    """Require that the arm can be at a place, by joint values q (n,), rad and m.
 
     Raises
     ------
     PlanningError
-        Torque limits do not hold it there, or it is nearer to obstacles than the clearance.
+        Torque limits do not hold it there, or it is nearer to obstacles than the clearance; at the start and the goal,
+        where the clearance may be reduced: it collides.
     """
-    loaded = request.loaded(description)
-    if request.rests_at("goal"):
-        require_holdable(loaded, request.limits, points[-1], "goal")
+    if request.rests_at(name):
+        require_holdable(request.loaded(description), request.limits, q, name)
     if request.avoidance:
-        for k, point in enumerate(points[1:], start=1):
-            is_goal = k == len(points) - 1
-            name, allowed = ("goal", 0.0) if is_goal else (f"via {k}", request.avoidance.clearance)
-            request.avoidance.require_no_collision(description, point, name, allowed)
+        least = 0.0 if name in ("start", "goal") else request.avoidance.clearance
+        request.avoidance.require_gap(description, q, name, least)
 
 
 def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:

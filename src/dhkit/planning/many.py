@@ -8,10 +8,10 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from typing import Any, Protocol, TypeAlias
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
+from dhkit.description.arrays import number_array
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
@@ -100,10 +100,7 @@ def _solved(planner: OneMotion, start: Array, goal: Array, options: dict[str, An
 def _places(values: ArrayLike, n: int, name: str, *, poses: bool) -> Sequence[Array]:
     """Return places, each of shape (n,) or (4, 4), from one or several of them."""
     expected = f"(..., {n})" + (" or (..., 4, 4)" if poses else "")
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} is no array of numbers; expected shape {expected}") from None
+    array = number_array(values, name, expected)
     if poses and array.shape[-2:] == (4, 4) and array.ndim in (2, 3):
         return list(array.reshape(-1, 4, 4))
     if array.ndim not in (1, 2) or array.shape[-1] != n or not array.size:

@@ -22,8 +22,8 @@ from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
     classical_durations,
-    require_ends,
     require_inside_limits,
+    require_place,
     require_possible,
 )
 from dhkit.planning.goals import Route, find_routes, parse_places
@@ -35,7 +35,7 @@ from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PlanRequest, check_options, checked_limits, end_velocity
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Program, Search, coarser
+from dhkit.planning.search import RESOLUTION, PlannedMotion, Program, Search, Work, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curves_for
@@ -218,10 +218,9 @@ class Planner:
         require_possible(description, self.objective, self.constraints, request, places, routes)
         deadline = began + time_limit
         try:
-            found, branches, seconds, counts = self._best(request, routes, warm, deadline, progress)
+            task, best, branches, work = self._best(request, routes, warm, deadline, progress)
         except PlanningError as error:
             raise self._with_reason(error, request, routes, deadline) from None
-        task, best = found
         report = PlanReport(
             objective=str(self.objective),
             cost=best.cost,
@@ -229,10 +228,10 @@ class Planner:
             certificate=best.certificate,
             joints=tuple(joint.name for joint in description.joints),
             intervals=len(best.trajectory.breaks) - 1,
-            iterations=counts[0],
-            solves=counts[1],
-            build_seconds=seconds,
-            solve_seconds=time.perf_counter() - began - seconds,
+            iterations=work.iterations,
+            solves=work.solves,
+            build_seconds=work.build_seconds,
+            solve_seconds=time.perf_counter() - began - work.build_seconds,
             slow_down=best.slow_down,
             tightened=best.tightened,
             branches=branches,
@@ -361,11 +360,11 @@ class Planner:
         warm: Trajectory | None,
         deadline: float,
         progress: ProgressCall | None,
-    ) -> tuple[tuple[PlanTask, PlannedMotion], tuple[BranchReport, ...], float, tuple[int, int]]:
-        """Return the best motion of all routes, the branches' reports, the building time (s), iterations and solves."""
+    ) -> tuple[PlanTask, PlannedMotion, tuple[BranchReport, ...], Work]:
+        """Return the best motion of all routes with its task, the branches' reports, and the work for all of them."""
         best: tuple[PlanTask, PlannedMotion] | None = None
         failure: PlanningError | None = None
-        reports, seconds, iterations, solves, chosen = list[BranchReport](), 0.0, 0, 0, -1
+        reports, work, chosen = list[BranchReport](), Work(), -1
         for number, route in enumerate(routes):
             hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
             late = best is not None and time.perf_counter() > deadline
@@ -373,11 +372,12 @@ class Planner:
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
-                if route.label:  # a chosen branch; the ends of a single route were checked by _require
-                    require_ends(self.description, request, route.points)
+                if route.label:  # a chosen branch; the places of a single route were checked by require_possible
+                    last = len(route.points) - 1
+                    for k, point in enumerate(route.points[1:], start=1):
+                        require_place(self.description, request, point, "goal" if k == last else f"via {k}")
                 task = self._task(request, route.points)
-                found, made, counts = self._route_motion(task, warm, deadline, progress)
-                seconds, iterations, solves = seconds + made, iterations + counts[0], solves + counts[1]
+                found = self._route_motion(task, warm, deadline, progress, work)
             except PlanningError as error:
                 failure = failure or error
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
@@ -392,35 +392,33 @@ class Planner:
         reports_of_branches = (
             tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(routes) > 1 else ()
         )
-        return best, reports_of_branches, seconds, (iterations, solves)
+        return *best, reports_of_branches, work
 
     def _route_motion(
-        self, task: PlanTask, warm: Trajectory | None, deadline: float, progress: ProgressCall | None
-    ) -> tuple[PlannedMotion, float, tuple[int, int]]:
-        """Return the best motion of a task, the building time (s), and the numbers of iterations and solutions."""
+        self, task: PlanTask, warm: Trajectory | None, deadline: float, progress: ProgressCall | None, work: Work
+    ) -> PlannedMotion:
+        """Return the best motion of a task, and count the work."""
         if task.rests and task.span < RESOLUTION:
-            return PlannedMotion.unresolved(task, self.objective), 0.0, (0, 0)
-        seconds, iterations, solves = 0.0, 0, 0
+            return PlannedMotion.unresolved(task, self.objective)
         count = len(self._curves(task))
         for attempt in range(count):
-            program, seconds_made = self.program(task, attempt)
-            seconds += seconds_made
+            program, seconds = self.program(task, attempt)
+            work.build_seconds += seconds
             is_last = attempt == count - 1
             search = Search(task.without_obstacles, program, deadline, progress, is_last)
             try:
                 found = search(warm)
-                if task.avoidance and not (certificate := task.checker.check(found.trajectory)).ok:
-                    finer = partial(self.program, task, attempt, FINER)
-                    found = AvoidingSearch(task, search, finer)(warm)
-                elif task.avoidance:
-                    found = replace(found, certificate=certificate)
-                break
+                if not task.avoidance:
+                    return found
+                if (certificate := task.checker.check(found.trajectory)).ok:
+                    return replace(found, certificate=certificate)
+                return AvoidingSearch(task, search, partial(self.program, task, attempt, FINER))(warm)
             except PlanningError:
                 if is_last or time.perf_counter() > deadline:
                     raise
             finally:
-                iterations, solves = iterations + search.iterations, solves + search.solves
-        return found, seconds, (iterations, solves)
+                work.iterations, work.solves = work.iterations + search.iterations, work.solves + search.solves
+        raise AssertionError("no curve")
 
     def _with_reason(
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
@@ -444,7 +442,8 @@ class Planner:
         )
 
     def _coarse(self, task: PlanTask, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
-        if self.intervals_for(task) <= MIN_LEG_INTERVALS:
+        # Among obstacles a coarser mesh may lead around them on another side.
+        if task.avoidance or self.intervals_for(task) <= MIN_LEG_INTERVALS:
             return None
-        program, _ = self.program(task, scale=0.5)
+        program, _ = self.program(task, self._curves(task).index(best.curve), scale=0.5)
         return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)

@@ -31,6 +31,16 @@ if TYPE_CHECKING:
 SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
 """Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
+ROW_ORDERS = {
+    "joint positions": 0,
+    "joint velocities": 1,
+    "joint accelerations": 2,
+    "position": 0,
+    "velocity": 1,
+    "acceleration": 2,
+    "jerk": 3,
+}
+"""Orders of the derivatives by time that rows limit."""
 USUAL_MOVE, USUAL_DURATIONS = 0.1, (0.1, 10.0)
 """Smallest largest move (rad or m) and range of durations (s) of motions that are planned in SI units."""
 
@@ -124,18 +134,10 @@ class Problem:
         if length < 1.0:
             for indices in (at.q, at.middles[0]):
                 units.offset[indices] = guess.q[:1].T
-        orders = {
-            **dict(zip(("joint positions", "joint velocities", "joint accelerations"), (0, 1, 2), strict=True)),
-            **dict(zip(("position", "velocity", "acceleration", "jerk"), range(4), strict=True)),
-        }
+        row_units = {"duration": time, **{what: length / time**order for what, order in ROW_ORDERS.items()}}
         parts = [np.zeros(0)]
         for block in program.blocks:
-            each = [
-                np.full(rows.count, time if rows.what == "duration" else length / time ** orders[rows.what])
-                if rows.what in orders or rows.what == "duration"
-                else np.ones(rows.count)
-                for rows in block.rows
-            ]
+            each = [np.full(rows.count, row_units.get(rows.what, 1.0)) for rows in block.rows]
             parts.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
         return Scaling(units.offset, units.unit, np.concatenate(parts))
 

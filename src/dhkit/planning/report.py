@@ -75,6 +75,18 @@ class PlanReport:
         """Relative excess of the cost on half as many intervals over this one."""
         return None if self.coarse is None else self.coarse[1] / self.cost - 1
 
+    @property
+    def notes(self) -> list[str]:
+        """What a reader of the motion has to know besides, a sentence each."""
+        notes = []
+        if self.reduced_clearances:
+            notes.append(f"clearance reduced near the ends: {', '.join(self.reduced_clearances)}")
+        if not self.is_converged:
+            notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
+        if not self.is_resolved:
+            notes.append("the move is too small to be optimized: a quintic that keeps the limits")
+        return notes
+
     def active_limits(self) -> list[tuple[str, float]]:
         """Return the active limits and their shares of time, the most active first."""
         named = [(f"{what} of {self._name(what, row)}", share) for what, row, share in self.certificate.active]
@@ -105,7 +117,7 @@ class PlanReport:
             f"{self.duration:.4f} s, least {self.objective}, {self._certified}",
             html_table((), facts),
             html_table(("branch", "duration", ""), branches) if branches else "",
-            html_lines([f"tightened: {', '.join(self.tightened)}"] if self.tightened else []),
+            html_lines([f"tightened: {', '.join(self.tightened)}"] * bool(self.tightened) + self.notes),
         )
 
     @property
@@ -189,12 +201,7 @@ class PlanReport:
         lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
-        if self.reduced_clearances:
-            lines.append(f"clearance reduced near the ends: {', '.join(self.reduced_clearances)}")
-        if not self.is_converged:
-            lines.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
-        if not self.is_resolved:
-            lines.append("the move is too small to be optimized: a quintic that keeps the limits")
+        lines += self.notes
         if self.coarse is not None:
             more = f"{100 * (self.sensitivity or 0):.3g} % more"
             lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")

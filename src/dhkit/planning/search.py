@@ -89,16 +89,15 @@ class Program:
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """A certified motion, with its cost and the work of finding it."""
+    """A certified motion, with its cost."""
 
     trajectory: Trajectory
-    knots: Knots
     certificate: Certificate
     cost: float
-    slow_down: float
-    tightened: tuple[str, ...]
-    iterations: int
-    solves: int
+    curve: Curve
+    """Shape of the acceleration in the program's intervals."""
+    slow_down: float = 1.0
+    tightened: tuple[str, ...] = ()
     is_resolved: bool = True
     """Whether the motion was optimized; a move below ``RESOLUTION`` is not."""
     is_converged: bool = True
@@ -121,10 +120,17 @@ class PlannedMotion:
             worst = max(certificate.checks, key=lambda check: check.excess)
             raise PlanningError(f"{worst.what} is exceeded by {100 * worst.excess:.2g} % at {worst.time:.3g} s")
         cost = cost_of(objective, trajectory, task.description, task.friction)
-        knots = Knots(
-            np.array([trajectory.duration]), task.points, np.zeros_like(task.points), np.zeros((1, task.arm.n))
-        )
-        return cls(trajectory, knots, certificate, cost, 1.0, (), 0, 0, is_resolved=False)
+        return cls(trajectory, certificate, cost, Curve.QUADRATIC, is_resolved=False)
+
+
+@dataclass
+class Work:
+    """Work of all searches for one motion, of failed branches too."""
+
+    iterations: int = 0
+    solves: int = 0
+    build_seconds: float = 0.0
+    """Time for making programs, s."""
 
 
 @dataclass(eq=False)
@@ -177,42 +183,41 @@ class Search:
     def _certify(self, knots: Knots) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
         margins = Margins(self.program.mesh)
-        for turn in range(MAX_ROUNDS if self.is_last else FIRST_ROUNDS):
+        for turn in range(self._rounds):
             found = self.checked(knots, turn)
             if isinstance(found, PlannedMotion):
                 return found
             margins = self.widen_margins(margins, found.states, turn)
-            knots = self.solution(found.knots, margins)
+            knots = self.solution(self.knots_of(found.trajectory), margins)
         raise self.stays_exceeded(found.certificate)
+
+    @property
+    def _rounds(self) -> int:
+        return MAX_ROUNDS if self.is_last else FIRST_ROUNDS
+
+    def knots_of(self, trajectory: Trajectory) -> Knots:
+        """Return a motion of the program's mesh as the start of the next solution."""
+        return knots_along(trajectory, self.program.mesh, trajectory.breaks[list(self.program.mesh.ends)])
 
     def checked(self, knots: Knots, turn: int) -> PlannedMotion | Excess:
         """Return a solution as a certified motion, or what it exceeds; in later turns it may be slowed down further."""
         task, mesh = self.task, self.program.mesh
         trajectory = assemble_trajectory(task.arm, mesh, knots, fixed_ends=self.program.problem.jerk_counts)
         trajectory, states, certificate, c = self._slow_down(trajectory, SMALL_STEP[mesh.curve] * STEP_GROWTH**turn)
-        again = knots_along(trajectory, mesh, trajectory.breaks[list(mesh.ends)])
         if certificate.ok:
             cost, tightened = self._cost(trajectory), tuple(self.tightened)
             return PlannedMotion(
-                trajectory,
-                again,
-                certificate,
-                cost,
-                c,
-                tightened,
-                self.iterations,
-                self.solves,
-                is_converged=self.is_converged,
+                trajectory, certificate, cost, mesh.curve, c, tightened, is_converged=self.is_converged
             )
         exceeded = [check.what for check in certificate.checks if check.excess > 0]
         self.tightened += [what for what in exceeded if what not in self.tightened]
-        return Excess(trajectory, again, states, certificate)
+        return Excess(trajectory, states, certificate)
 
     def stays_exceeded(self, certificate: Certificate) -> PlanningError:
         """Return the error for a limit that tightening does not help."""
         worst = max(certificate.checks, key=lambda check: check.excess)
         name = self._row_name(worst.what, worst.row)
-        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {MAX_ROUNDS} rounds")
+        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {self._rounds} rounds")
 
     def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
         """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
@@ -357,8 +362,6 @@ class Excess:
     """A motion that exceeds limits."""
 
     trajectory: Trajectory
-    knots: Knots
-    """The motion on the mesh, as the start of the next solution."""
     states: States
     certificate: Certificate
 

@@ -16,8 +16,6 @@ from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacl
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
-FARTHEST = 1e9
-"""Distance beyond which pairs are not measured, m."""
 ROUNDING = 1e-7
 """Difference of bounds (m) that counts as equal: coal's distances are accurate to about 1e-9."""
 
@@ -180,7 +178,7 @@ def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) ->
     distances = np.full(low.shape, np.inf)
     least = np.min(high, axis=1, initial=np.inf)
     for k in range(low.shape[1]):
-        rows = np.flatnonzero(low[:, k] <= np.minimum(least + ROUNDING, FARTHEST))
+        rows = np.flatnonzero(np.isfinite(low[:, k]) & (low[:, k] <= least + ROUNDING))
         if len(rows):
             distances[rows, k] = measure(k, rows)
     return _smallest(distances)

@@ -69,8 +69,8 @@ class PathSampler:
             target = grown.nodes[new]
             last = self._extend(other, other.nearest(target), target)
             if last is not None and np.array_equal(other.nodes[last], target):
-                one, two = (trees[0], new if turn % 2 == 0 else last), (trees[1], last if turn % 2 == 0 else new)
-                return np.array([*reversed(one[0].back(one[1])), *two[0].back(two[1])[1:]])
+                first, second = (new, last) if turn % 2 == 0 else (last, new)
+                return np.array([*reversed(trees[0].back(first)), *trees[1].back(second)[1:]])
         return None
 
     def shortened(self, path: Array) -> Array:

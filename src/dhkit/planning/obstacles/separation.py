@@ -84,17 +84,16 @@ class Separation:
         for k, item in enumerate(self.obstacles):
             if isinstance(item, Floor):
                 ends = {i: tuple(end for j, end in checked.heights if j == i) for i, _ in checked.heights}
-                self._add([Pair(i, k, None, which) for i, which in ends.items()])
+                self._add([Pair(i, k, None, which) for i, which in ends.items()], item)
             else:
-                self._add([Pair(i, k) for i in checked.moving])
+                self._add([Pair(i, k) for i in checked.moving], item)
         if self_collision:
-            self._add([Pair(i, None, j) for i, j in checked.itself])
+            self._add([Pair(i, None, j) for i, j in checked.itself], None)
 
-    def _add(self, pairs: list[Pair]) -> None:
+    def _add(self, pairs: list[Pair], obstacle: Obstacle | Floor | None) -> None:
         if pairs:
             begin = len(self.pairs)
             self.pairs += pairs
-            obstacle = None if pairs[0].obstacle is None else self.obstacles[pairs[0].obstacle]
             self._groups.append(_Group(slice(begin, len(self.pairs)), obstacle, [pair.capsule for pair in pairs]))
 
     def gaps(self, q: Array, near: float = np.inf) -> Gaps:
@@ -164,7 +163,7 @@ class Separation:
     def _measure(self, axes: Array, group: _Group, at: tuple[Indices, Indices], found: Gaps) -> None:
         """Write the gaps of some groups of states and pairs, each at its smallest."""
         k, p = at
-        pairs = [self.pairs[group.part][i] for i in range(len(group.capsules))]
+        pairs = self.pairs[group.part]
         capsules = np.array(group.capsules)[p]
         own, item = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.obstacle
         radius = np.zeros(len(k))
