@@ -853,6 +853,10 @@ class Arm:
         time_limit: float = 10.0,
         progress: ProgressCall | None = None,
         payload: Payload | None = None,
+        friction: bool | Friction = False,
+        obstacles: Scene = (),
+        clearance: float = 0.01,
+        self_collision: bool = False,
     ) -> Trajectory:
         """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
         from dhkit.planning import along_path
@@ -868,6 +872,10 @@ class Arm:
             time_limit=time_limit,
             progress=progress,
             payload=payload,
+            friction=friction,
+            obstacles=obstacles,
+            clearance=clearance,
+            self_collision=self_collision,
         )
 
     def certify(

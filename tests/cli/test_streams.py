@@ -111,7 +111,7 @@ def test_options_of_one_meaning_have_one_name():
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("plan puma560 --to nominal --intervals 96", "of 30 s to search"),
+        ("plan puma560 --to nominal --intervals 480", "of 30 s to search"),
         ("simulate puma560 --duration 30", "simulating"),
     ],
 )

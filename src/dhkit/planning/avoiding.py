@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import knots_along
-from dhkit.planning.certificate import MIN_REACH, Certificate
+from dhkit.planning.certificate import Certificate
+from dhkit.planning.collision_avoidance import Clearance
+from dhkit.planning.joint_limits import Limit
+from dhkit.planning.motion_program import MotionProgram
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
-from dhkit.planning.search import Excess, PlannedMotion, Program, Search, TimeLimitError
-from dhkit.planning.task import Margins, PlanTask
+from dhkit.planning.search import Excess, PlannedMotion, Search, TimeLimitError
+from dhkit.planning.task import Margins, Task
 from dhkit.planning.variables import Knots
 from dhkit.trajectories import Trajectory
 
@@ -94,13 +97,18 @@ class AvoidingSearch:
         The motion, with its obstacles.
     search
         The search of the same motion without obstacles.
+    program
+        Its program.
     finer
-        Returns the program of a finer mesh, on which paths that led to no motion are tried again, and its build time.
+        Returns the program of a finer mesh, on which paths that led to no motion are tried again.
     """
 
-    def __init__(self, task: PlanTask, search: Search, finer: Callable[[], tuple[Program, float]]) -> None:
+    def __init__(
+        self, task: Task, search: Search[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
+    ) -> None:
         avoidance = task.avoidance
         self.task, self.search, self.clearance = task, search, avoidance.clearance
+        self.program = program
         self.separation = Separation(task.arm, avoidance.obstacles, avoidance.self_collision)
         self.paths = 0
         self._speed = np.where(np.isfinite(task.limits.velocity), task.limits.velocity, 1.0)
@@ -120,7 +128,7 @@ class AvoidingSearch:
             # On the coarse mesh the arm may move too far in an interval for one plane to separate it from an obstacle.
             for is_finer in (False, True):
                 if is_finer:
-                    search.program, _ = self._finer()
+                    self.program = search.program = self._finer()
                 for guess in self._starts(warm):
                     try:
                         found = self._improved(*guess, np.inf if best is None else best.cost)
@@ -149,7 +157,7 @@ class AvoidingSearch:
 
     def _starts(self, warm: Trajectory | None) -> Iterator[tuple[Trajectory, Array]]:
         """Yield motions that are about clear of obstacles, and the ends of their legs, s: short ones first."""
-        if warm is not None and len(self.search.program.mesh.legs) == 1:
+        if warm is not None and len(self.program.mesh.legs) == 1:
             self.paths += 1
             yield warm, np.array([warm.duration])
         found: list[tuple[float, list[Array]]] = []
@@ -219,8 +227,8 @@ class AvoidingSearch:
 
     def _timed(self, path: list[Array]) -> tuple[Trajectory, Array]:
         """Return a motion along a path that rests at the ends of legs, and their times, s; its velocities are rough."""
-        task, mesh = self.task, self.search.program.mesh
-        total = self.search.guessed_durations()
+        task, mesh = self.task, self.program.mesh
+        total = self.program.guessed_durations(self.search.task)
         times, q = [np.zeros(1)], [task.points[:1]]
         for k, leg in enumerate(path):
             steps = self._durations(leg)
@@ -245,22 +253,23 @@ class AvoidingSearch:
 
         The improvement ends early where it will hardly lead below ``best_cost``.
         """
-        search, mesh = self.search, self.search.program.mesh
+        search, mesh = self.search, self.program.mesh
         guess = knots_along(start, mesh, ends)
         gaps = self._gaps(start, guess, np.inf)
-        planes, margins = Planes.of(gaps, self._required(gaps, LONGER), 0.0), Margins(mesh)
+        planes, margins = Planes.of(gaps, self._required(gaps, LONGER), 0.0), Margins(mesh.intervals)
         best: PlannedMotion | None = None
         turn = 0
         for _ in range(MAX_SOLUTIONS):
             kept = planes.required + planes.inflation
-            program = search.program.apart(self.separation.rows(planes.gaps, planes.active, kept, {0, *mesh.ends}))
+            program = self.program.apart(self.separation.rows(planes.gaps, planes.active, kept, {0, *mesh.ends}))
             try:
-                found = search.checked(search.solution(guess, margins, program), turn)
+                solved = search.solution(guess, margins, program)
+                found = search.checked(solved, turn)
             except PlanningError:
                 if best is not None:
                     return best
                 raise
-            knots = search.knots_of(found.trajectory)
+            knots = self.program.knots_of(found.trajectory)
             gaps = self._gaps(found.trajectory, knots, self.clearance + ACTIVE_GAP)
             required = self._required(gaps)
             short = float(np.max(required - gaps.gap, initial=-np.inf))
@@ -282,9 +291,9 @@ class AvoidingSearch:
             if is_new and short > ACTIVE_GAP:
                 continue  # from the same guess: this motion went far astray
             if isinstance(found, Excess) and any(
-                check.excess > 0 and check.what != "clearance" for check in found.certificate.checks
+                check.excess > 0 and check.limit != Limit.CLEARANCE for check in found.certificate.checks
             ):
-                margins = search.widen_margins(margins, found.states, turn)
+                margins = search.widen_margins(margins, solved, found, turn)
                 turn += 1
             guess = knots
         if best is not None:
@@ -300,13 +309,12 @@ class AvoidingSearch:
         certificate = checker.check(found.trajectory, states)
         if certificate.ok:
             return replace(found, certificate=certificate)
-        self.search.tightened += ["clearance"] * ("clearance" not in self.search.tightened)
+        self.search.tightened += [Limit.CLEARANCE.what] * (Limit.CLEARANCE.what not in self.search.tightened)
         return Excess(found.trajectory, states, certificate)
 
     def _shortfall(self, certificate: Certificate) -> float:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""
-        short = [check.excess for check in certificate.checks if check.what == "clearance"]
-        return max(0.0, *short) * max(self.task.description.reach, MIN_REACH)
+        return max(0.0, certificate.excess_of(Limit.CLEARANCE)) * Clearance.unit(self.task.arm)
 
     def _required(self, gaps: Gaps, longer: int = 1) -> Array:
         """Return the required gaps in each interval, shape (K, P), m."""
@@ -314,7 +322,7 @@ class AvoidingSearch:
 
     def _gaps(self, motion: Trajectory, knots: Knots, near: float) -> Gaps:
         """Return the gaps in each interval of the mesh; those above ``near`` (m) may be infinite."""
-        times = self.search.program.mesh.times(knots.durations)
+        times = self.program.mesh.times(knots.durations)
         inside = times[:-1, None] + np.diff(times)[:, None] * np.linspace(0.0, 1.0, POINTS)
         return self.separation.gaps(motion.q(inside), near)
 

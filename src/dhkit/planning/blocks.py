@@ -7,6 +7,7 @@ and evaluated at all its points; the derivatives of the program are these values
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -55,25 +56,36 @@ class LocalFunction:
         self.hessian, self.hessian_at = function("hessian", inputs, _nonzeros(hessian)), _triplet(hessian)
 
 
+class RowKind(Enum):
+    """What rows are for, which decides their bounds and units."""
+
+    CONTINUITY = "continuity"
+    """Zero: a variable equals an expression."""
+    TIME = "time"
+    """At most zero: the time that an interval takes beyond its duration."""
+    DURATION = "duration"
+    """The duration of the motion."""
+    LIMIT = "limit"
+    """A limit of the motion."""
+    PLANE = "plane"
+    """At least zero: the distance beyond a plane, m."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Rows of one kind at each point of a block."""
 
+    kind: RowKind
     what: str
-    """Name of the limited quantity, such as ``"torque"``."""
-    low: Array
-    """Lower bounds at each point, shape (count,), without unit."""
-    high: Array
-
-    @classmethod
-    def of(cls, what: str, count: int, low: float = -np.inf, high: float = np.inf) -> Rows:
-        """Return rows with equal bounds; those without bounds get them from the task's limits."""
-        return cls(what, np.full(count, low), np.full(count, high))
-
-    @property
-    def count(self) -> int:
-        """Number of rows at each point."""
-        return len(self.low)
+    """Name of the limited quantity, for messages."""
+    count: int
+    """Number of rows at each point."""
+    limit: int = -1
+    """Place of the limit among the motion's constraints, see :class:`dhkit.planning.joint_limits.Limit`."""
+    order: int | None = None
+    """Order of the derivative by time of joint values that the rows are; None if they have no unit."""
+    of_joints: bool = False
+    """Whether there is one row for each joint."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.display import html_block, html_table, repr_line, value_line
-from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
+from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.joint_limits import Limit, PositionLimit
+from dhkit.planning.loaded import LoadedArm, loaded
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
@@ -25,8 +29,8 @@ ACCEPTED_EXCESS = 5e-7
 ACTIVE_SHARE = 0.99
 """Share of a limit from which it counts as active."""
 HALVINGS = 40
-MIN_REACH = 1e-9
-"""Smallest reach (m) used as a scale of lengths, for arms without reach."""
+MIN_SEARCHED_COEFFICIENTS = 3
+"""Number of coefficients from which a polynomial may have an extreme inside its piece."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,23 @@ class Check:
     """Joint (from 0) or row of a constraint that comes nearest to its limit."""
     time: float
     """Time of the largest excess, s."""
+    of_joint: bool = True
+    """Whether ``row`` is a joint."""
+    limit: int | None = None
+    """Place among the constraints of the motion, see :class:`dhkit.planning.joint_limits.Limit`; None for jumps."""
 
     __repr__ = value_line
+
+
+class ActiveLimit(NamedTuple):
+    """A limit that a motion reaches."""
+
+    what: str
+    row: int
+    """Joint (from 0) or row of a constraint."""
+    share: float
+    """Share of time at the limit."""
+    of_joint: bool
 
 
 @dataclass(frozen=True)
@@ -52,8 +71,7 @@ class Certificate:
     states: int
     reference: str
     """Name of the library that computed torques and poses: Pinocchio, or dhkit if it is not installed."""
-    active: tuple[tuple[str, int, float], ...]
-    """Active limits: the kind, the joint from 0, and the share of time for which the joint is at it."""
+    active: tuple[ActiveLimit, ...]
     any_active: float
     """Share of time for which at least one joint is at a limit."""
 
@@ -69,11 +87,15 @@ class Certificate:
 
     def with_worse_checks(self, checks: Sequence[Check]) -> Certificate:
         """Return the certificate with checks of the same limits replaced where the given ones are worse."""
-        by_name = {check.what: check for check in self.checks}
+        by_limit = {check.limit: check for check in self.checks}
         for check in checks:
-            if check.what not in by_name or check.excess > by_name[check.what].excess:
-                by_name[check.what] = check
-        return replace(self, checks=tuple(by_name.values()))
+            if check.limit not in by_limit or check.excess > by_limit[check.limit].excess:
+                by_limit[check.limit] = check
+        return replace(self, checks=tuple(by_limit.values()))
+
+    def excess_of(self, limit: int) -> float:
+        """Return the largest excess of a constraint, by its place, as a share of the limit; -inf without it."""
+        return max((check.excess for check in self.checks if check.limit == limit), default=-np.inf)
 
     @property
     def worst(self) -> Check | None:
@@ -150,10 +172,9 @@ def certify(
     if limits.velocity.shape != (description.n,):
         raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {description.n}")
     carried = motion.payload if payload is None else payload
-    loaded = description if carried is None else carried.carried(description)
     chosen = motion.friction if friction is None else Friction.chosen(friction)
     points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1])
-    certificate = Checker(loaded, limits, friction=chosen, points=points).check(motion)
+    certificate = Checker(loaded(description, carried), limits, friction=chosen, points=points).check(motion)
     return certificate.with_worse_checks(_extremes(motion, limits, points))
 
 
@@ -161,8 +182,7 @@ def certify(
 class Checker:
     """Limits and constraints of a motion, for checking trajectories against them."""
 
-    description: Description
-    """The robot with its payload."""
+    description: LoadedArm
     limits: Limits
     constraints: tuple[Constraint, ...] = ()
     parameters: tuple[Array, ...] = ()
@@ -180,45 +200,31 @@ class Checker:
         inside = States.of(self.description, trajectory, t[:, :-1], self.friction, "right")
         return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), self.points)
 
-    def measured(self, states: States) -> list[tuple[str, Array]]:
-        """Return each kind of limit with its use, shape (N, k), which is 1 at the limit."""
-        limits, found = self.limits, []
-        for what, values, limit in (
-            ("velocity", states.qd, limits.velocity),
-            ("acceleration", states.qdd, limits.acceleration),
-        ):
-            if np.isfinite(limit).any():
-                found.append((what, np.abs(values) / limit))
-        if np.isfinite(limits.torque).any():
-            found.append(("torque", np.abs(states.tau) / limits.torque))
-        for constraint, parameters in zip(self.constraints, self.parameters, strict=True):
-            found.append((constraint.what, constraint.use(states, parameters)))
-        if self.avoidance:
-            short = self.avoidance.shortfalls(self.description, states.q)
-            found.append(("clearance", 1 + short[:, None] / max(self.description.reach, MIN_REACH)))
-        return found
+    @cached_property
+    def every(self) -> tuple[tuple[Constraint, Array], ...]:
+        """All constraints of the motion with their parameters: first those of :class:`Limit`."""
+        every = motion_constraints(self.limits, self.avoidance, self.constraints)
+        own = [limit.values(self.description, np.eye(4)) for limit in every[: len(Limit)]]
+        return tuple(zip(every, (*own, *self.parameters), strict=True))
 
-    def peaks(self, states: States) -> list[tuple[str, Array]]:
-        """Return each kind of limit with its use at the grid's states, shape (N, k), raised to its peak between states.
+    @cached_property
+    def limiting(self) -> dict[int, tuple[Constraint, Array]]:
+        """Those that limit motions, by their places."""
+        return {k: pair for k, pair in enumerate(self.every) if pair[0].is_limiting}
+
+    def measured(self, states: States) -> dict[int, Array]:
+        """Return the use of each limit, shape (N, k), which is 1 at the limit."""
+        return {k: constraint.use(states, given) for k, (constraint, given) in self.limiting.items()}
+
+    def peaks(self, states: States) -> dict[int, Array]:
+        """Return the use of each limit at the grid's states, shape (N, k), raised to its peak between states.
 
         The peak is that of the parabola through three neighbouring states of an interval.
         """
-        return [(what, use + _parabola_rises(use, self.points)) for what, use in self.measured(states)]
+        return self._raised(self.measured(states))
 
-    def positions(self, states: States) -> Array:
-        """Return the excess of each joint value over its limits at the grid's states, shape (N, n); negative inside.
-
-        In shares of the limit (:func:`position_sizes`), raised to peaks between states as in :meth:`peaks`.
-        """
-        lower, upper = self.limits.lower, self.limits.upper
-        size = position_sizes(self.limits)
-        if not (np.isfinite(lower) | np.isfinite(upper)).any():
-            return np.full(states.q.shape, -np.inf)
-        with np.errstate(invalid="ignore"):
-            excess = np.stack([(lower - states.q) / size, (states.q - upper) / size])
-            raised = [np.where(np.isfinite(side), side + _parabola_rises(side, self.points), side) for side in excess]
-        worst: Array = np.maximum(*raised)
-        return worst
+    def _raised(self, uses: dict[int, Array]) -> dict[int, Array]:
+        return {k: use + _parabola_rises(use, self.points) for k, use in uses.items()}
 
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
@@ -227,16 +233,17 @@ class Checker:
         share = _time_shares(trajectory, states)
         if (jump := _largest_jump(trajectory, self.limits)) is not None:
             checks.append(jump)
-        excess = self.positions(states)
-        if np.isfinite(excess).any():
-            checks.append(_check("position", excess, states.times))
-        if np.isfinite(self.limits.jerk).any():
-            checks.append(_largest_jerk(trajectory, self.limits.jerk))
-        for what, use in self.peaks(states):
-            checks.append(_check(what, use - 1, states.times))
+        for k, use in self.peaks(states).items():
+            constraint, _ = self.limiting[k]
+            checks.append(_check(constraint, k, use - 1, states.times))
             reached = use >= ACTIVE_SHARE
+            if k == Limit.POSITION:
+                continue  # a joint may rest anywhere in its range
             anywhere |= reached.any(axis=1)
-            active += [(what, i, float(share @ reached[:, i])) for i in range(use.shape[1]) if reached[:, i].any()]
+            active += [
+                ActiveLimit(constraint.what, i, float(share @ reached[:, i]), constraint.of_joints)
+                for i in np.flatnonzero(reached.any(axis=0)).tolist()
+            ]
         return Certificate(tuple(checks), len(states.times), states.reference, tuple(active), float(share @ anywhere))
 
     def slow_down(self, states: States) -> float:
@@ -244,9 +251,12 @@ class Checker:
 
         Infinite if a limit is exceeded even at rest. Only for motions from rest to rest.
         """
+        moving = {k: pair for k, pair in self.limiting.items() if pair[0].moving}
 
         def keeps(c: float) -> bool:
-            return all(np.max(use, initial=0.0) <= 1.0 for _, use in self._velocity_dependent(states.slowed(c)))
+            slower = states.slowed(c)
+            uses = {k: constraint.use(slower, given) for k, (constraint, given) in moving.items()}
+            return all(np.max(use, initial=0.0) <= 1.0 for use in self._raised(uses).values())
 
         if keeps(1.0):
             return 1.0
@@ -263,17 +273,6 @@ class Checker:
                 break
         return high
 
-    def _velocity_dependent(self, states: States) -> list[tuple[str, Array]]:
-        resting = {constraint.what for constraint in self.constraints if not constraint.moving}
-        moving = replace(self, avoidance=NO_AVOIDANCE)
-        return [(what, use) for what, use in moving.peaks(states) if what not in resting]
-
-
-def position_sizes(limits: Limits) -> Array:
-    """Return the scales of positions outside their limits, shape (n,): the larger limit, at least 1 rad or m."""
-    size = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
-    return np.where(np.isfinite(size) & (size > 0), size, 1.0)
-
 
 def _parabola_rises(use: Array, points: int) -> Array:
     """Return the height of the parabola's vertex over each value, shape (N, k), through it and its neighbours."""
@@ -284,10 +283,10 @@ def _parabola_rises(use: Array, points: int) -> Array:
     return np.pad(rises, ((0, 0), (1, 1), (0, 0))).reshape(use.shape)
 
 
-def _check(what: str, excess: Array, times: Array) -> Check:
+def _check(constraint: Constraint, limit: int, excess: Array, times: Array) -> Check:
     excess = np.where(np.isnan(excess), np.inf, excess)  # a limit whose use is not a number is not kept
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    return Check(what, float(excess[k, i]), int(i), float(times[k]))
+    return Check(constraint.what, float(excess[k, i]), int(i), float(times[k]), constraint.of_joints, limit)
 
 
 def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
@@ -300,7 +299,7 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     fastest = np.where(np.isfinite(limits.velocity), limits.velocity, np.maximum(speeds, 1e-3))
     largest = max(float(np.abs(trajectory.qdd(trajectory.breaks)).max()), 1e-3)
     for what, values, size in (
-        ("jump of position", trajectory.q, position_sizes(limits)),
+        ("jump of position", trajectory.q, PositionLimit(limits).sizes),
         ("jump of velocity", trajectory.qd, fastest),
         ("jump of acceleration", trajectory.qdd, np.where(np.isfinite(limits.jerk), largest, np.inf)),
     ):
@@ -311,29 +310,27 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     return worst if worst.excess > ACCEPTED_EXCESS else None
 
 
-def _largest_jerk(trajectory: Trajectory, limit: Array) -> Check:
-    """Return the largest use of the jerk limits: at ends of intervals, and inside pieces of high degree."""
-    pieces = trajectory.pieces.differentiated(3)
-    degree = pieces.coefficients.shape[1] - 1
-    t, values = pieces.inside(2) if degree < 2 else pieces.extremes(POINTS_PER_COEFFICIENT * (degree + 1))
-    use = np.abs(values) / limit
-    k, p, i = np.unravel_index(int(np.argmax(use)), use.shape)
-    return Check("jerk", float(use[k, p, i] - 1), int(i), float(t[k, p] if t.ndim == 2 else t[k, p, i]))
-
-
 def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
-    """Return the checks of the extremes of positions, rates and accelerations, searched from ``points`` in a piece."""
+    """Return the checks of the extremes of positions and their derivatives, searched from ``points`` in a piece."""
     found = []
-    size = position_sizes(limits)
-    for order, what in enumerate(("position", "velocity", "acceleration")):
-        t, values = motion.pieces.differentiated(order).extremes(points)
-        if order == 0:
-            excess = np.maximum(limits.lower - values, values - limits.upper) / size
+    kinds = (Limit.POSITION, Limit.VELOCITY, Limit.ACCELERATION, Limit.JERK)
+    position = PositionLimit(limits)
+    for order, kind in enumerate(kinds):
+        pieces = motion.pieces.differentiated(order)
+        if kind is Limit.JERK and pieces.coefficients.shape[1] < MIN_SEARCHED_COEFFICIENTS:
+            t, values = pieces.inside(2)
+            t = np.broadcast_to(t[..., None], values.shape)
         else:
-            excess = np.abs(values) / getattr(limits, what) - 1
-        if np.isfinite(getattr(limits, what) if order else np.minimum(-limits.lower, limits.upper)).any():
+            t, values = pieces.extremes(points)
+        if kind is Limit.POSITION:
+            is_limited = position.is_limiting
+            excess = np.maximum(limits.lower - values, values - limits.upper) / position.sizes
+        else:
+            limit = getattr(limits, kind.what)
+            is_limited, excess = bool(np.isfinite(limit).any()), np.abs(values) / limit - 1
+        if is_limited:
             k, p, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-            found.append(Check(what, float(excess[k, p, i]), int(i), float(t[k, p, i])))
+            found.append(Check(kind.what, float(excess[k, p, i]), int(i), float(t[k, p, i]), limit=kind))
     return found
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.joint_limits import joint_limits
 from dhkit.planning.obstacles import (
     Floor,
     Obstacle,
@@ -23,7 +25,11 @@ from dhkit.planning.obstacles import (
     pair_distances,
     required_gaps,
 )
+from dhkit.planning.states import States
+from dhkit.trajectories import Limits
 
+MIN_REACH = 1e-9
+"""Smallest reach (m) used as a scale of lengths, for arms without reach."""
 KEPT_SHARE = 0.75
 """Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
 way out of a narrow place."""
@@ -126,3 +132,38 @@ class CollisionAvoidance:
 
 
 NO_AVOIDANCE = CollisionAvoidance()
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance(Constraint):
+    """The clearance from obstacles, measured by coal; an optimizer keeps it by planes, see ``avoiding.py``."""
+
+    avoidance: CollisionAvoidance
+    moving = False
+
+    @property
+    def what(self) -> str:
+        """Name of the limited quantity."""
+        return "clearance"
+
+    @property
+    def is_limiting(self) -> bool:
+        """Whether there are obstacles."""
+        return bool(self.avoidance)
+
+    @staticmethod
+    def unit(description: Description) -> float:
+        """Return the length that counts as 1, m: the arm's reach."""
+        return max(description.reach, MIN_REACH)
+
+    def measured(self, states: States, parameters: Array) -> Array:
+        """Return 1 plus what is missing of the required distances in shares of the arm's reach, shape (N, 1)."""
+        short = self.avoidance.shortfalls(states.description, states.q)
+        return 1 + short[:, None] / self.unit(states.description)
+
+
+def motion_constraints(
+    limits: Limits, avoidance: CollisionAvoidance, constraints: Sequence[Constraint]
+) -> tuple[Constraint, ...]:
+    """Return all constraints of a motion: those of :class:`dhkit.planning.joint_limits.Limit`, then the given ones."""
+    return (*joint_limits(limits), Clearance(avoidance), *constraints)

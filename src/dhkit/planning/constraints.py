@@ -31,12 +31,18 @@ class Constraint:
     """Whether the quantity depends on velocity, so that a motion keeps the constraint if it is slow enough."""
     two_sided: ClassVar[bool] = False
     """Whether the quantity must stay between -1 and 1, not only below 1."""
-    needs_torque: ClassVar[bool] = False
+    of_joints: ClassVar[bool] = False
+    """Whether there is one row for each joint."""
 
     @property
     def what(self) -> str:
         """Name of the limited quantity."""
         raise NotImplementedError(f"{type(self).__name__} has no property what, the name of the limited quantity")
+
+    @property
+    def is_limiting(self) -> bool:
+        """Whether the constraint limits motions at all."""
+        return True
 
     def use_text(self, use: float) -> str:
         """Return a use of the limit (1 at the limit) as text."""
@@ -85,6 +91,17 @@ class Constraint:
             raise PlanningError(f"{self.what} is not a number at {t:.3g} s, so that no motion can be certified")
         return np.abs(values) if self.two_sided else values
 
+    def bounds(self, parameters: Array, shares: Array) -> tuple[Array, Array]:
+        """Return the bounds of ``rows`` for the optimizer, shape (P, k) each, less margins.
+
+        Parameters
+        ----------
+        shares
+            Margins at P points as shares of the limit, shape (P, k).
+        """
+        high = 1 - shares
+        return -high if self.two_sided else np.full_like(high, -np.inf), high
+
     def size(self, description: Description) -> int:
         """Return the number of parameters."""
         return 0
@@ -100,7 +117,7 @@ class MotorPower(Constraint):
 
     watts: float | tuple[float, ...]
     two_sided = True
-    needs_torque = True
+    of_joints = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "watts", positive("MotorPower", self.watts))
@@ -130,7 +147,7 @@ class TorqueSpeedLine(Constraint):
     no_load_speed: float | tuple[float, ...]
     """No-load speed at the joint, rad/s or m/s, likewise."""
     two_sided = True
-    needs_torque = True
+    of_joints = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stall_torque", positive("TorqueSpeedLine", self.stall_torque))

@@ -12,10 +12,11 @@ from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.goals import Place, Route
+from dhkit.planning.loaded import LoadedArm
 from dhkit.planning.objectives import Objective
 from dhkit.planning.request import PlanRequest
 from dhkit.planning.states import States
-from dhkit.planning.task import PlanTask
+from dhkit.planning.task import Task
 from dhkit.trajectories import Limits, quintic, trapezoidal
 
 CONSTRAINT_ROUNDING = 1e-6
@@ -57,7 +58,7 @@ def require_speed(description: Description, limits: Limits, qd: Array, where: st
     raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {durations}, above its limit, {bound}")
 
 
-def require_holdable(description: Description, limits: Limits, q: Array, where: str) -> None:
+def require_holdable(description: LoadedArm, limits: Limits, q: Array, where: str) -> None:
     """Require joint values q (n,), rad and m, at which the torque limits suffice to hold the arm.
 
     Raises
@@ -80,7 +81,7 @@ def require_holdable(description: Description, limits: Limits, q: Array, where: 
     )
 
 
-def require_kept(description: Description, constraints: Sequence[Constraint], T_start: Array, place: Place) -> None:
+def require_kept(description: LoadedArm, constraints: Sequence[Constraint], T_start: Array, place: Place) -> None:
     """Require that a place keeps the constraints at rest; ``T_start`` (4, 4), m, is the tool's pose at the start.
 
     Raises
@@ -147,7 +148,7 @@ def require_possible(
     resting = [constraint for constraint in constraints if not constraint.moving]
     T_start = world_to_tool(description, routes[0].points[0])
     for place in places:
-        require_kept(description, resting, T_start, place)
+        require_kept(request.loaded(description), resting, T_start, place)
     if request.duration is not None and request.duration < routes[0].bound:
         least = f"the speed limits alone ask for {routes[0].bound:.6g} s"
         raise PlanningError(f"a duration of {request.duration:.6g} s is too short: {least}")
@@ -173,7 +174,7 @@ def require_place(description: Description, request: PlanRequest, q: Array, name
         request.avoidance.require_gap(description, q, name, least)
 
 
-def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:
+def classical_durations(task: Task) -> tuple[tuple[str, float], ...]:
     """Return the durations of a quintic and of the best trapezoid along the straight joint path, under its limits, s.
 
     Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction.
@@ -188,7 +189,7 @@ def classical_durations(task: PlanTask) -> tuple[tuple[str, float], ...]:
         return ()
 
     def torques(q: Array, qd: Array, qdd: Array) -> Array:
-        return States(task.description, np.zeros(len(q)), q, qd, qdd).tau
+        return States(task.loaded, np.zeros(len(q)), q, qd, qdd).tau
 
     durations = []
     for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):

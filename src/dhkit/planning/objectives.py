@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -27,13 +27,16 @@ class Term:
 
     weight: float = 1.0
 
+    has_integrand: ClassVar[bool] = False
+    """Whether the term is the integral of a function of the state; such functions depend on torques."""
+
     def __post_init__(self) -> None:
         if not isinstance(self.weight, Real) or not math.isfinite(self.weight) or self.weight <= 0:
             raise ValueError(f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number")
 
-    def integrand(self, point: Point) -> casadi.SX | None:
-        """Return the integrand over time, 1 x 1, unit of the term over s; None if not a function of the state."""
-        return None
+    def integrand(self, point: Point) -> casadi.SX:
+        """Return the integrand over time, 1 x 1, unit of the term over s, of terms that have one."""
+        raise NotImplementedError(f"{type(self).__name__} is no integral of a function of the state")
 
     def measured(self, states: States) -> Array:
         """Return the integrand at a motion's states, shape (N,)."""
@@ -59,18 +62,31 @@ class Time(Term):
 
 @dataclass(frozen=True)
 class Effort(Term):
-    """The integral of the squared torques, N^2 m^2 s (for a prismatic joint N^2 s)."""
+    """The integral of the squared torques, N^2 m^2 s (for a prismatic joint N^2 s), each multiplied by a weight."""
+
+    joint_weights: float | tuple[float, ...] = ()
+    """Weights of the joints' squared torques, such as 1 / limit^2: one for each joint, without unit; empty for 1."""
+    has_integrand = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "joint_weights", _numbers("Effort", "joint weights", self.joint_weights))
+
+    def _weights(self, n: int) -> Array:
+        return _each("Effort", "joint weights", self.joint_weights or 1.0, n)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return tau . tau, 1 x 1, N^2 m^2."""
+        """Return the sum of weight tau^2, 1 x 1, N^2 m^2."""
         import casadi
 
-        return casadi.sumsqr(point.tau)
+        return casadi.dot(self._weights(point.n), point.tau**2)
 
     def measured(self, states: States) -> Array:
-        """Return tau . tau, shape (N,), N^2 m^2."""
-        squares: Array = np.sum(states.tau**2, axis=1)
+        """Return the sum of weight tau^2, shape (N,), N^2 m^2."""
+        squares: Array = states.tau**2 @ self._weights(states.n)
         return squares
+
+    __repr__ = value_line
 
 
 @dataclass(frozen=True)
@@ -95,14 +111,11 @@ class Energy(Term):
     """Motor constants k, N m per square root of W: one for all joints or one for each; empty for no losses."""
     regenerates: bool = False
     """Whether the drives feed the power of braking back."""
+    has_integrand = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        constants = self.motor_constants
-        given = (float(constants),) if isinstance(constants, float | int) else tuple(float(k) for k in constants)
-        if any(not math.isfinite(k) or k <= 0 for k in given):
-            raise ValueError(f"Energy: motor constants are {given}; expected positive numbers, N m per root of W")
-        object.__setattr__(self, "motor_constants", given)
+        object.__setattr__(self, "motor_constants", _numbers("Energy", "motor constants", self.motor_constants))
 
     @property
     def constants(self) -> tuple[float, ...]:
@@ -119,8 +132,6 @@ class Energy(Term):
         import casadi
 
         n, constants = point.n, self.constants
-        if len(constants) not in (0, 1, n):
-            raise ValueError(f"Energy: {len(constants)} motor constants; expected 1 or {n}")
         if self.regenerates and not constants and point.friction is None:
             raise ValueError(
                 "Energy: without motor constants, friction or power that is lost all motions cost the same"
@@ -130,8 +141,8 @@ class Energy(Term):
             if not self.regenerates:
                 power, soft = point.tau[i] * point.qd[i], FADE_SHARE * point.power_scale[i]
                 total += (casadi.sqrt(power * power + soft * soft) - soft) / 2
-            if constants:
-                total += (point.tau[i] / (constants[i % len(constants)] * point.gear[i])) ** 2
+        if constants:
+            total += casadi.sumsqr(point.tau / (_each("Energy", "motor constants", constants, n) * point.gear))
         return total
 
     def measured(self, states: States) -> Array:
@@ -145,6 +156,21 @@ class Energy(Term):
         return total
 
     __repr__ = value_line
+
+
+def _numbers(name: str, what: str, given: float | tuple[float, ...]) -> tuple[float, ...]:
+    """Return positive numbers as a tuple, empty if none are given."""
+    numbers = (float(given),) if isinstance(given, float | int) else tuple(float(k) for k in given)
+    if any(not math.isfinite(k) or k <= 0 for k in numbers):
+        raise ValueError(f"{name}: {what} are {numbers}; expected positive numbers")
+    return numbers
+
+
+def _each(name: str, what: str, numbers: float | tuple[float, ...], n: int) -> Array:
+    array = np.atleast_1d(np.array(numbers, dtype=float))
+    if array.size not in (1, n):
+        raise ValueError(f"{name}: {array.size} {what}; expected 1 or {n}")
+    return np.broadcast_to(array, n)
 
 
 @dataclass(frozen=True)
@@ -211,13 +237,25 @@ class Objective:
 
     @property
     def has_integral(self) -> bool:
-        """Whether a term is the integral of a function of the state."""
-        return any(isinstance(term, Effort | Energy) for term in self.terms)
+        """Whether a term is the integral of a function of the state, which depends on torques."""
+        return any(term.has_integrand for term in self.terms)
 
     @property
-    def needs_torque(self) -> bool:
-        """Whether a term depends on torques, so that every link needs a body."""
-        return any(isinstance(term, Effort | Energy) for term in self.terms)
+    def time_weight(self) -> float:
+        """Weight of the duration."""
+        return sum(term.weight for term in self.terms if isinstance(term, Time))
+
+    @property
+    def jerk_weight(self) -> float:
+        """Weight of the squared jerks."""
+        return sum(term.weight for term in self.terms if isinstance(term, Jerk))
+
+    def integrand(self, point: Point) -> casadi.SX:
+        """Return the sum of the integrands that are functions of the state, 1 x 1."""
+        import casadi
+
+        each = [term.weight * term.integrand(point) for term in self.terms if term.has_integrand]
+        return sum(each, casadi.SX(0))
 
     def __add__(self, other: Term | Objective) -> Objective:
         if not isinstance(other, Term | Objective):

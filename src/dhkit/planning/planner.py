@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,21 +29,27 @@ from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.many import ManyProgress, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
+from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport, PlanReport
-from dhkit.planning.request import PlanRequest, check_options, checked_limits, end_velocity
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Program, Search, Work, coarser
+from dhkit.planning.request import (
+    PlanRequest,
+    check_options,
+    checked_constraints,
+    checked_limits,
+    end_velocity,
+    smoothed,
+)
+from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coarser
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
-from dhkit.planning.task import MAX_SMALL_JOINTS, PlanTask, curves_for
+from dhkit.planning.task import Task
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
 
-CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}
-"""Ipopt's tolerance for each curve: with constant accelerations, the error of the mesh is larger than 1e-6."""
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
 MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
@@ -54,8 +59,6 @@ DURATION_TOLERANCE = 1e-3
 """Relative excess of the fastest motion over a given duration from which an error calls the duration too short."""
 DEFAULT_DURATION_FACTOR = 2.0
 """Factor over the duration of the fastest cubics that gives the default duration of objectives without time."""
-SMOOTH_FRICTION = Friction(width=1e-2)
-"""Smooth friction in place of friction that is a step, of this width in rad/s or m/s."""
 
 
 class Planner:
@@ -111,21 +114,16 @@ class Planner:
             raise ValueError(
                 f"intervals is {intervals!r}; expected a whole number from {MIN_LEG_INTERVALS} to {MAX_INTERVALS}"
             )
-        constraints = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
-        for constraint in constraints:
-            if not isinstance(constraint, Constraint):
-                raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
         self.description = description
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
-        self.constraints = constraints
+        self.constraints = checked_constraints(constraints)
         usual = SMALL_ARM_SIZE // description.n if description.n <= MAX_SMALL_JOINTS else DEFAULT_INTERVALS
         # Smooth objectives need half as many intervals: their accelerations are parabolas.
         self._requested_intervals = intervals
         self.intervals = intervals or (usual if self.objective.has_time else usual // 2)
-        chosen = Friction.chosen(friction)
-        self.friction = SMOOTH_FRICTION if chosen is not None and chosen.width == 0 else chosen
-        self._programs: dict[tuple[object, ...], Program] = {}
+        self.friction = smoothed(Friction.chosen(friction))
+        self._programs: dict[tuple[object, ...], MotionProgram] = {}
         self._making = threading.Lock()
 
     def __reduce__(self) -> tuple[type[Planner], tuple[object, ...]]:
@@ -278,13 +276,13 @@ class Planner:
     # Programs
 
     @delayed_interrupts()
-    def program(self, task: PlanTask, attempt: int = 0, scale: float = 1.0) -> tuple[Program, float]:
+    def program(self, task: Task, attempt: int = 0, scale: float = 1.0) -> tuple[MotionProgram, float]:
         """Return the program for a task, and the time for building it now, s.
 
         Parameters
         ----------
         attempt
-            Index of its curve, see :func:`dhkit.planning.task.curves_for`; later ones have twice as many intervals.
+            Index of its curve, see :func:`curves_for`; later ones have twice as many intervals.
         scale
             Factor of the number of intervals.
         """
@@ -309,48 +307,44 @@ class Planner:
                 payload=task.is_loaded,
                 jerk_limited=jerk_limited,
             )
-            program = Program.of(problem, CONVERGENCE[curve])
+            program = MotionProgram(problem)
             self._programs[key] = program
             return program, time.perf_counter() - began
 
-    def intervals_for(self, task: PlanTask) -> int:
+    def intervals_for(self, task: Task) -> int:
         """Return the number of intervals of a task's mesh: by default half with obstacles, whose rows are many."""
         if self._requested_intervals is None and task.avoidance:
             return max(MIN_DEFAULT_INTERVALS, self.intervals // 2)
         return self.intervals
 
-    def _curves(self, task: PlanTask) -> tuple[Curve, ...]:
+    def _curves(self, task: Task) -> tuple[Curve, ...]:
         jerk_counts = bool(np.isfinite(task.limits.jerk).any()) or self.objective.has_jerk
         has_friction = self.friction is not None
         return curves_for(self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction)
 
-    def _task(self, request: PlanRequest, points: Array) -> PlanTask:
+    def _task(self, request: PlanRequest, points: Array) -> Task:
         description, limits = self.description, request.limits
-        loaded = request.loaded(description)
+        arm = request.loaded(description)
         T_start = world_to_tool(description, points[0])
         parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
         duration = request.duration
         if duration is None and not self.objective.has_time:
-            duration = DEFAULT_DURATION_FACTOR * float(leg_durations(loaded, limits, points).sum())
+            duration = DEFAULT_DURATION_FACTOR * float(leg_durations(arm, limits, points).sum())
             if not duration > 0:
                 raise PlanningError(f"nothing limits how fast {self.objective} may be: give a duration, or limits")
         avoidance = request.avoidance
         if avoidance:
             avoidance = avoidance.between(description, points[0], points[-1])
-        checker = Checker(loaded, limits, self.constraints, parameters, self.friction, avoidance)
-        return PlanTask(
+        return Task(
             description,
-            loaded,
+            arm,
+            self.objective,
             points,
             request.start_velocity,
             request.goal_velocity,
             duration,
-            limits,
-            checker,
+            Checker(arm, limits, self.constraints, parameters, self.friction, avoidance),
             load=request.payload.numbers if request.payload else None,
-            parameters=parameters,
-            friction=self.friction,
-            avoidance=avoidance,
         )
 
     def _best(
@@ -360,9 +354,9 @@ class Planner:
         warm: Trajectory | None,
         deadline: float,
         progress: ProgressCall | None,
-    ) -> tuple[PlanTask, PlannedMotion, tuple[BranchReport, ...], Work]:
+    ) -> tuple[Task, PlannedMotion, tuple[BranchReport, ...], Work]:
         """Return the best motion of all routes with its task, the branches' reports, and the work for all of them."""
-        best: tuple[PlanTask, PlannedMotion] | None = None
+        best: tuple[Task, PlannedMotion] | None = None
         failure: PlanningError | None = None
         reports, work, chosen = list[BranchReport](), Work(), -1
         for number, route in enumerate(routes):
@@ -395,29 +389,33 @@ class Planner:
         return *best, reports_of_branches, work
 
     def _route_motion(
-        self, task: PlanTask, warm: Trajectory | None, deadline: float, progress: ProgressCall | None, work: Work
+        self, task: Task, warm: Trajectory | None, deadline: float, progress: ProgressCall | None, work: Work
     ) -> PlannedMotion:
         """Return the best motion of a task, and count the work."""
         if task.rests and task.span < RESOLUTION:
-            return PlannedMotion.unresolved(task, self.objective)
+            return PlannedMotion.unresolved(task)
         count = len(self._curves(task))
         for attempt in range(count):
             program, seconds = self.program(task, attempt)
             work.build_seconds += seconds
             is_last = attempt == count - 1
-            search = Search(task.without_obstacles, program, deadline, progress, is_last)
+            search = Search(task.without_obstacles, program, deadline, work, progress, is_last)
             try:
-                found = search(warm)
+                found = replace(search(warm), attempt=attempt)
                 if not task.avoidance:
                     return found
                 if (certificate := task.checker.check(found.trajectory)).ok:
                     return replace(found, certificate=certificate)
-                return AvoidingSearch(task, search, partial(self.program, task, attempt, FINER))(warm)
+
+                def finer(attempt: int = attempt) -> MotionProgram:
+                    program, seconds = self.program(task, attempt, FINER)
+                    work.build_seconds += seconds
+                    return program
+
+                return AvoidingSearch(task, search, program, finer)(warm)
             except PlanningError:
                 if is_last or time.perf_counter() > deadline:
                     raise
-            finally:
-                work.iterations, work.solves = work.iterations + search.iterations, work.solves + search.solves
         raise AssertionError("no curve")
 
     def _with_reason(
@@ -432,7 +430,7 @@ class Planner:
         )
         try:
             program, _ = quickest.program(quick := quickest._task(replace(request, duration=None), routes[0].points))
-            least = Search(quick, program, deadline)().trajectory.duration
+            least = Search(quick, program, deadline, Work())().trajectory.duration
         except PlanningError:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
@@ -441,9 +439,9 @@ class Planner:
             f"a duration of {request.duration:.6g} s is too short: the fastest motion found takes {least:.6g} s"
         )
 
-    def _coarse(self, task: PlanTask, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
+    def _coarse(self, task: Task, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
         # Among obstacles a coarser mesh may lead around them on another side.
         if task.avoidance or self.intervals_for(task) <= MIN_LEG_INTERVALS:
             return None
-        program, _ = self.program(task, self._curves(task).index(best.curve), scale=0.5)
-        return coarser(Search(task.without_obstacles, program, deadline), best.trajectory)
+        program, _ = self.program(task, best.attempt, scale=0.5)
+        return coarser(Search(task.without_obstacles, program, deadline, Work()), best.trajectory)

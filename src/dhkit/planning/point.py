@@ -72,16 +72,10 @@ class Point:
         return casadi.jtimes(v, self.q, self.qd) + casadi.jtimes(v, self.qd, self.qdd)
 
     @property
-    def torque_scale(self) -> Array:
-        """Scales of torques, shape (n,), N m and N: their limits, 1 where unlimited."""
-        torque = self.limits.torque
-        return np.where(np.isfinite(torque), torque, 1.0)
-
-    @property
     def power_scale(self) -> Array:
         """Scales of power, shape (n,), W: torque limit times speed limit, 1 where unlimited."""
-        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
-        return self.torque_scale * velocity
+        torque, velocity = self.limits.torque, self.limits.velocity
+        return np.where(np.isfinite(torque), torque, 1.0) * np.where(np.isfinite(velocity), velocity, 1.0)
 
     @property
     def gear(self) -> Array:

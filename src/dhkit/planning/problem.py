@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, Rows, Scaling
+from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
+from dhkit.planning.collision_avoidance import NO_AVOIDANCE, motion_constraints
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.joint_limits import Limit
 from dhkit.planning.mesh import Curve, Interval, Mesh
-from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, Time
+from dhkit.planning.objectives import Objective
 from dhkit.planning.obstacles.separation import PlaneRow
 from dhkit.planning.point import LOAD, Point
+from dhkit.planning.program import limit_rows
 from dhkit.planning.variables import Knots, StatePoints, Variables
 from dhkit.symbolic import Friction
 from dhkit.symbolic.differentiable.frames import SymbolicTable
@@ -31,16 +34,6 @@ if TYPE_CHECKING:
 SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
 """Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
-ROW_ORDERS = {
-    "joint positions": 0,
-    "joint velocities": 1,
-    "joint accelerations": 2,
-    "position": 0,
-    "velocity": 1,
-    "acceleration": 2,
-    "jerk": 3,
-}
-"""Orders of the derivatives by time that rows limit."""
 USUAL_MOVE, USUAL_DURATIONS = 0.1, (0.1, 10.0)
 """Smallest largest move (rad or m) and range of durations (s) of motions that are planned in SI units."""
 
@@ -66,14 +59,15 @@ class Problem:
         self.description, self.objective, self.constraints, self.mesh = description, objective, constraints, mesh
         self.n, self.payload, self.jerk_limited = description.n, payload, jerk_limited
         self.point = Point(description, limits, friction, payload)
-        self.with_torque = bool(
-            np.isfinite(limits.torque).any()
-            or objective.needs_torque
-            or any(constraint.needs_torque for constraint in constraints)
-        )
         self._plane_functions: dict[int, LocalFunction] = {}
-        self.moving = tuple(constraint for constraint in constraints if constraint.moving)
-        self.places = tuple(constraint for constraint in constraints if not constraint.moving)
+        every = enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints))
+        # Positions, rates and accelerations are variables; their limits are bounds, and rows inside intervals.
+        self._every = dict(every)
+        others = [(k, constraint) for k, constraint in self._every.items() if k >= Limit.TORQUE]
+        others = [(k, constraint) for k, constraint in others if constraint.is_limiting]
+        self.moving = tuple(pair for pair in others if pair[1].moving)
+        self.places = tuple(pair for pair in others if not pair[1].moving)
+        self.with_states = bool(self.moving) or objective.has_integral
 
     @property
     def jerk_counts(self) -> bool:
@@ -85,8 +79,8 @@ class Problem:
     @cached_property
     def variables(self) -> Variables:
         """Indices of the program's variables."""
-        curve, has_states = self.mesh.curve, self.with_torque or bool(self.moving)
-        has_middles = has_states and self._states_at_middles
+        curve = self.mesh.curve
+        has_middles = self.with_states and self._states_at_middles
         return Variables.of(
             self.n,
             self.mesh,
@@ -99,8 +93,9 @@ class Problem:
 
     @property
     def _states_at_middles(self) -> bool:
+        has_constraints = any(k > Limit.CLEARANCE for k, _ in self.moving)
         return self.mesh.curve in (Curve.LINEAR, Curve.QUADRATIC) or (
-            self.mesh.curve is Curve.JUMPING and bool(self.moving)
+            self.mesh.curve is Curve.JUMPING and has_constraints
         )
 
     def vector(self, knots: Knots) -> Array:
@@ -134,10 +129,9 @@ class Problem:
         if length < 1.0:
             for indices in (at.q, at.middles[0]):
                 units.offset[indices] = guess.q[:1].T
-        row_units = {"duration": time, **{what: length / time**order for what, order in ROW_ORDERS.items()}}
         parts = [np.zeros(0)]
         for block in program.blocks:
-            each = [np.full(rows.count, row_units.get(rows.what, 1.0)) for rows in block.rows]
+            each = [np.full(rows.count, _unit(rows, length, time)) for rows in block.rows]
             parts.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
         return Scaling(units.offset, units.unit, np.concatenate(parts))
 
@@ -146,11 +140,19 @@ class Problem:
     @cached_property
     def parameter_sizes(self) -> tuple[int, ...]:
         """Lengths of the parameters: payload, each constraint, scale of the cost, scales of accelerations, shares."""
-        each = (constraint.size(self.description) for constraint in self.constraints)
+        each = (constraint.size(self.description) for constraint in self._every.values())
         return (LOAD if self.payload else 0, *each, 1, self.n, self.mesh.intervals, len(self._weights))
 
-    def parameters(self, load: Array | None, each: tuple[Array, ...], scale: float, usual: Array) -> Array:
-        """Return the program's parameters as one array; ``usual`` are the scales of accelerations, shape (n,)."""
+    def parameters(self, load: Array | None, each: Sequence[Array], scale: float, usual: Array) -> Array:
+        """Return the program's parameters as one array.
+
+        Parameters
+        ----------
+        each
+            Parameters of all constraints of the motion.
+        usual
+            Scales of accelerations, shape (n,).
+        """
         given = [np.zeros(0) if load is None else load, *each, [scale], 1 / usual]
         return np.concatenate([*given, self.mesh.shares, self._weights])
 
@@ -166,7 +168,7 @@ class Problem:
     def program(self) -> BlockProgram:
         """The program's blocks."""
         blocks = [self._durations, self._intervals]
-        if self.with_torque or self.moving:
+        if self.with_states:
             blocks.append(self._states)
         if self.places:
             blocks.append(self._resting_places)
@@ -182,7 +184,7 @@ class Problem:
             planes = np.array([[*row.point, *row.normal, row.level] for row in of_link])
             intervals = np.clip(np.stack([knots - 1, knots], axis=1), 0, self.mesh.intervals - 1)
             parameters = (begin + np.arange(planes.size)).reshape(planes.shape).T
-            kinds = (Rows.of("clearance", 1, 0.0),)
+            kinds = (Rows(RowKind.PLANE, Limit.CLEARANCE.what, 1),)
             blocks.append(Block(self._beside_plane(link), at.q[:, knots], parameters, kinds, intervals))
             values.append(planes.ravel())
             begin += planes.size
@@ -207,10 +209,10 @@ class Problem:
 
         D, scale = casadi.SX.sym("durations", len(self.mesh.legs)), casadi.SX.sym("scale")
         total = casadi.sum1(D)
-        weight = sum(term.weight for term in self.objective.terms if isinstance(term, Time))
-        function = LocalFunction(D, scale, total, scale * weight * total)
+        function = LocalFunction(D, scale, total, scale * self.objective.time_weight * total)
         scale_index = self._parameter_indices[-4]
-        return Block(function, self.variables.durations[:, None], scale_index[:, None], (Rows.of("duration", 1),))
+        kinds = (Rows(RowKind.DURATION, "duration", 1),)
+        return Block(function, self.variables.durations[:, None], scale_index[:, None], kinds)
 
     @property
     def _intervals(self) -> Block:
@@ -225,44 +227,44 @@ class Problem:
         lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
         interval = Interval(share * duration, q, qd, *curve.abc(accelerations))
         a, b, c, h = interval.a, interval.b, interval.c, interval.h
-        rows = [
-            (Rows.of("joint positions", n, 0.0, 0.0), q_next - interval.q_end),
-            (Rows.of("joint velocities", n, 0.0, 0.0), qd_next - interval.qd_end),
+        continuity = [
+            Rows(RowKind.CONTINUITY, f"continuity of {what}", n, order=order, of_joints=True)
+            for order, what in enumerate(("position", "velocity", "acceleration"))
         ]
-        for name, symbols, value in zip(
-            ("joint positions", "joint velocities", "joint accelerations"),
-            lifted,
-            (interval.q_middle, interval.qd_middle, b),
-            strict=True,
-        ):
+        rows = [(continuity[0], q_next - interval.q_end), (continuity[1], qd_next - interval.qd_end)]
+        for kind, symbols, value in zip(continuity, lifted, (interval.q_middle, interval.qd_middle, b), strict=True):
             if symbols.numel():
-                rows.append((Rows.of(name, n, 0.0, 0.0), symbols - value))
+                rows.append((kind, symbols - value))
         # Polynomials are inside the hull of their Bernstein coefficients: of positions, velocities, accelerations.
-        inside: dict[str, list[casadi.SX]] = {"position": [], "velocity": [], "acceleration": [], "jerk": []}
+        inside: dict[Limit, list[casadi.SX]] = {}
         match curve:
             case Curve.CONSTANT:
-                inside["position"] = [q + h / 2 * qd]
+                inside[Limit.POSITION] = [q + h / 2 * qd]
             case Curve.JUMPING | Curve.LINEAR:
-                inside["position"] = [q + h / 3 * qd, q_next - h / 3 * qd_next]
-                inside["velocity"] = [qd + h / 2 * a]
+                inside[Limit.POSITION] = [q + h / 3 * qd, q_next - h / 3 * qd_next]
+                inside[Limit.VELOCITY] = [qd + h / 2 * a]
             case Curve.QUADRATIC:
-                inside["velocity"] = [qd + h / 3 * a, qd_next - h / 3 * c]
-                inside["acceleration"] = [2 * b - (a + c) / 2]
+                inside[Limit.VELOCITY] = [qd + h / 3 * a, qd_next - h / 3 * c]
+                inside[Limit.ACCELERATION] = [2 * b - (a + c) / 2]
         if self.jerk_limited:
-            inside["jerk"] = list(interval.jerks)[: 1 if curve is Curve.LINEAR else 2]
-        rows += [(Rows.of(what, n), value) for what, values in inside.items() for value in values]
+            inside[Limit.JERK] = list(interval.jerks)[: 1 if curve is Curve.LINEAR else 2]
+        reciprocals = {limit: symbol(limit.what, n) for limit in inside if limit is not Limit.POSITION}
+        for limit, values in inside.items():
+            order = 0 if limit is Limit.POSITION else None
+            kind = Rows(RowKind.LIMIT, limit.what, n, limit, order, of_joints=True)
+            rows += [(kind, value * reciprocals[limit] if limit in reciprocals else value) for value in values]
         cost = casadi.SX(1, 1)
         if self.objective.needs_smoothing:
             weights = curve.column_weights
-            squares = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, accelerations, strict=True))
+            mean = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, accelerations, strict=True))
             # Weighted by shares of time, since meshes are finer at their ends.
-            cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * squares
-        first, last = interval.jerks
-        for term in self.objective.terms:
-            if isinstance(term, Jerk):
-                cost += scale * term.weight * h / 3 * casadi.sum1(first * first + first * last + last * last)
+            cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * mean
+        if self.objective.has_jerk:
+            first, last = interval.jerks
+            squares = casadi.sum1(first * first + first * last + last * last) / 3
+            cost += scale * self.objective.jerk_weight * h * squares
         z = casadi.vertcat(duration, q, qd, q_next, qd_next, *accelerations, *lifted)
-        p = casadi.vertcat(share, scale, usual)
+        p = casadi.vertcat(share, scale, usual, *reciprocals.values())
         columns = np.array([curve.columns_of(k) for k in range(K)])
         *_, scale_at, usual_at, shares_at, _ = self._parameter_indices
         variables = [
@@ -271,7 +273,8 @@ class Problem:
             *(at.qdd[:, column] for column in columns.T),
             *(indices for indices in at.middles if indices.size),
         ]
-        parameters = [shares_at[None], np.tile(np.concatenate([scale_at, usual_at])[:, None], K)]
+        of_limits = [self._parameter_indices[1 + limit] for limit in reciprocals]
+        parameters = [shares_at[None], np.tile(np.concatenate([scale_at, usual_at, *of_limits])[:, None], K)]
         return Block(
             LocalFunction(z, p, casadi.vertcat(*(value for _, value in rows)), cost),
             np.vstack(variables),
@@ -296,21 +299,14 @@ class Problem:
         import casadi
 
         point, points, symbols = self.point, self._state_points, self._parameter_symbols
-        rows = [(Rows.of("torque", self.n), point.tau / point.torque_scale)] if self.with_torque else []
-        each = list(zip(self.constraints, symbols[1:], strict=True))
-        rows += [_rows_of(constraint, point, given) for constraint, given in each if constraint.moving]
+        rows = limit_rows(self.moving, point, symbols[1:])
         duration, scale, weight = (casadi.SX.sym(name) for name in ("duration", "scale", "weight"))
         z, p, cost = [point.q, point.qd, point.qdd], list(symbols), None
         variables: list[Indices] = [points.q, points.qd, points.qdd]
         parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
         parameters = np.tile(parameters, points.count)
         if self.objective.has_integral:
-            integrand = sum(
-                term.weight * term.integrand(point)
-                for term in self.objective.terms
-                if isinstance(term, Effort | Energy)
-            )
-            cost = scale * weight * duration * integrand
+            cost = scale * weight * duration * self.objective.integrand(point)
             z.insert(0, duration)
             variables.insert(0, self.variables.durations[points.leg][None])
             *_, scale_at, _, _, weights_at = self._parameter_indices
@@ -331,8 +327,7 @@ class Problem:
         import casadi
 
         at, K, symbols = self.variables, self.mesh.intervals, self._parameter_symbols
-        each = [pair for pair in zip(self.constraints, symbols[1:], strict=True) if not pair[0].moving]
-        rows = [_rows_of(constraint, self.point, given) for constraint, given in each]
+        rows = limit_rows(self.places, self.point, symbols[1:])
         step = np.arange(K)
         parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
         return Block(
@@ -348,11 +343,12 @@ class Problem:
         """Symbols of the payload and of each constraint's parameters."""
         import casadi
 
-        sizes = self.parameter_sizes[1 : 1 + len(self.constraints)]
+        sizes = self.parameter_sizes[1 : 1 + len(self._every)]
         return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes))]
 
 
-def _rows_of(constraint: Constraint, point: Point, parameters: casadi.SX) -> tuple[Rows, casadi.SX]:
-    expression = constraint.checked_rows(point, parameters)
-    low = -1.0 if constraint.two_sided else -np.inf
-    return Rows.of(constraint.what, expression.numel(), low, 1.0), expression
+def _unit(rows: Rows, length: float, time: float) -> float:
+    """Return the unit of rows, for units of joint values and of time, s."""
+    if rows.kind is RowKind.DURATION:
+        return time
+    return 1.0 if rows.order is None else length / time**rows.order

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.planning.certificate import Certificate
 
-JOINT_LIMITS = ("position", "velocity", "acceleration", "jerk", "torque", "motor power", "torque-speed line")
-"""Names of limits that apply to each joint."""
 MAX_LISTED_LIMITS = 3
 """Largest number of active limits that are listed as text."""
 
@@ -89,7 +87,10 @@ class PlanReport:
 
     def active_limits(self) -> list[tuple[str, float]]:
         """Return the active limits and their shares of time, the most active first."""
-        named = [(f"{what} of {self._name(what, row)}", share) for what, row, share in self.certificate.active]
+        named = [
+            (f"{limit.what} of {self.joints[limit.row] if limit.of_joint else 'the tool'}", limit.share)
+            for limit in self.certificate.active
+        ]
         return sorted(named, key=lambda item: -item[1])
 
     def __repr__(self) -> str:
@@ -124,13 +125,6 @@ class PlanReport:
     def _certified(self) -> str:
         return "certified" if self.certificate.ok else f"exceeds a limit by {100 * self.certificate.violation:.2g} %"
 
-    def _name(self, what: str, row: int) -> str:
-        joint = self._joint(what, row)
-        return "the tool" if joint is None else joint
-
-    def _joint(self, what: str, row: int) -> str | None:
-        return self.joints[row] if what in JOINT_LIMITS else None
-
     def as_dict(self) -> dict[str, object]:
         """Return the report as numbers and texts, for JSON."""
         certificate = self.certificate
@@ -145,7 +139,7 @@ class PlanReport:
             "limits": [
                 {
                     "what": check.what,
-                    "joint": self._joint(check.what, check.row),
+                    "joint": self.joints[check.row] if check.of_joint else None,
                     "excess": check.excess,
                     "time_s": check.time,
                 }

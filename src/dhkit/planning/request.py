@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -10,6 +11,9 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.collision_avoidance import CollisionAvoidance
+from dhkit.planning.constraints import Constraint
+from dhkit.planning.loaded import LoadedArm, loaded
+from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
 
@@ -24,9 +28,9 @@ class PlanRequest:
     payload: Payload | None
     avoidance: CollisionAvoidance
 
-    def loaded(self, description: Description) -> Description:
+    def loaded(self, description: Description) -> LoadedArm:
         """Return the arm with its payload."""
-        return self.payload.carried(description) if self.payload else description
+        return loaded(description, self.payload)
 
     def rests_at(self, name: str) -> bool:
         """Whether the arm is at rest at a place, given by its name."""
@@ -90,3 +94,27 @@ def end_velocity(description: Description, value: ArrayLike | None, name: str) -
     if qd.shape != (description.n,) or not np.isfinite(qd).all():
         raise ValueError(f"{name}_velocity: expected finite numbers, shape ({description.n},)")
     return qd
+
+
+def checked_constraints(constraints: Constraint | Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return constraints as a tuple.
+
+    Raises
+    ------
+    TypeError
+        Something else.
+    """
+    given = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
+    for constraint in given:
+        if not isinstance(constraint, Constraint):
+            raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
+    return given
+
+
+SMOOTH_FRICTION = Friction(width=1e-2)
+"""Smooth friction in place of friction that is a step, of this width in rad/s or m/s."""
+
+
+def smoothed(friction: Friction | None) -> Friction | None:
+    """Return friction that an optimizer can derive."""
+    return SMOOTH_FRICTION if friction is not None and friction.width == 0 else friction

@@ -16,6 +16,7 @@ from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
 from dhkit.model import PinocchioModel, pinocchio_model
+from dhkit.planning.loaded import LoadedArm
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
 from dhkit.trajectories.pieces import Side
@@ -25,8 +26,7 @@ from dhkit.trajectories.pieces import Side
 class States:
     """q, qd and qdd of N states, shape (N, n) each, and quantities derived from them on first use."""
 
-    description: Description
-    """The robot with its payload."""
+    description: LoadedArm
     times: Array
     """Times, shape (N,), s."""
     q: Array
@@ -39,16 +39,16 @@ class States:
     @classmethod
     def of(
         cls,
-        description: Description,
+        arm: LoadedArm,
         trajectory: Trajectory,
         times: Array,
         friction: Friction | None = None,
         side: Side = "right",
     ) -> States:
-        """Return a motion's states at times of any shape, s; ``description`` may include a payload."""
+        """Return a motion's states at times of any shape, s."""
         values = (trajectory.q, trajectory.qd, trajectory.qdd, trajectory.jerk)
         q, qd, qdd, jerk = (value(times, side).reshape(-1, trajectory.n) for value in values)
-        return cls(description, times.ravel(), q, qd, qdd, friction, jerk)
+        return cls(arm, times.ravel(), q, qd, qdd, friction, jerk)
 
     def beside(self, last: States, count: int) -> States:
         """Return K rows of ``count`` states each: count - 1 of these and a last one of ``last``."""

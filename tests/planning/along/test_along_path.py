@@ -1,6 +1,6 @@
 """Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library.
 
-Modules: checks, grid, path_motion, path_states, program, rows, search, terms, timing_task.
+Modules: checks, grid, path_motion, path_point, path_states, timing.
 """
 
 import numpy as np
@@ -288,7 +288,7 @@ def test_the_report_says_how_it_was_found(tool_motion):
     assert report.joints == tuple(joint.name for joint in arm.joints)
     assert report.certificate.reference == "Pinocchio"
     assert "certified" in str(report)
-    assert along_path(arm, path).report.build_seconds < 1e-3  # the program is there already
+    assert report.build_seconds > 0 < report.solve_seconds
 
 
 def test_progress_is_told_in_seconds(tool_motion):
@@ -350,7 +350,7 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
         (SHORT, {"limits": Limits.of(ARM, jerk=9.0)}, "jerk is limited"),
         (SHORT, {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
         (SHORT, {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
-        (SHORT, {"time_limit": 0.0}, "time limit"),
+        (SHORT, {"time_limit": 1e-9}, "time limit"),
         (SHORT, {"constraints": [ToolOrientation(0.1)]}, "tool orientation is exceeded"),
     ],
 )
@@ -363,8 +363,8 @@ def test_what_is_in_the_way_is_said(path, options, words):
     ("options", "words"),
     [
         ({"objective": "effort"}, "expected duration="),
-        ({"objective": Jerk()}, "expected time and effort"),
-        ({"objective": Energy(), "duration": 1.0}, "expected time and effort"),
+        ({"objective": Jerk()}, "expected time, effort or energy"),
+        ({"objective": Energy()}, "expected duration="),
         ({"intervals": 3}, "intervals is 3"),
         ({"duration": -1.0}, "duration"),
     ],

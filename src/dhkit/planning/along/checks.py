@@ -1,25 +1,26 @@
-"""Checks of a path before a solution, and error messages from a solution that did not converge."""
+"""Checks of a path: reasons why no motion along it can exist, as error messages."""
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 import numpy as np
 
-from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
 from dhkit.planning.along.grid import JUMP_ROUNDING, jumps
-from dhkit.planning.along.timing_task import POINTS, TimingTask
+from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.feasibility import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
-from dhkit.planning.search import FEASIBILITY_TOLERANCE
-from dhkit.planning.solver import Solution
+from dhkit.planning.joint_limits import Limit
+from dhkit.planning.loaded import LoadedArm
+from dhkit.planning.states import States
 from dhkit.trajectories import JointPath, Limits
+
+REGULAR_POINTS = 8
+"""Number of points of each piece of a path at which its derivative is examined."""
 
 MIN_DERIVATIVE_RATIO, MAX_DERIVATIVE_RATIO = 1e-6, 1e4
 """Ratios of the path's derivative to its mean: below the first the path stops, above the second it is singular."""
 
 
-def require_path(description: Description, path: JointPath, limits: Limits) -> None:
+def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> None:
     """Require a path that a motion can follow from rest to rest without stopping.
 
     Raises
@@ -51,7 +52,7 @@ def _require_no_corner(path: JointPath) -> None:
 
 def _require_regular(path: JointPath) -> None:
     """Require a path whose derivative by s is neither near zero nor very large."""
-    s, slopes = path.pieces.derivative.inside(POINTS)
+    s, slopes = path.pieces.derivative.inside(REGULAR_POINTS)
     steepness = np.abs(slopes).max(axis=2)
     mean = float(np.sum(steepness.mean(axis=1) * np.diff(path.breaks)))
     if not steepness.min() > MIN_DERIVATIVE_RATIO * mean:
@@ -64,20 +65,29 @@ def _require_regular(path: JointPath) -> None:
         raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there")
 
 
-def require_kept(task: TimingTask) -> None:
+def require_kept(program: TimingProgram) -> None:
     """Require that a path keeps the constraints at rest, and that some limit bounds the speed along it.
 
     Raises
     ------
     PlanningError
-        Names the constraint and the place.
+        Names the constraint or the obstacle, and the place.
     """
-    resting = {constraint.what for constraint in task.checker.constraints if not constraint.moving}
-    for what, use in task.checker.measured(task.still) if resting else []:
-        if what in resting and use.max() > 1 + CONSTRAINT_ROUNDING:
-            s = task.states.s.flat[int(np.argmax(use.max(axis=1)))]
-            raise PlanningError(f"{what} is exceeded by {100 * (use.max() - 1):.2g} % at s = {s:.4g}, at any speed")
-    moves = np.abs(task.states.qs).max(axis=(0, 1)) > 0
+    task, states = program.task, program.states
+    q, s = states.q.reshape(-1, task.arm.n), states.s.ravel()
+    still = States(task.loaded, s, q, 0 * q, 0 * q)
+    for limit, (constraint, parameters) in task.checker.limiting.items():
+        if constraint.moving or limit == Limit.POSITION:
+            continue
+        use = constraint.use(still, parameters).max(axis=1)
+        k = int(np.argmax(use))
+        if use[k] > 1 + CONSTRAINT_ROUNDING:
+            if limit == Limit.CLEARANCE:
+                task.avoidance.require_gap(task.arm, q[k], f"the path at s = {s[k]:.4g}", task.avoidance.clearance)
+            raise PlanningError(
+                f"{constraint.what} is exceeded by {100 * (use[k] - 1):.2g} % at s = {s[k]:.4g}, at any speed"
+            )
+    moves = np.abs(states.qs).max(axis=(0, 1)) > 0
     limited = np.isfinite(task.limits.torque) | np.isfinite(task.limits.acceleration)
     if task.objective.only_time and not (moves & limited).any():
         raise PlanningError(
@@ -85,26 +95,15 @@ def require_kept(task: TimingTask) -> None:
         )
 
 
-def refuse(task: TimingTask, solution: Solution, bounds: tuple[Array, Array]) -> NoReturn:
-    """Raise the reason of a failed solution: a joint that cannot hold the arm, or the row with the largest violation.
-
-    ``bounds`` are the lower and upper bounds of the rows, shape (rows,) each, without unit.
+def require_holdable_along(program: TimingProgram) -> None:
+    """Require torque limits that hold the arm everywhere on a path; asked only of paths without a solution.
 
     Raises
     ------
     PlanningError
-        Always.
+        Names the joint and the place.
     """
-    states, names = task.states, [joint.name for joint in task.description.joints]
+    task, states = program.task, program.states
     use = np.abs(states.g) / task.limits.torque
     end, k, _ = np.unravel_index(int(np.argmax(use)), use.shape)
-    require_holdable(task.description, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")
-    rows = [(row.what, names[i]) for row in task.rows for i in np.flatnonzero(row.limited)]
-    misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
-    misses = np.where(np.isnan(misses), np.inf, misses)[:-1].reshape(task.intervals, -1)[:, 1 : 1 + 2 * len(rows)]
-    where = ""
-    if misses.size and misses.max() > FEASIBILITY_TOLERANCE:
-        k, end, i = np.unravel_index(int(np.argmax(misses)), (task.intervals, 2, len(rows)))
-        what, joint = rows[i]
-        where = f": {what} of joint {joint} misses its limit by {misses.max():.2g} at s = {states.s[end, k]:.4g}"
-    raise PlanningError(f"not converged ({solution.status} after {solution.iterations} iterations){where}")
+    require_holdable(task.loaded, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")

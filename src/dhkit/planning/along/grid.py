@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.along.rows import speed_bounds, timing_rows, tool_speeds
-from dhkit.planning.constraints import Constraint
-from dhkit.trajectories import JointPath, Limits
+from dhkit.trajectories import JointPath
 
 JUMP_ROUNDING = 1e-6
 """Jump of a derivative, relative to its largest value, that counts as rounding."""
@@ -21,16 +18,6 @@ def jumps(path: JointPath, order: int) -> Array:
     pieces, inside = path.pieces.differentiated(order), path.breaks[1:-1]
     steps: Array = pieces(inside) - pieces(inside, "left")
     return steps
-
-
-def even_speeds(states: PathStates, limits: Limits, constraints: tuple[Constraint, ...]) -> Array:
-    """Return the largest constant speed along the path in each interval, shape (K,), 1/s."""
-    nothing = np.zeros((len(states.steps), 1))
-    bounds = speed_bounds(states, limits, nothing, [(tool, nothing) for tool in tool_speeds(constraints)])
-    most = np.minimum(bounds[:-1], bounds[1:])
-    for row in timing_rows(states, limits):
-        most = np.minimum(most, row.even.min(axis=0))
-    return np.sqrt(most)
 
 
 def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Array:

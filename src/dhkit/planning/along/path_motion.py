@@ -5,23 +5,41 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
+
+import numpy as np
 
 from dhkit.description import Description, Payload, takes_robot
+from dhkit.description.frames import world_to_tool
+from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
-from dhkit.planning.along.checks import require_kept, require_path
-from dhkit.planning.along.search import MAX_INTERVALS, solve_steps
-from dhkit.planning.along.timing_task import TimingTask
+from dhkit.planning.along.checks import require_holdable_along, require_kept, require_path
+from dhkit.planning.along.grid import knots_of
+from dhkit.planning.along.path_states import PathStates
+from dhkit.planning.along.timing import MAX_INTERVALS, Profile, TimingProgram
+from dhkit.planning.certificate import Checker
+from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.costs import cost_of
-from dhkit.planning.objectives import Effort, Objective, ObjectiveLike, Time
+from dhkit.planning.loaded import loaded
+from dhkit.planning.objectives import Objective, ObjectiveLike
+from dhkit.planning.obstacles import Scene
+from dhkit.planning.program import Starts
 from dhkit.planning.report import PlanReport
-from dhkit.planning.request import checked_limits
+from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed
+from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, Work
 from dhkit.planning.solver import ProgressCall
+from dhkit.planning.task import Task
+from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
 MIN_INTERVALS = 6
 """Smallest number of intervals."""
+QUICKEST = Objective.of("time")
+POINTS = 8
+"""Number of states in an interval for the certificate; few, because there are many intervals."""
+DURATION_FACTOR = 1.5
+"""Factor of the duration of other objectives over the fastest motion, for the initial guess."""
 
 
 @takes_robot
@@ -37,6 +55,10 @@ def along_path(
     time_limit: float = 10.0,
     progress: ProgressCall | None = None,
     payload: Payload | None = None,
+    friction: bool | Friction = False,
+    obstacles: Scene = (),
+    clearance: float = 0.01,
+    self_collision: bool = False,
 ) -> Trajectory:
     """Return the best motion along a path, from rest to rest, which stays exactly on the path.
 
@@ -51,7 +73,7 @@ def along_path(
     path
         A path without corners, such as one of :func:`dhkit.trajectories.joint_path`.
     objective
-        ``"time"``, ``"effort"``, or a sum such as ``Time() + 0.01 * Effort()``.
+        ``"time"``, ``"effort"``, ``"energy"``, or a sum such as ``Time() + 0.01 * Effort()``.
     duration
         Duration, s; required for objectives without time.
     limits
@@ -66,6 +88,14 @@ def along_path(
         Called once in each iteration.
     payload
         Payload of the tool.
+    friction
+        Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+    obstacles
+        Obstacles from which the path must keep the clearance.
+    clearance
+        Smallest distance from obstacles, m.
+    self_collision
+        Whether links keep the clearance from each other too.
 
     Returns
     -------
@@ -78,7 +108,7 @@ def along_path(
         The path leaves the joint limits, has a corner, stands still or is singular; the arm cannot hold itself
         somewhere on it; no motion keeps the limits, or none was found in time. Names the limit and the place.
     ValueError
-        Another robot's path, an objective that needs a duration, or one of energy or jerk.
+        Another robot's path, an objective that needs a duration, or one of jerk.
 
     Examples
     --------
@@ -96,44 +126,87 @@ def along_path(
     check_whole("intervals", intervals, MIN_INTERVALS)
     if intervals > MAX_INTERVALS:
         raise ValueError(f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}")
+    check_options(description, payload, None, time_limit, progress)
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
         )
     wanted = Objective.of(objective)
     _require_objective(wanted, duration)
-    limits = checked_limits(description, limits or default_limits(description))
-    loaded = description if payload is None else payload.carried(description)
-    require_path(loaded, path, limits)
-    task = TimingTask.of(loaded, path, wanted, duration, limits, tuple(constraints), intervals)
-    require_kept(task)
-    building = time.perf_counter()
-    for step in task.steps:
-        _ = step.program
-    built = time.perf_counter() - building
-    found, *before = solve_steps(task, began + time_limit, progress)
-    cost = cost_of(wanted, found.trajectory, loaded)
+    arm, limits = loaded(description, payload), checked_limits(description, limits or default_limits(description))
+    require_path(arm, path, limits)
+    constraints = checked_constraints(constraints)
+    avoidance = CollisionAvoidance.of(obstacles, clearance, self_collision)
+    if avoidance:
+        avoidance = avoidance.between(description, path.q(0.0), path.q(1.0))
+    T_start = world_to_tool(description, path.q(0.0))
+    parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
+    chosen = smoothed(Friction.chosen(friction))
+    still = np.zeros(description.n)
+    checker = Checker(arm, limits, constraints, parameters, chosen, avoidance, points=POINTS)
+    task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, duration, checker, path=path)
+    work, deadline = Work(), began + time_limit
+    found = _best_timing(task, intervals, work, deadline, progress)
     report = PlanReport(
         objective=str(wanted),
-        cost=cost,
+        cost=found.cost,
         duration=found.trajectory.duration,
         certificate=found.certificate,
         joints=tuple(joint.name for joint in description.joints),
-        intervals=len(found.knots) - 1,
-        iterations=found.iterations + sum(each.iterations for each in before),
-        solves=found.solves + sum(each.solves for each in before),
-        build_seconds=built,
-        solve_seconds=time.perf_counter() - began - built,
+        intervals=found.intervals,
+        iterations=work.iterations,
+        solves=work.solves,
+        build_seconds=work.build_seconds,
+        solve_seconds=time.perf_counter() - began - work.build_seconds,
         slow_down=found.slow_down,
         tightened=found.tightened,
         unlimited=limits.unlimited,
+        is_converged=found.is_converged,
+        reduced_clearances=tuple(str(reduced) for reduced in avoidance.reduced),
     )
-    return replace(found.trajectory, description=description, report=report, payload=payload)
+    return replace(found.trajectory, description=description, report=report, payload=payload, friction=chosen)
+
+
+def _best_timing(
+    task: Task, intervals: int, work: Work, deadline: float, progress: ProgressCall | None
+) -> PlannedMotion:
+    """Return the best motion; objectives other than time start from the fastest one."""
+    path, limits = cast("JointPath", task.path), task.limits
+    rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
+    states = PathStates.of(task.loaded, path, rough)
+    s = knots_of(path, intervals, rough, states.even_speeds(limits))
+
+    def program_of(task: Task) -> TimingProgram:
+        building = time.perf_counter()
+        program = TimingProgram(task, s)
+        work.build_seconds += time.perf_counter() - building
+        return program
+
+    quick = replace(task, objective=QUICKEST, duration=None)
+    is_quick = task.objective.only_time and task.duration is None
+    program = program_of(task if is_quick else quick)
+    require_kept(program)
+    search = Search(program.task, program, deadline, work, progress)
+    try:
+        found = search()
+        if is_quick:
+            return found
+        quickest, profile = found.trajectory.duration, cast("Profile", search.found)
+        if task.duration is not None and quickest > task.duration * (1 + TIME_SCALING_MARGIN):
+            raise PlanningError(
+                f"{task.duration:.6g} s are too short: the limits allow the motion along the path in {quickest:.6g} s"
+            )
+        guess = profile.lasting(task.duration or DURATION_FACTOR * quickest)
+        program = program_of(task)
+        return Search(task, program, deadline, work, progress)(starts=Starts([lambda: program.again(guess, guess)]))
+    except PlanningError:
+        require_holdable_along(program)
+        raise
 
 
 def _require_objective(objective: Objective, duration: float | None) -> None:
     check_duration(duration)
-    if not all(isinstance(term, Time | Effort) for term in objective.terms):
-        raise ValueError(f"objective is {objective}; expected time and effort along a path")
+    if objective.has_jerk:
+        raise ValueError(f"objective is {objective}; expected time, effort or energy along a path")
     if not objective.has_time and duration is None:
         raise ValueError(f"objective {objective} says nothing about time; expected duration=, or Time() + ...")

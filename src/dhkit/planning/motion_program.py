@@ -1,0 +1,201 @@
+"""The program of motions between configurations: its guesses, bounds, and trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.planning.assembly import assemble_trajectory, knots_along
+from dhkit.planning.blocks import Indices
+from dhkit.planning.costs import cost_of, size_of
+from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
+from dhkit.planning.joint_limits import Limit
+from dhkit.planning.mesh import Curve
+from dhkit.planning.objectives import Objective
+from dhkit.planning.obstacles.separation import PlaneRow
+from dhkit.planning.problem import USUAL_MOVE, Problem
+from dhkit.planning.program import Arguments, Program, Starts
+from dhkit.planning.solver import Solver
+from dhkit.planning.task import Margins, Task
+from dhkit.planning.variables import Knots
+from dhkit.trajectories import Trajectory
+
+CONVERGENCE = {Curve.CONSTANT: 1e-6, Curve.JUMPING: 1e-8, Curve.LINEAR: 1e-8, Curve.QUADRATIC: 1e-8}
+"""Ipopt's tolerance for each curve: with constant accelerations, the error of the mesh is larger than 1e-6."""
+SMALL_STEP = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-3, Curve.QUADRATIC: 1e-3}
+"""Relative slow-down up to which a solution is slowed down; beyond it, exceeded limits are tightened."""
+MAX_SMALL_JOINTS = 3
+"""Largest number of joints of arms whose programs are small."""
+RESTART_FACTORS = (2.5, 0.6)
+"""Factors of the guessed durations for further starts, if the first one fails."""
+SMALL_ARM_STARTS = 4
+"""Number of starts for arms of two or three joints: their programs are small and have several local optima."""
+MIN_LEG_SHARE = 1e-4
+"""Shortest duration of a leg, as a share of the guessed duration of the motion."""
+STILL_DURATION = 1e-3
+"""Guessed duration (s) of a motion that nothing limits."""
+MAX_GUESSED_DURATION, GUESSED_DURATIONS = 100.0, 24
+"""Longest duration (s) and number of durations that are compared for the initial guess of mixed objectives."""
+MIN_COST_SCALE = 1e-9
+
+
+class MotionProgram(Program[Knots]):
+    """A problem with its solver.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    planes
+        Planes on one side of which points of links stay.
+    """
+
+    def __init__(self, problem: Problem, planes: Sequence[PlaneRow] = ()) -> None:
+        self.problem, self.mesh = problem, problem.mesh
+        self.blocks, self._planes = problem.apart(planes)
+        self.solver = Solver(self.blocks, len(self.mesh.legs), tolerance=CONVERGENCE[self.mesh.curve])
+        self.intervals, self.small_step = self.mesh.intervals, SMALL_STEP[self.mesh.curve]
+
+    def apart(self, planes: Sequence[PlaneRow]) -> MotionProgram:
+        """Return the same program with other planes."""
+        return MotionProgram(self.problem, planes)
+
+    # Guesses
+
+    def starts(self, task: Task, warm: Trajectory | None) -> Starts[Knots]:
+        """Return guesses: a given motion, straight paths, and detours of arms with few joints."""
+        # In small moves gravity and inertia hardly change, so that detours do not pay.
+        is_small_arm = 1 < task.arm.n <= MAX_SMALL_JOINTS and task.objective.has_time
+        detours = SMALL_ARM_STARTS - 1 if is_small_arm and task.span >= USUAL_MOVE else 0
+        durations = self.guessed_durations(task)
+        guesses: list[Callable[[], Knots]] = []
+        if warm is not None and len(self.mesh.legs) == 1:
+            guesses.append(partial(knots_along, warm, self.mesh, np.array([warm.duration])))
+        guesses.append(partial(straight_knots, task, self.mesh, durations))
+        guesses += [partial(detour, task, self.mesh, durations, seed) for seed in range(detours)]
+        compared = len(guesses) if detours else 0
+        if task.duration is None:
+            guesses += [partial(straight_knots, task, self.mesh, durations * factor) for factor in RESTART_FACTORS]
+        return Starts(guesses, compared)
+
+    def again(self, guess: Knots, found: Knots) -> Knots:
+        """Return the first guess: Ipopt converges more slowly from the ends of its bounds, where solutions are."""
+        return guess
+
+    def guessed_durations(self, task: Task) -> Array:
+        """Return durations of the legs for an initial guess, shape (legs,), s."""
+        durations = leg_durations(task.loaded, task.limits, task.points)
+        durations = np.maximum(durations, 10 * MIN_LEG_SHARE * float(durations.sum()) or STILL_DURATION)
+        if task.duration is not None:
+            durations *= task.duration / durations.sum()
+        elif not task.objective.only_time:
+            durations *= self._best_factor(task, durations)
+        return durations
+
+    def _best_factor(self, task: Task, durations: Array) -> float:
+        """Return the factor of the durations with which the straight path costs least."""
+        factors = np.geomspace(1.0, MAX_GUESSED_DURATION / max(float(durations.sum()), 1e-6), GUESSED_DURATIONS)
+        motions = (self._assembled(task, straight_knots(task, self.mesh, durations * factor)) for factor in factors)
+        costs = [cost_of(task.objective, motion, task.loaded, task.friction) for motion in motions]
+        return float(factors[int(np.argmin(costs))])
+
+    def _assembled(self, task: Task, knots: Knots) -> Trajectory:
+        return assemble_trajectory(task.arm, self.mesh, knots, fixed_ends=False)
+
+    # Arguments
+
+    def arguments(self, task: Task, guess: Knots, margins: Margins) -> Arguments:
+        """Return the arguments of a solution."""
+        problem = self.problem
+        each = [parameters for _, parameters in task.checker.every]
+        scale, usual = 1.0 / self._cost_scale(task, guess), usual_accelerations(task, guess)
+        return Arguments(
+            problem.vector(guess),
+            np.append(problem.parameters(task.load, each, scale, usual), self._planes),
+            self._bounds(task, margins, MIN_LEG_SHARE * float(guess.durations.sum())),
+            problem.scaling(self.blocks, guess),
+        )
+
+    def _cost_scale(self, task: Task, guess: Knots) -> float:
+        """Return the cost of a guess, which scales the objective."""
+        if task.objective.only_time:
+            return float(guess.durations.sum())
+        cost = size_of(task.objective, self._assembled(task, guess), task.loaded, task.friction)
+        return max(cost, MIN_COST_SCALE)
+
+    def _bounds(self, task: Task, margins: Margins, shortest_leg: float) -> tuple[Array, Array]:
+        """Return the lower and upper bounds of the variables, shape (variables,) each, SI units.
+
+        Parameters
+        ----------
+        shortest_leg
+            Shortest duration of a leg, s.
+        """
+        limits, mesh, at = task.limits, self.mesh, self.problem.variables
+        n, low, high = task.arm.n, np.full(at.count, -np.inf), np.full(at.count, np.inf)
+        position, given = task.checker.every[Limit.POSITION]
+
+        def set_bounds(indices: Indices, lower: Array, upper: Array) -> None:
+            low[indices], high[indices] = lower, upper
+
+        lower, upper = position.bounds(given, margins.at_knots(Limit.POSITION, n))
+        set_bounds(at.q, lower.T, upper.T)
+        if at.middles[0].size:
+            lower, upper = position.bounds(given, margins.of(Limit.POSITION, n))
+            set_bounds(at.middles[0], lower.T, upper.T)
+        speed = limits.velocity[:, None] * (1 - margins.at_knots(Limit.VELOCITY, n).T)
+        set_bounds(at.qd, -speed, speed)
+        set_bounds(at.qdd, -limits.acceleration[:, None], limits.acceleration[:, None])
+        for k, point in zip((0, *mesh.ends), task.points, strict=True):
+            set_bounds(at.q[:, k], point, point)
+        for k, velocity in ((0, task.start_velocity), (-1, task.goal_velocity)):
+            set_bounds(at.qd[:, k], velocity, velocity)
+            if self.problem.jerk_counts:
+                set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
+        low[at.durations] = shortest_leg
+        if task.duration is not None and len(mesh.legs) == 1:
+            low[at.durations] = high[at.durations] = task.duration
+        return low, high
+
+    # Solutions
+
+    def iterate(self, x: Array) -> Knots:
+        """Return the motion of variables, shape (variables,), SI units."""
+        return self.problem.knots(x)
+
+    def trajectory(self, task: Task, found: Knots) -> Trajectory:
+        """Return a solution as a trajectory."""
+        return assemble_trajectory(task.arm, self.mesh, found, fixed_ends=self.problem.jerk_counts)
+
+    def interval_of(self, trajectory: Trajectory, found: Knots) -> Indices:
+        """Return the interval of the mesh that each piece lies in, shape (pieces,): its own."""
+        return np.arange(self.intervals)
+
+    def place(self, interval: float) -> str:
+        """Return a place of the motion as text."""
+        return f"{100 * min(interval / max(self.intervals - 1, 1), 1.0):.0f} % of the way"
+
+    def knots_of(self, trajectory: Trajectory) -> Knots:
+        """Return a motion on the program's mesh as a guess."""
+        return knots_along(trajectory, self.mesh, trajectory.breaks[list(self.mesh.ends)])
+
+
+def curves_for(n: int, objective: Objective, *, jerk_counts: bool, friction: bool) -> tuple[Curve, ...]:
+    """Return the curves of accelerations that are tried in turn.
+
+    Torques of time-optimal motions jump, and so do those of least energy without losses in windings and, with friction,
+    where a joint turns back. Constant accelerations need twice as many intervals as linear ones, but are solved faster
+    for arms of many joints. Smooth objectives are nearest to their optimum with parabolas; these exceed limits between
+    their points where torques nearly jump, as in motions in little more than the least time, for which the second
+    curve serves.
+    """
+    if objective.has_time:
+        if jerk_counts:
+            return (Curve.LINEAR,)
+        return (Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT,)
+    if jerk_counts:
+        return (Curve.QUADRATIC, Curve.LINEAR)
+    return (Curve.QUADRATIC, Curve.CONSTANT) if objective.is_smooth and not friction else (Curve.CONSTANT,)
