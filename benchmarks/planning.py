@@ -30,6 +30,8 @@ from dhkit.dynamics import gravity_torque
 from dhkit.errors import PlanningError
 from dhkit.planning import Planner
 from dhkit.planning.certificate import Checker
+from dhkit.planning.joint_limits import Limit
+from dhkit.planning.loaded import loaded
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits, Trajectory, quintic, trapezoidal
 
@@ -241,8 +243,10 @@ def _pair(
 def _excess(description: Description, motion: Motion, limits: Limits) -> float:
     """Return the largest share by which a motion exceeds a limit of speed or torque; negative if it keeps them."""
     t = np.append(np.arange(0.0, motion.duration, 1 / CHECK_RATE), motion.duration)
-    states = States(description, t, motion.q(t), motion.qd(t), motion.qdd(t))
-    return max(float(use.max()) - 1 for _, use in Checker(description, limits).measured(states))
+    arm = loaded(description)
+    states = States(arm, t, motion.q(t), motion.qd(t), motion.qdd(t))
+    uses = Checker(arm, limits).measured(states)
+    return max(float(use.max()) - 1 for limit, use in uses.items() if limit != Limit.POSITION)
 
 
 def _rows(samples: list[_Sample], usual: int) -> Iterator[MotionRow]:

@@ -272,7 +272,7 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
         ("planar2r --to 1 1 --velocity -1", 2, "velocity of joint 1 is -1; expected a positive number"),
         ("planar2r --to 1 1 --tool-speed -1", 2, "ToolSpeed: -1.0; expected positive"),
         ("planar2r --to 1 1 --line --via 0 1", 2, "--line: found --via too"),
-        ("planar2r --to 1 1 --line --floor -1", 2, "--line: found obstacles too"),
+        ("planar2r --to 1 1 --line --sphere 0.1 @ 0.1 0.8 0", 1, "the path at s = "),
         ("planar2r --to 1 1 -o run.txt", 2, "run.txt: ends in '.txt'; expected .npz, .mat, .csv, .yaml"),
         ("planar2r --to 1 1 --figure run.xyz", 2, "run.xyz: ends in '.xyz'; expected .png"),
         ("planar2r --to 1 1 --html /dev/null/run.html", 2, "/dev/null: a file; expected a folder"),

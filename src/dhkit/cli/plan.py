@@ -216,12 +216,12 @@ def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, 
     PlanningError
         There is no such motion.
     """
-    refused = {"via": "--via", "obstacles": "obstacles", "self_collision": "--self-collision"}
-    if found := next((name for key, name in refused.items() if between[key]), None):
-        raise DescriptionError(f"--line: found {found} too; expected a motion straight from start to goal, without")
+    if between["via"]:
+        raise DescriptionError("--line: found --via too; expected a motion straight from start to goal, without")
+    around = {name: value for name, value in between.items() if name != "via"}
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
     path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])
-    return arm.plan_path(path, **options)
+    return arm.plan_path(path, **around, **options)
 
 
 def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_time: bool, degrees: bool) -> None:

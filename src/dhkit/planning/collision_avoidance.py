@@ -157,9 +157,9 @@ class Clearance(Constraint):
         return max(description.reach, MIN_REACH)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return 1 plus what is missing of the required distances in shares of the arm's reach, shape (N, 1)."""
+        """Return 1 plus what is missing of the required distances in shares of the arm's reach, shape (N, 1); at least 0."""
         short = self.avoidance.shortfalls(states.description, states.q)
-        return 1 + short[:, None] / self.unit(states.description)
+        return 1 + np.maximum(short[:, None] / self.unit(states.description), -1.0)
 
 
 def motion_constraints(

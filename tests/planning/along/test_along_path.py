@@ -3,17 +3,23 @@
 Modules: checks, grid, path_motion, path_point, path_states, timing.
 """
 
+from dataclasses import dataclass
+
+import casadi
 import numpy as np
 import pytest
 
 from dhkit.description import library_robot, pose, world_to_tool
-from dhkit.dynamics import gravity_torque, inverse_dynamics, mass_matrix
+from dhkit.dynamics import friction_torque, gravity_torque, inverse_dynamics, mass_matrix
 from dhkit.errors import PlanningError
 from dhkit.planning import (
+    Constraint,
     Effort,
     Energy,
     Jerk,
     MotorPower,
+    Obstacle,
+    Planner,
     Time,
     ToolAcceleration,
     ToolDirection,
@@ -22,6 +28,7 @@ from dhkit.planning import (
     TorqueSpeedLine,
     along_path,
 )
+from dhkit.planning.point import gear_ratios
 from dhkit.trajectories import JointPath, Limits, joint_path, tool_line
 from trajectories_reference import reference_torques
 
@@ -281,7 +288,7 @@ def states_of(motion):
 
 
 def test_the_report_says_how_it_was_found(tool_motion):
-    arm, path, motion = tool_motion
+    arm, _, motion = tool_motion
     report = motion.report
     assert report.duration == motion.duration == pytest.approx(report.cost, rel=1e-12)
     assert report.intervals == 200
@@ -383,3 +390,90 @@ def test_a_kept_direction_is_no_hindrance():
     arm, *_, path = line_of("cobra600")
     motion = along_path(arm, path, constraints=[ToolDirection()])
     assert motion.report.certificate.ok
+
+
+# Friction, energy, obstacles, and a constraint of one's own
+
+
+@dataclass(frozen=True)
+class SupplyPower(Constraint):
+    """Power of all motors together, which may also not be fed back, W; its limit is a parameter."""
+
+    watts: float
+    what = "supply power"
+    two_sided = True
+
+    def size(self, description):
+        return 1
+
+    def values(self, description, T_start):
+        return np.array([1 / self.watts])
+
+    def rows(self, point, parameters):
+        return casadi.dot(point.tau, point.qd) * parameters
+
+    def measured(self, states, parameters):
+        return np.sum(states.tau * states.qd, axis=1, keepdims=True) * parameters
+
+
+@pytest.mark.parametrize("robot", ["puma560", "cobra600"])
+@pytest.mark.parametrize("objective", ["time", "effort"])
+def test_a_constraint_of_ones_own_holds_in_both_programs(robot, objective):
+    arm, *_, path = line_of(robot)
+    ends = path.q(0.0), path.q(1.0)
+    for free, make in (
+        (along_path(arm, path), lambda **options: along_path(arm, path, objective=objective, **options)),
+        (Planner(arm).solve(*ends), lambda **options: planned(arm, objective, ends, **options)),
+    ):
+        most = np.abs(power(free)).max() / 3
+        duration = None if objective == "time" else 2 * free.duration
+        motion = make(constraints=[SupplyPower(most)], duration=duration)
+        assert np.abs(power(motion)).max() < most * (1 + KEPT)
+        if objective == "time":
+            assert np.abs(power(motion)).max() > most * (1 - 1e-2)
+            assert "supply power" in {limit.what for limit in motion.report.certificate.active}
+
+
+def planned(arm, objective, ends, constraints, duration):
+    return Planner(arm, objective, constraints=constraints).solve(*ends, duration=duration)
+
+
+def power(motion):
+    t = motion.sample_times(1000.0)
+    qd = motion.qd(t)
+    return np.sum(reference_torques(motion.description)(motion.q(t), qd, motion.qdd(t)) * qd, axis=1)
+
+
+def test_friction_slows_a_motion_down_and_is_in_its_torques(tool_motion):
+    arm, path, free = tool_motion
+    for wanted in ("time", "effort"):
+        duration = None if wanted == "time" else 2 * free.duration
+        motion = along_path(arm, path, objective=wanted, duration=duration, friction=True)
+        t = motion.sample_times(1000.0)
+        qd = motion.qd(t)
+        tau = reference_torques(arm)(motion.q(t), qd, motion.qdd(t)) + friction_torque(arm, qd, motion.friction)
+        assert (np.abs(tau) / Limits.of(arm).torque).max() < 1 + KEPT
+        np.testing.assert_allclose(motion.tau(t), tau, atol=1e-9)
+        if wanted == "time":
+            assert motion.duration > free.duration
+
+
+def test_energy_of_a_slide_in_a_given_time():
+    # Heat in the windings alone counts where power is fed back: least squared force, a cubic.
+    mass, weight = mass_matrix(COBRA, HOME)[SLIDE, SLIDE], gravity_torque(COBRA, HOME)[SLIDE]
+    wanted = Energy(motor_constants=2.0, regenerates=True)
+    motion = along_path(COBRA, slide(0.1), objective=wanted, duration=0.5, limits=STRONG)
+    gear = gear_ratios(COBRA)[SLIDE]
+    least = (12 * mass**2 * 0.1**2 / 0.5**3 + weight**2 * 0.5) / (2.0 * gear) ** 2
+    still = np.delete(gravity_torque(COBRA, HOME), SLIDE)
+    assert np.abs(still).max() < 1e-9
+    assert motion.report.cost == pytest.approx(least + weight * 0.1, rel=1e-3)
+
+
+def test_a_path_that_comes_too_near_an_obstacle_is_refused(tool_motion):
+    arm, path, free = tool_motion
+    middle = world_to_tool(arm, path.q(0.5))[:3, 3]
+    far = Obstacle.sphere(0.05, middle + np.array([0.0, 0.0, 3.0]), name="far")
+    assert along_path(arm, path, obstacles=[far], clearance=0.02).duration == pytest.approx(free.duration, rel=1e-9)
+    with pytest.raises(PlanningError, match=r"the path at s = .*: .* mm inside ball, 20 mm are asked for"):
+        along_path(arm, path, obstacles=[Obstacle.sphere(0.05, middle, name="ball")], clearance=0.02)

@@ -15,7 +15,6 @@ from dhkit.planning.loaded import LoadedArm
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.pieces import Side
 
-
 ROUNDING = 1e-9
 """Magnitude of a sum relative to that of its parts below which it counts as zero."""
 

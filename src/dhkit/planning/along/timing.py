@@ -15,7 +15,7 @@ from dhkit.description import Array
 from dhkit.planning.along.path_point import PathPoint
 from dhkit.planning.along.path_states import PathStates
 from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows
-from dhkit.planning.costs import cost_of
+from dhkit.planning.costs import size_of
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Arguments, Program, Starts, limit_rows
 from dhkit.planning.solver import Solver
@@ -171,7 +171,7 @@ class TimingProgram(Program[Profile]):
         K, unit = self.intervals, guess.duration
         cost = unit
         if not task.objective.only_time:
-            cost = cost_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
+            cost = size_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
         path = np.concatenate([self.states.steps[:, None], *self.states.coefficients], axis=1)
         given = [parameters for _, parameters in task.checker.every]
         lowest = MIN_SQUARED_SPEED / unit**2
