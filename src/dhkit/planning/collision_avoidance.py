@@ -157,7 +157,7 @@ class Clearance(Constraint):
         return max(description.reach, MIN_REACH)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return 1 plus what is missing of the required distances in shares of the arm's reach, shape (N, 1); at least 0."""
+        """Return 1 plus what is missing of the required distances in shares of the reach, shape (N, 1); at least 0."""
         short = self.avoidance.shortfalls(states.description, states.q)
         return 1 + np.maximum(short[:, None] / self.unit(states.description), -1.0)
 
