@@ -61,6 +61,7 @@ bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside pe
 	$(BIN)/python -m benchmarks.kinematics $(ARGS)
 	$(BIN)/python -m benchmarks.dynamics $(ARGS)
 	$(BIN)/python -m benchmarks.planning
+	$(BIN)/python -m benchmarks.planning_cases
 	$(BIN)/python -m benchmarks.scenes
 	$(BIN)/python -m benchmarks.control
 

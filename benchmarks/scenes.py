@@ -181,9 +181,9 @@ class SceneReport:
         short, over = (max(getattr(result, name) for result in self.results) for name in ("shortfall", "excess"))
         return (
             f"Motions in least time, {1000 * CLEARANCE:g} mm clear. Time: of one call, with the planner made before. "
-            f"At {CHECK_RATE:g} Hz the motions come at most {max(short, 0.0):.0e} m nearer than that, by coal, and exceed "
-            f"limits by at most {max(over, 0.0):.0e} of them, by Pinocchio. The best start: of {self.starts} further "
-            "motions, each started from a path of OMPL by another seed beside our own starts."
+            f"At {CHECK_RATE:g} Hz the motions come at most {max(short, 0.0):.0e} m nearer than that, by coal, and "
+            f"exceed limits by at most {max(over, 0.0):.0e} of them, by Pinocchio. The best start: of {self.starts} "
+            "more motions, each started from another path of OMPL beside our own starts."
         )
 
     def markdown(self) -> str:
@@ -252,9 +252,8 @@ def compare_scenes(
             if found is not None:
                 results.append(found)
                 ratio = "" if np.isinf(found.best) else f", {found.duration / found.best:.3f} of the best"
-                tell(
-                    f"{len(results)}: {found.robot}, {found.seconds:.2f} s, {found.duration:.3f} s{ratio} {found.reason}"
-                )
+                took = f"{found.seconds:.2f} s, {found.duration:.3f} s{ratio}"
+                tell(f"{len(results)}: {found.robot}, {took} {found.reason}")
     except KeyboardInterrupt:
         interrupted = True
     return SceneReport(tuple(results), starts, Machine.here(), interrupted)
@@ -276,8 +275,8 @@ def _scene(planner: Planner, scene: Scene, starts: int) -> SceneResult | None:
         reason = str(error)
     seconds = perf_counter() - begin
     best = np.inf
-    for seed in range(2, 2 + starts):
-        path = sampled.path(scene.start, scene.goal, PEER_SECONDS, seed)
+    for _ in range(starts):
+        path = sampled.path(scene.start, scene.goal, PEER_SECONDS)
         if path is None:
             continue
         try:

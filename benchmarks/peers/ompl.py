@@ -32,10 +32,12 @@ class SampledPaths:
         self.description, self.obstacles, self.clearance = description, obstacles, clearance
         self.checked = 0
 
-    def path(self, start: Array, goal: Array, seconds: float, seed: int = 1) -> Array | None:
-        """Return the configurations of a path, shape (k, n), rad and m; None if there is none within a time, s."""
+    def path(self, start: Array, goal: Array, seconds: float) -> Array | None:
+        """Return the configurations of a path, shape (k, n), rad and m; None if none is found within a time, s.
+
+        Each call continues OMPL's random numbers, and finds another path.
+        """
         base, n, numbers = self._base, self.description.n, self.description.numbers
-        self._util.RNG.setSeed(seed)
         space = base.RealVectorStateSpace(n)
         bounds = base.RealVectorBounds(n)
         for i in range(n):

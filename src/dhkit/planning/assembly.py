@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.planning.blocks import Indices
 from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.variables import Knots
 from dhkit.trajectories import Trajectory
@@ -27,8 +28,21 @@ def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, f
         Whether the first and the last acceleration must not be changed.
     """
     h = mesh.shares * knots.durations[mesh.leg]
-    W, U = _weights(mesh.curve, mesh.intervals)
-    ends = np.array(mesh.ends)
+    coefficients = corrected(mesh.curve, h, np.array(mesh.ends), knots, fixed_ends=fixed_ends)
+    return Trajectory(description, np.concatenate([[0.0], np.cumsum(h)]), coefficients)
+
+
+def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends: bool) -> Array:
+    """Return a motion's polynomials after that correction, shape (K, p+1, columns), ascending powers.
+
+    Parameters
+    ----------
+    h
+        Durations of the K intervals, shape (K,), s.
+    ends
+        Indices of the knots at which legs end.
+    """
+    W, U = _weights(curve, len(h))
     qdd = knots.qdd.copy()
     free = slice(1, -1) if fixed_ends else slice(None)
     # The state at the legs' ends is linear in the accelerations: v = v0 + sum h W a, q = q0 + sum (h v + h^2 U a).
@@ -42,11 +56,11 @@ def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, f
         gap = np.vstack([(knots.q[ends] - q[ends]) / length, knots.qd[ends] - qd[ends]])
         qdd[free] += np.linalg.lstsq(influence, gap, rcond=None)[0]
     q, qd = _integrated(knots, qdd, h, W, U)
-    interval = Interval(h[:, None], q[:-1], qd[:-1], *mesh.curve.values(qdd))
+    interval = Interval(h[:, None], q[:-1], qd[:-1], *curve.values(qdd))
     first, last = interval.jerks
     coefficients = np.stack([q[:-1], qd[:-1], interval.a / 2, first / 6, (last - first) / (24 * interval.h)], axis=1)
-    degree = (2, 3, 3, 4)[mesh.curve.value]
-    return Trajectory(description, np.concatenate([[0.0], np.cumsum(h)]), coefficients[:, : degree + 1])
+    degree = (2, 3, 3, 4)[curve.value]
+    return coefficients[:, : degree + 1]
 
 
 def _integrated(knots: Knots, qdd: Array, h: Array, W: Array, U: Array) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library.
 
-Modules: checks, grid, path_motion, path_point, path_states, timing.
+Modules: checks, grid, path_motion, path_point, path_program, path_states, smooth_timing, timing.
 """
 
 from dataclasses import dataclass
@@ -343,6 +343,7 @@ SPIKE = JointPath(
         [[-0.75 + W * (1 + PEAK), 0], [0.5, 0], [0, 0]],
     ],
 )
+BEND = JointPath(ARM, [0, 0.5, 1], [[[0, 0], [1, 0], [1, 0]], [[0.75, 0], [2, 0], [0, 0]]])
 SHORT = JointPath.straight(ARM, [0, 0], [1, 0])
 LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
 
@@ -354,7 +355,7 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
         (LINGERS, {}, "stands still at s = 0:"),
         (SPIKE, {}, "singular at s = 0.5: joint .* turns ever faster"),
         (JointPath.straight(ARM, [0, 0], [9, 0]), {}, "the path at s = 1: joint .* above its upper limit"),
-        (SHORT, {"limits": Limits.of(ARM, jerk=9.0)}, "jerk is limited"),
+        (BEND, {"limits": Limits.of(ARM, jerk=9.0)}, "curvature jumps at s = 0.5, where joint .* infinite jerk"),
         (SHORT, {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
         (SHORT, {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
         (SHORT, {"time_limit": 1e-9}, "time limit"),
@@ -477,3 +478,52 @@ def test_a_path_that_comes_too_near_an_obstacle_is_refused(tool_motion):
     assert along_path(arm, path, obstacles=[far], clearance=0.02).duration == pytest.approx(free.duration, rel=1e-9)
     with pytest.raises(PlanningError, match=r"the path at s = .*: .* mm inside ball, 20 mm are asked for"):
         along_path(arm, path, obstacles=[Obstacle.sphere(0.05, middle, name="ball")], clearance=0.02)
+
+
+# Limits of jerk
+
+
+@pytest.mark.parametrize(
+    ("d", "v", "a"), [(0.2, np.inf, np.inf), (0.2, 0.3, np.inf), (0.2, np.inf, 0.5), (0.2, 0.3, 0.5)]
+)
+def test_under_a_limit_of_jerk_a_slide_is_a_double_s(d, v, a):
+    j = 3.0
+    v, a = min(v, 1e3), min(a, 1e3)
+    # Biagiotti and Melchiorri 2008, Trajectory Planning for Automatic Machines and Robots, section 3.4, from rest.
+    rise = a / j if v * j >= a**2 else np.sqrt(v / j)
+    speeding = rise + v / a if v * j >= a**2 else 2 * rise
+    best = d / v + speeding
+    if d < v * speeding:  # the speed is not reached
+        best = 4 * (d / (2 * j)) ** (1 / 3) if d < 2 * a**3 / j**2 else a / j + np.sqrt((a / j) ** 2 + 4 * d / a)
+    limits = Limits.of(COBRA, velocity=v, acceleration=a, torque=np.inf, jerk=j)
+    motion = along_path(COBRA, slide(d), limits=limits)
+    assert motion.duration == pytest.approx(best, rel=1e-3)
+    assert motion.duration >= best * (1 - 1e-6)
+    assert np.abs(motion.jerk(motion.sample_times(1000.0))).max() < j * (1 + KEPT)
+
+
+@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("objective", ["time", "effort"])
+def test_jerk_is_limited_along_a_line(name, objective):
+    arm, *_, path = line_of(name)
+    free, limits = along_path(arm, path), Limits.of(arm, jerk=300.0)
+    motion = along_path(arm, path, limits=limits)
+    assert motion.duration > free.duration
+    if objective == "effort":
+        slow = along_path(arm, path, objective="effort", duration=1.5 * motion.duration, limits=limits)
+        assert slow.report.cost < motion_cost(motion.slowed(1.5))
+        motion = slow
+    t = motion.sample_times(5000.0)
+    by_differences = np.diff(motion.qdd(t), axis=0) / np.diff(t)[:, None]
+    assert np.abs(by_differences).max() < 300.0 * (1 + 1e-5)
+    assert excess(motion, limits) < KEPT
+    for end in (0.0, motion.duration):
+        assert np.abs(motion.qd(end)).max() < 1e-9 > np.abs(motion.qdd(end)).max() * 1e-3
+    if objective == "time":
+        assert np.abs(motion.jerk(t)).max() > 300.0 * (1 - 1e-2)
+
+
+def motion_cost(motion):
+    t = np.linspace(0, motion.duration, 20_000)
+    tau = reference_torques(motion.description)(motion.q(t), motion.qd(t), motion.qdd(t))
+    return np.trapezoid(np.sum(tau**2, axis=1), t)

@@ -6,7 +6,7 @@ import numpy as np
 
 from dhkit.errors import PlanningError
 from dhkit.planning.along.grid import JUMP_ROUNDING, jumps
-from dhkit.planning.along.timing import TimingProgram
+from dhkit.planning.along.path_program import PathProgram, Profile
 from dhkit.planning.feasibility import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.loaded import LoadedArm
@@ -26,28 +26,27 @@ def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> Non
     Raises
     ------
     PlanningError
-        Jerk is limited, the path leaves the joint limits, has a corner, stands still or is singular, or the arm cannot
-        hold itself at one of its ends.
+        The path leaves the joint limits, has a corner (or a jump of curvature, if jerk is limited), stands still or is
+        singular, or the arm cannot hold itself at one of its ends.
     """
-    if np.isfinite(limits.jerk).any():
-        raise PlanningError("jerk is limited: along a path accelerations jump; give limits without those of jerk")
     s, q = (array.reshape(-1, description.n) for array in path.pieces.extremes())
     k, i = np.unravel_index(int(np.argmax(np.maximum(limits.lower - q, q - limits.upper))), q.shape)
     require_inside_limits(description, limits, q[k], f"the path at s = {s[k, i]:.4g}")
-    _require_no_corner(path)
+    _require_no_jump(path, 1, "the path has a corner", "turns suddenly: plan to it and on from it")
+    if np.isfinite(limits.jerk).any():
+        _require_no_jump(path, 2, "the path's curvature jumps", "would need infinite jerk, which is limited")
     _require_regular(path)
     for where, end in (("the path's beginning", 0.0), ("the path's end", 1.0)):
         require_holdable(description, limits, path.q(end), where)
 
 
-def _require_no_corner(path: JointPath) -> None:
-    steps = np.abs(jumps(path, 1))
-    if steps.size and steps.max() > JUMP_ROUNDING * np.abs(path.qs(path.breaks)).max():
+def _require_no_jump(path: JointPath, order: int, what: str, joint_does: str) -> None:
+    """Require a path whose derivative by s of an order does not jump."""
+    steps, values = np.abs(jumps(path, order)), path.pieces.differentiated(order)(path.breaks)
+    if steps.size and steps.max() > JUMP_ROUNDING * np.abs(values).max():
         k, i = np.unravel_index(int(np.argmax(steps)), steps.shape)
-        raise PlanningError(
-            f"the path has a corner at s = {path.breaks[k + 1]:.4g}, where joint {path.description.joints[i].name} "
-            "turns suddenly: plan to it and on from it"
-        )
+        name = path.description.joints[i].name
+        raise PlanningError(f"{what} at s = {path.breaks[k + 1]:.4g}, where joint {name} {joint_does}")
 
 
 def _require_regular(path: JointPath) -> None:
@@ -65,7 +64,7 @@ def _require_regular(path: JointPath) -> None:
         raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there")
 
 
-def require_kept(program: TimingProgram) -> None:
+def require_kept(program: PathProgram[Profile]) -> None:
     """Require that a path keeps the constraints at rest, and that some limit bounds the speed along it.
 
     Raises
@@ -88,14 +87,14 @@ def require_kept(program: TimingProgram) -> None:
                 f"{constraint.what} is exceeded by {100 * (use[k] - 1):.2g} % at s = {s[k]:.4g}, at any speed"
             )
     moves = np.abs(states.qs).max(axis=(0, 1)) > 0
-    limited = np.isfinite(task.limits.torque) | np.isfinite(task.limits.acceleration)
+    limited = np.isfinite([task.limits.torque, task.limits.acceleration, task.limits.jerk]).any(axis=0)
     if task.objective.only_time and not (moves & limited).any():
         raise PlanningError(
-            "nothing limits acceleration along the path: no joint that moves has a limit of it or of torque"
+            "nothing limits acceleration along the path: no joint that moves has a limit of it, of jerk or of torque"
         )
 
 
-def require_holdable_along(program: TimingProgram) -> None:
+def require_holdable_along(program: PathProgram[Profile]) -> None:
     """Require torque limits that hold the arm everywhere on a path; asked only of paths without a solution.
 
     Raises

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from dhkit.description import Description, Payload, takes_robot
+from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.description.frames import world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_holdable_along, require_kept, require_path
 from dhkit.planning.along.grid import knots_of
+from dhkit.planning.along.path_program import MAX_INTERVALS, PathProgram, Profile
 from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.along.timing import MAX_INTERVALS, Profile, TimingProgram
+from dhkit.planning.along.smooth_timing import SmoothTimingProgram
+from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
@@ -62,9 +64,10 @@ def along_path(
 ) -> Trajectory:
     """Return the best motion along a path, from rest to rest, which stays exactly on the path.
 
-    With s(t) of piecewise constant acceleration the motion is q(s(t)). Its limits are checked at eight states of each
-    interval, and by parabolas between them, with torques by Pinocchio if it is installed. Where limits are exceeded,
-    the grid is refined and limits are tightened or, if a thousandth suffices, the motion is slowed down.
+    With s(t) of piecewise constant acceleration, or of piecewise linear acceleration under limits of jerk, the motion
+    is q(s(t)). Its limits are checked at eight states of each interval, and by parabolas between them, with torques by
+    Pinocchio if it is installed. Where limits are exceeded, the grid is refined and limits are tightened or, if a
+    thousandth suffices, the motion is slowed down.
 
     Parameters
     ----------
@@ -77,7 +80,7 @@ def along_path(
     duration
         Duration, s; required for objectives without time.
     limits
-        Limits; the robot's own if not given. Jerk is infinite at the intervals' ends and cannot be limited.
+        Limits; the robot's own if not given. Under limits of jerk the path must not have jumps of curvature.
     constraints
         Further constraints, such as :class:`dhkit.planning.ToolSpeed`.
     intervals
@@ -176,32 +179,39 @@ def _best_timing(
     states = PathStates.of(task.loaded, path, rough)
     s = knots_of(path, intervals, rough, states.even_speeds(limits))
 
-    def program_of(task: Task) -> TimingProgram:
+    def searched(task: Task, program: PathProgram[Profile], start: Profile | None) -> tuple[PlannedMotion, Profile]:
+        search = Search(task, program, deadline, work, progress)
+        found = search(starts=None if start is None else Starts([lambda: program.again(start, start)]))
+        return found, cast("Profile", search.found)
+
+    def best(kind: Callable[[Task, Array], PathProgram[Profile]]) -> PlannedMotion:
+        is_quick = task.objective.only_time and task.duration is None
+        quick = task if is_quick else replace(task, objective=QUICKEST, duration=None)
+        program = made(kind, quick)
+        require_kept(program)
+        try:
+            found, profile = searched(quick, program, None)
+            if is_quick:
+                return found
+            quickest = found.trajectory.duration
+            if task.duration is not None and quickest > task.duration * (1 + TIME_SCALING_MARGIN):
+                raise PlanningError(
+                    f"{task.duration:.6g} s are too short: the limits allow the motion along the path in "
+                    f"{quickest:.6g} s"
+                )
+            start = profile.lasting(task.duration or DURATION_FACTOR * quickest)
+            return searched(task, made(kind, task), start)[0]
+        except PlanningError:
+            require_holdable_along(program)
+            raise
+
+    def made(kind: Callable[[Task, Array], PathProgram[Profile]], task: Task) -> PathProgram[Profile]:
         building = time.perf_counter()
-        program = TimingProgram(task, s)
+        program = kind(task, s)
         work.build_seconds += time.perf_counter() - building
         return program
 
-    quick = replace(task, objective=QUICKEST, duration=None)
-    is_quick = task.objective.only_time and task.duration is None
-    program = program_of(task if is_quick else quick)
-    require_kept(program)
-    search = Search(program.task, program, deadline, work, progress)
-    try:
-        found = search()
-        if is_quick:
-            return found
-        quickest, profile = found.trajectory.duration, cast("Profile", search.found)
-        if task.duration is not None and quickest > task.duration * (1 + TIME_SCALING_MARGIN):
-            raise PlanningError(
-                f"{task.duration:.6g} s are too short: the limits allow the motion along the path in {quickest:.6g} s"
-            )
-        guess = profile.lasting(task.duration or DURATION_FACTOR * quickest)
-        program = program_of(task)
-        return Search(task, program, deadline, work, progress)(starts=Starts([lambda: program.again(guess, guess)]))
-    except PlanningError:
-        require_holdable_along(program)
-        raise
+    return best(SmoothTimingProgram) if np.isfinite(limits.jerk).any() else best(TimingProgram)
 
 
 def _require_objective(objective: Objective, duration: float | None) -> None:

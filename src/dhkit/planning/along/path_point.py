@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class PathPoint(Point):
     """A state on a path: its speed and acceleration sd and sdd along it, and the path's coefficients there.
 
-    The coefficients are those of :class:`PathStates`, 6 n + 6.
+    The coefficients are those of :class:`PathStates`, 7 n + 6.
     """
 
     def __init__(self, description: Description, limits: Limits, friction: Friction | None) -> None:
@@ -28,8 +28,9 @@ class PathPoint(Point):
         n = description.n
         self.description, self.limits, self.n, self.friction = description, limits, n, friction
         self.b, self.speed, self.sdd = (casadi.SX.sym(name) for name in ("b", "speed", "sdd"))
-        self.path = casadi.SX.sym("path", 6 * n + 6)
-        q, qs, qss, m, c, g, ps, pss = casadi.vertsplit(self.path, [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6])
+        self.path = casadi.SX.sym("path", 7 * n + 6)
+        edges = [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6, 7 * n + 6]
+        q, qs, qss, m, c, g, ps, pss, _ = casadi.vertsplit(self.path, edges)
         self.q, self.qd, self.qdd = q, qs * self.speed, qs * self.sdd + qss * self.b
         self.load = casadi.SX(0, 1)  # torques along the path include the payload
         self._rigid = m * self.sdd + c * self.b + g

@@ -39,13 +39,14 @@ class PathStates:
     ps: Array
     """Derivatives of the tool's position by s, shape (2, K, 3), m."""
     pss: Array
+    qsss: Array
 
     @classmethod
     def of(cls, arm: LoadedArm, path: JointPath, knots: Array) -> PathStates:
         """Evaluate a path (rad and m) on knots (K+1,); at jumps of curvature each interval has its side's value."""
-        first, second = path.pieces.derivative, path.pieces.derivative.derivative
+        pieces = [path.pieces.differentiated(order) for order in range(4)]
         ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
-        q, qs, qss = (np.stack([piece(s, side) for s, side in ends]) for piece in (path.pieces, first, second))
+        q, qs, qss, qsss = (np.stack([piece(s, side) for s, side in ends]) for piece in pieces)
         still = np.zeros_like(q)
         m = c = g = still
         if np.isfinite(arm.numbers.mass).all():
@@ -55,7 +56,7 @@ class PathStates:
         J, Jd = kinematics.jacobian(arm, q), kinematics.jacobian_dot(arm, q, qs)
         ps = np.einsum("...ij,...j->...i", J[..., :3, :], qs)
         pss = np.einsum("...ij,...j->...i", J[..., :3, :], qss) + np.einsum("...ij,...j->...i", Jd[..., :3, :], qs)
-        return cls(np.stack([knots[:-1], knots[1:]]), q, qs, qss, m, c, g, ps, pss)
+        return cls(np.stack([knots[:-1], knots[1:]]), q, qs, qss, m, c, g, ps, pss, qsss)
 
     @property
     def steps(self) -> Array:
@@ -65,8 +66,9 @@ class PathStates:
 
     @property
     def coefficients(self) -> Array:
-        """Arguments of :class:`PathPoint` at both ends of the intervals, shape (2, K, 6 n + 6)."""
-        return np.concatenate([self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss], axis=-1)
+        """Arguments of :class:`PathPoint` at both ends of the intervals, shape (2, K, 7 n + 6)."""
+        parts = [self.q, self.qs, self.qss, self.m, self.c, self.g, self.ps, self.pss, self.qsss]
+        return np.concatenate(parts, axis=-1)
 
     # Speeds without friction and further constraints, for grids and guesses
 

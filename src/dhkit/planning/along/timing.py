@@ -7,31 +7,24 @@ b without friction: Verscheure et al. 2009, Time-optimal path tracking for robot
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.along.path_point import PathPoint
-from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows
-from dhkit.planning.costs import size_of
+from dhkit.planning.along.path_program import PathProgram
+from dhkit.planning.blocks import Block, BlockProgram, LocalFunction, RowKind, Rows
 from dhkit.planning.joint_limits import Limit
-from dhkit.planning.program import Arguments, Program, Starts, limit_rows
+from dhkit.planning.program import Arguments, Starts
 from dhkit.planning.solver import Solver
 from dhkit.planning.task import Margins, Task
-from dhkit.trajectories import JointPath, Trajectory
+from dhkit.trajectories import Trajectory
 
-MAX_INTERVALS = 2000
-"""Largest number of requested intervals; after refinement there may be twice as many."""
 MIN_SQUARED_SPEED = 1e-7
 """Smallest b at inner knots, relative to about the path's mean: Ipopt relaxes bounds by a tenth of it."""
 TIME_TOLERANCE, SMOOTH_TOLERANCE = 1e-7, 1e-8
 """Ipopt's tolerances for time (scaled to 1) and for other objectives; each active limit costs a tenth of it."""
 GUESS_SPEED_SHARE = 0.5
 """Squared speed of the initial guess as a share of the largest possible."""
-REFINED = 4
-"""Factor by which the excess inside an interval falls if the interval is halved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +52,8 @@ class Profile:
         return Profile(self.s, self.b * (self.duration / duration) ** 2)
 
 
-class TimingProgram(Program[Profile]):
-    """The program of one task along a path.
+class TimingProgram(PathProgram[Profile]):
+    """The program of one task along a path, without limits of jerk.
 
     The variables are the durations of the intervals and b at the inner knots. The rows of an interval are the time that
     it takes beyond its duration, and limits at its left and right end; the last row is the duration. For objectives
@@ -75,31 +68,13 @@ class TimingProgram(Program[Profile]):
         Path parameters of the grid's knots, shape (K+1,).
     """
 
-    small_step = 1e-3
-
     def __init__(self, task: Task, s: Array) -> None:
         import casadi
 
-        path = cast("JointPath", task.path)
-        self.task, self.path, self.s, self.intervals = task, path, s, len(s) - 1
-        self.states = PathStates.of(task.loaded, path, s)
+        super().__init__(task, s)
         self._logarithmic = not task.objective.only_time
-        self._limited = [
-            (k, constraint)
-            for k, (constraint, _) in task.checker.limiting.items()
-            if constraint.moving and k not in (Limit.VELOCITY, Limit.JERK)
-        ]
-        self._point = PathPoint(task.loaded, task.limits, task.friction)
-        K, path_size = self.intervals, int(self._point.path.numel())
-        self._sizes = [len(parameters) for _, parameters in task.checker.every]
-        of_interval, of_all = 1 + 2 * path_size, sum(self._sizes) + 1
+        K, parameters = self.intervals, self.parameters_at
         step = np.arange(K)
-        parameters = np.vstack(
-            [
-                of_interval * step + np.arange(of_interval)[:, None],
-                np.tile((K * of_interval + np.arange(of_all))[:, None], K),
-            ]
-        )
         durations, inner = step[None], K + step[None, :-1]
         total, each = casadi.SX.sym("total", K), np.stack([step, step], axis=1)
         middle = np.vstack([durations[:, 1:-1], inner[:, :-1], inner[:, 1:]])
@@ -115,7 +90,7 @@ class TimingProgram(Program[Profile]):
         duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
         kinds = (Rows(RowKind.DURATION, "duration", 1),)
         blocks.append(Block(duration, durations.T, np.zeros((0, 1), dtype=int), kinds))
-        self.blocks = BlockProgram(2 * K - 1, K * of_interval + of_all, tuple(blocks))
+        self.blocks = BlockProgram(2 * K - 1, self.parameter_count, tuple(blocks))
         tolerance = TIME_TOLERANCE if task.objective.has_time else SMOOTH_TOLERANCE
         self.solver = Solver(self.blocks, K, tolerance=tolerance)
 
@@ -123,10 +98,8 @@ class TimingProgram(Program[Profile]):
         """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
         import casadi
 
-        symbol, point = casadi.SX.sym, self._point
-        duration, inner = symbol("duration"), symbol("b", 2 - first - last)
-        step, left, right = symbol("step"), symbol("left", point.path.numel()), symbol("right", point.path.numel())
-        given, scale = [symbol(f"p{k}", size) for k, size in enumerate(self._sizes)], symbol("scale")
+        duration, inner = casadi.SX.sym("duration"), casadi.SX.sym("b", 2 - first - last)
+        step, left, right, given, scale = self.symbols()
         known = casadi.vertsplit(casadi.exp(inner) if self._logarithmic else inner)
         # At rest the speed is a constant: the square root has no derivative there.
         rest = [casadi.SX(0)]
@@ -134,17 +107,13 @@ class TimingProgram(Program[Profile]):
         speed = [*rest * first, *(casadi.sqrt(part) for part in known), *rest * last]
         kinds = [Rows(RowKind.TIME, "duration of an interval", 1)]
         rows, rates = [2 * step / (speed[0] + speed[1]) - duration], []
-        limits = limit_rows(self._limited, point, given)
-        expressions = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits))
-        state = [point.sdd, point.b, point.speed, point.path]
-        results = [expressions, self.task.objective.integrand(point)]
-        at_state = casadi.Function("at_state", [*state, *given], results, {"cse": True})
+        at_state, limits = self.at_state(given)
         sdd = (b[1] - b[0]) / (2 * step)
         for x, v, coefficients in zip(b, speed, (left, right), strict=True):
             row, rate = at_state(sdd, x, v, coefficients, *given)
             rows.append(row)
             rates.append(rate)
-            kinds += [kind for kind, _ in limits]
+            kinds += limits
         cost = scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
         z, p = casadi.vertcat(duration, inner), casadi.vertcat(step, left, right, *given, scale)
         return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
@@ -169,11 +138,6 @@ class TimingProgram(Program[Profile]):
     def arguments(self, task: Task, guess: Profile, margins: Margins) -> Arguments:
         """Return the arguments of a solution; the unit of time is the guess's duration."""
         K, unit = self.intervals, guess.duration
-        cost = unit
-        if not task.objective.only_time:
-            cost = size_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
-        path = np.concatenate([self.states.steps[:, None], *self.states.coefficients], axis=1)
-        given = [parameters for _, parameters in task.checker.every]
         lowest = MIN_SQUARED_SPEED / unit**2
         shares = margins.of(Limit.VELOCITY, task.arm.n)
         high = np.maximum(self.states.fastest(task.limits, shares)[1:-1], 2 * lowest)
@@ -189,7 +153,7 @@ class TimingProgram(Program[Profile]):
         low = self._variables(np.zeros(K), np.full(K - 1, lowest))
         return Arguments(
             self._variables(np.diff(guess.times), np.maximum(guess.b[1:-1], lowest)),
-            np.concatenate([path.ravel(), *given, [1 / cost]]),
+            self.parameters(task, guess),
             (low, self._variables(np.full(K, np.inf), high)),
             scaling,
         )
@@ -206,29 +170,8 @@ class TimingProgram(Program[Profile]):
         inside = np.exp(inner) if self._logarithmic else np.maximum(inner, 0.0)
         return Profile(self.s, np.concatenate([[0.0], inside, [0.0]]))
 
-    def trajectory(self, task: Task, found: Profile) -> Trajectory:
-        """Return the motion along the path, with exactly the duration of the task if it has one."""
-        speed, times = np.sqrt(found.b), found.times
+    def law(self, found: Profile) -> tuple[Array, Array]:
+        """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, 3)."""
+        speed = np.sqrt(found.b)
         sdd = (speed[1:] - speed[:-1]) * (speed[1:] + speed[:-1]) / (2 * np.diff(found.s))
-        trajectory = self.path.timed(times, np.stack([found.s[:-1], speed[:-1], sdd / 2], axis=1))
-        return trajectory if task.duration is None else trajectory.slowed(task.duration / times[-1])
-
-    def interval_of(self, trajectory: Trajectory, found: Profile) -> Indices:
-        """Return the interval that each piece of a trajectory lies in: its breaks are between those of the grid."""
-        ends, breaks = found.times / found.duration, trajectory.breaks / trajectory.duration
-        interval: Indices = np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1
-        return np.clip(interval, 0, self.intervals - 1)
-
-    def place(self, interval: float) -> str:
-        """Return a place of the motion as text."""
-        return f"s = {self.s[int(min(interval, self.intervals - 1))]:.4g}"
-
-    def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[TimingProgram, Margins]:
-        """Return the program with intervals halved where limits are exceeded most, and margins raised elsewhere."""
-        is_refined = np.any([(share > self.small_step).any(axis=1) for share in more.values()], axis=0)
-        if not is_refined.any() or self.intervals + is_refined.sum() > 2 * MAX_INTERVALS:
-            return self, margins.raised(more)
-        factor = np.where(is_refined, 1 / REFINED, 1.0)[:, None]
-        margins = margins.raised({limit: factor * share for limit, share in more.items()})
-        middles = ((self.s[1:] + self.s[:-1]) / 2)[is_refined]
-        return TimingProgram(self.task, np.sort(np.append(self.s, middles))), margins.divided(1 + is_refined)
+        return found.times, np.stack([found.s[:-1], speed[:-1], sdd / 2], axis=1)

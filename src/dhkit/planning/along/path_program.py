@@ -1,0 +1,139 @@
+"""What the programs along a path share: the grid, the path's coefficients, and the limits of a state."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.planning.along.path_point import PathPoint
+from dhkit.planning.along.path_states import PathStates
+from dhkit.planning.blocks import Indices, Rows
+from dhkit.planning.costs import size_of
+from dhkit.planning.joint_limits import Limit
+from dhkit.planning.program import Program, limit_rows
+from dhkit.planning.task import Margins, Task
+from dhkit.trajectories import JointPath, Trajectory
+
+if TYPE_CHECKING:
+    import casadi
+
+MAX_INTERVALS = 2000
+"""Largest number of requested intervals; after refinement there may be twice as many."""
+REFINED = 4
+"""Factor by which the excess inside an interval falls if the interval is halved."""
+
+
+class Timed(Protocol):
+    """A motion along a path on a grid."""
+
+    @property
+    def times(self) -> Array:
+        """Times of the knots, shape (K+1,), s."""
+        ...
+
+    def lasting(self, duration: float) -> Self:
+        """Return the same motion, slower or faster, with another duration, s."""
+        ...
+
+
+Profile = TypeVar("Profile", bound=Timed)
+
+
+class PathProgram(Program[Profile]):
+    """A program of one task along a path.
+
+    Its parameters are, for each interval, the length in s and the path's coefficients at both ends; then those of all
+    constraints, and the scale of the cost.
+
+    Parameters
+    ----------
+    task
+        The task, with its path.
+    s
+        Path parameters of the grid's knots, shape (K+1,).
+    """
+
+    small_step = 1e-3
+
+    def __init__(self, task: Task, s: Array) -> None:
+        self.task, self.path, self.s, self.intervals = task, cast("JointPath", task.path), s, len(s) - 1
+        self.states = PathStates.of(task.loaded, self.path, s)
+        self.point = PathPoint(task.loaded, task.limits, task.friction)
+        self._limited = [
+            (k, constraint)
+            for k, (constraint, _) in task.checker.limiting.items()
+            if constraint.moving and k not in (Limit.VELOCITY, Limit.JERK)
+        ]
+        K, of_interval = self.intervals, 1 + 2 * int(self.point.path.numel())
+        self.sizes = [len(parameters) for _, parameters in task.checker.every]
+        of_all = sum(self.sizes) + 1
+        own, common = of_interval * np.arange(K) + np.arange(of_interval)[:, None], K * of_interval + np.arange(of_all)
+        self.parameters_at: Indices = np.vstack([own, np.tile(common[:, None], K)])
+        """Indices of each interval's parameters, shape (parameters, K)."""
+        self.parameter_count = K * of_interval + of_all
+
+    def symbols(self) -> tuple[casadi.SX, casadi.SX, casadi.SX, list[casadi.SX], casadi.SX]:
+        """Return symbols of an interval's parameters: its length, both ends' coefficients, constraints, scale."""
+        import casadi
+
+        symbol, size = casadi.SX.sym, int(self.point.path.numel())
+        given = [symbol(f"p{k}", count) for k, count in enumerate(self.sizes)]
+        return symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale")
+
+    def at_state(self, given: list[casadi.SX]) -> tuple[casadi.Function, list[Rows]]:
+        """Return the rows and the integrand as a function of sdd, sd^2, sd, coefficients and ``given``; and the kinds.
+
+        Parameters
+        ----------
+        given
+            Parameters of all constraints.
+        """
+        import casadi
+
+        point, limits = self.point, limit_rows(self._limited, self.point, given)
+        rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits))
+        inputs = [point.sdd, point.b, point.speed, point.path, *given]
+        results = [rows, self.task.objective.integrand(point)]
+        return casadi.Function("at_state", inputs, results, {"cse": True}), [kind for kind, _ in limits]
+
+    def parameters(self, task: Task, guess: Profile) -> Array:
+        """Return the parameters, shape (parameters,); the guess's cost is the unit of the cost."""
+        cost = float(guess.times[-1])
+        if not task.objective.only_time:
+            cost = size_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
+        path = np.concatenate([self.states.steps[:, None], *self.states.coefficients], axis=1)
+        given = [parameters for _, parameters in task.checker.every]
+        return np.concatenate([path.ravel(), *given, [1 / cost]])
+
+    @abstractmethod
+    def law(self, found: Profile) -> tuple[Array, Array]:
+        """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, p+1)."""
+
+    def trajectory(self, task: Task, found: Profile) -> Trajectory:
+        """Return the motion along the path, with exactly the duration of the task if it has one."""
+        times, coefficients = self.law(found)
+        trajectory = self.path.timed(times, coefficients)
+        return trajectory if task.duration is None else trajectory.slowed(task.duration / times[-1])
+
+    def interval_of(self, trajectory: Trajectory, found: Profile) -> Indices:
+        """Return the interval that each piece of a trajectory lies in: its breaks are between those of the grid."""
+        ends, breaks = found.times / found.times[-1], trajectory.breaks / trajectory.duration
+        interval: Indices = np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1
+        return np.clip(interval, 0, self.intervals - 1)
+
+    def place(self, interval: float) -> str:
+        """Return a place of the motion as text."""
+        return f"s = {self.s[int(min(interval, self.intervals - 1))]:.4g}"
+
+    def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[Self, Margins]:
+        """Return the program with intervals halved where limits are exceeded most, and margins raised elsewhere."""
+        is_refined = np.any([(share > self.small_step).any(axis=1) for share in more.values()], axis=0)
+        if not is_refined.any() or self.intervals + is_refined.sum() > 2 * MAX_INTERVALS:
+            return self, margins.raised(more)
+        factor = np.where(is_refined, 1 / REFINED, 1.0)[:, None]
+        margins = margins.raised({limit: factor * share for limit, share in more.items()})
+        middles = ((self.s[1:] + self.s[:-1]) / 2)[is_refined]
+        return type(self)(self.task, np.sort(np.append(self.s, middles))), margins.divided(1 + is_refined)
