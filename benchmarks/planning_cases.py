@@ -213,7 +213,7 @@ def _first_of_panda(seed: int) -> Iterator[Case]:
 
 
 def _beside_table(*, is_first: bool) -> Iterator[Case]:
-    """A box between start and goal, above a table."""
+    """Yield motions with a box between start and goal, above a table."""
     arm, rng = library_robot("ur5"), np.random.default_rng(0)
     planner = Planner(arm)
     for _ in range(20):
@@ -250,7 +250,8 @@ def _small_moves() -> Iterator[Case]:
     planner.solve(start, start + 0.3)
     for size in np.geomspace(1e-9, 1e-2, 22):
         for direction in ((1.0, 1.0), (1.0, -0.5)):
-            yield lambda goal=start + size * np.array(direction): planner.solve(start, goal)  # type: ignore[misc]
+            goal = start + size * np.array(direction)
+            yield lambda goal=goal: planner.solve(start, goal)  # type: ignore[misc]
 
 
 def _fast_panda(seed: int) -> Iterator[Case]:
@@ -272,7 +273,7 @@ def _pose_goals(seed: int) -> Iterator[Case]:
 def _new_processes() -> Iterator[Case]:
     for k in range(20):
         with tempfile.TemporaryDirectory() as folder:
-            environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "XDG_CACHE_HOME": folder}
+            environment = {**os.environ, "DHKIT_CACHE_DIR": folder}
             program = [sys.executable, "-c", FIRST_MOTION.format(last=1.0 - 0.05 * k)]
 
             def find(program: list[str] = program, environment: dict[str, str] = environment) -> None:
